@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The small part of FreeCAD's document model that the walker touches, under FreeCAD's own names.
+
+Live FreeCAD objects, objects read from an FCStd file (:mod:`silo.fcstd`) and the tests' fakes all have this
+shape. Only what the spec's listing touches is required; every other attribute may be absent and then counts
+as unset. Two traps of the live objects shape the helpers below (measured, FreeCAD 0.20 to 1.1):
+
+* attributes of a link are forwarded to its target, so ``hasattr(link, "Group")`` says nothing about the link;
+  ``own()`` asks ``PropertiesList`` first where the object has one;
+* a type is asked with ``isDerivedFrom``, which is not forwarded and is False for unknown names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol, runtime_checkable
+
+from silo.bom.findings import FindingCode
+
+
+@runtime_checkable
+class DocumentLike(Protocol):
+    """A FreeCAD document. ``FileName`` is an absolute path, "" while unsaved.
+
+    Optional: ``Label``, ``Name``, ``Objects`` (all objects, in document order), ``Meta`` (str → str),
+    ``getPropertyByName(name)`` (AttributeError where there is no such property), ``getObject(name)``.
+    """
+
+    @property
+    def FileName(self) -> str: ...
+
+
+@runtime_checkable
+class ObjectLike(Protocol):
+    """A FreeCAD document object.
+
+    Optional: ``Name``, ``Label``, ``TypeId``, ``PropertiesList``, ``Group``, ``LinkedObject`` (an object,
+    None, or a tuple ``(object, sub_name)``), ``ElementCount``, ``ElementList``, ``Visibility``, ``ScaleVector``,
+    ``ScaleList``, ``LinkCopyOnChangeSource``, ``Suppressed``, ``SiloBomExclude``, ``SiloItemId``, ``SiloUUID``,
+    and for Draft arrays ``Base`` and ``Count``.
+    """
+
+    @property
+    def Document(self) -> DocumentLike: ...
+
+    def isDerivedFrom(self, type_name: str, /) -> bool: ...
+
+
+def derived(obj: object, type_name: str) -> bool:
+    """True where ``obj`` says it is of (a type derived from) ``type_name``."""
+    ask = getattr(obj, "isDerivedFrom", None)
+    return bool(ask(type_name)) if callable(ask) else False
+
+
+def own(obj: object, name: str, default: Any = None) -> Any:
+    """The object's own property ``name``; never that of a link's target."""
+    names: Sequence[str] | None = getattr(obj, "PropertiesList", None)
+    if names is not None and name not in names:
+        return default
+    return getattr(obj, name, default)
+
+
+def document_property(doc: object, name: str) -> Any:
+    """A property of the document, None where there is none (FreeCAD 0.20 has no such properties at all)."""
+    ask = getattr(doc, "getPropertyByName", None)
+    if callable(ask):
+        try:
+            return ask(name)
+        except (AttributeError, KeyError):
+            return None
+    return getattr(doc, name, None)
+
+
+@dataclass(frozen=True, slots=True)
+class LinkProblem:
+    """Why a link has no target. ``file`` and ``obj`` as the link records them ("" where unknown).
+
+    A reader that knows more than ``LinkedObject is None`` puts this on its link objects as ``LinkProblem``
+    (:mod:`silo.fcstd` does); for live objects the walker is given a function that finds it out.
+    ``code`` UNSET_LINK means that the link never had a target.
+    """
+
+    code: FindingCode
+    file: str = ""
+    obj: str = ""
+    detail: str = ""

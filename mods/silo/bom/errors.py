@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Every error of the project, split by whose fault it is.
+
+::
+
+    SiloError
+    ├── InputError              ours to mend: a file, an argument, a configuration
+    │   ├── DocumentError       a FreeCAD document cannot be read or written
+    │   └── ConfigError         the configuration is missing or contradicts itself
+    ├── RemoteError             the server's, or the way to it
+    │   ├── UnreachableError    no answer (no network, refused, timed out)
+    │   ├── AuthError           401: who are you; 403: you may not
+    │   ├── NotFoundError       404
+    │   ├── RejectedError       400, 413, 422: the server names what it does not accept
+    │   ├── ReadOnlyError       503: the server takes no changes now
+    │   └── ServerFaultError    any other 5xx, or an answer that cannot be understood
+    └── ConflictError           nobody's: two truths met (409)
+        ├── CycleError          the BOM would contain itself
+        └── VersionConflictError  412: somebody else changed it first
+
+A message says what was wanted, what was got, where, and what to do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+
+class SiloError(Exception):
+    """The root. ``status_hint`` is the HTTP status a server answers with, ``code`` its machine name."""
+
+    status_hint: ClassVar[int] = 500
+    code: ClassVar[str] = "error"
+
+
+class InputError(SiloError):
+    """Something given to us is unusable."""
+
+    status_hint = 400
+    code = "bad_input"
+
+
+class DocumentError(InputError):
+    """A FreeCAD document cannot be read or written."""
+
+    code = "bad_document"
+
+    def __init__(self, path: str, reason: str) -> None:
+        super().__init__(f"{path}: {reason}")
+        self.path = path
+        self.reason = reason
+
+
+class ConfigError(InputError):
+    """The configuration is missing or contradicts itself."""
+
+    code = "bad_config"
+
+
+class RemoteError(SiloError):
+    """The server's fault, or that of the way to it."""
+
+    status_hint = 502
+    code = "remote"
+
+
+class UnreachableError(RemoteError):
+    """No answer: no network, connection refused, timed out."""
+
+    status_hint = 504
+    code = "unreachable"
+
+
+class AuthError(RemoteError):
+    """401: the token is missing or wrong; 403: its role is too low."""
+
+    status_hint = 401
+    code = "unauthorized"
+
+
+class NotFoundError(RemoteError):
+    """404: the server has no such item, revision or route."""
+
+    status_hint = 404
+    code = "not_found"
+
+
+class RejectedError(RemoteError):
+    """400, 413, 422: the server does not accept what was sent. ``problems`` lists all of it at once."""
+
+    status_hint = 400
+    code = "rejected"
+
+    def __init__(self, message: str, problems: Sequence[str] = ()) -> None:
+        super().__init__(message)
+        self.problems = tuple(problems)
+
+
+class ReadOnlyError(RemoteError):
+    """503: the server takes no changes now; the same request may succeed later."""
+
+    status_hint = 503
+    code = "read_only"
+
+
+class ServerFaultError(RemoteError):
+    """Another 5xx, or an answer that cannot be understood."""
+
+    status_hint = 500
+    code = "server_fault"
+
+
+class ConflictError(SiloError):
+    """Two truths met (409); a person or a new read decides."""
+
+    status_hint = 409
+    code = "conflict"
+
+
+class CycleError(ConflictError):
+    """A BOM would contain itself. ``path`` is the ring of part numbers or objects, first = last."""
+
+    code = "cycle"
+
+    def __init__(self, path: Sequence[str]) -> None:
+        super().__init__("this BOM would contain itself: " + " → ".join(path))
+        self.path = tuple(path)
+
+
+class VersionConflictError(ConflictError):
+    """412: the BOM has another version than the one the request was made from."""
+
+    status_hint = 412
+    code = "version_conflict"

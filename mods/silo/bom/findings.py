@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What a run noticed: one code, one severity, one plain sentence, and where.
+
+Everything that is not counted, or counted with a doubt, is explained by a finding; nothing is dropped in
+silence. A finding of severity ERROR keeps a BOM from being synced until a person says otherwise: a missing
+file must never read as "removed".
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Severity(StrEnum):
+    """How much a finding matters."""
+
+    INFO = "info"  # told for completeness: this is how it was counted
+    WARNING = "warning"  # counted, or left out, in a way a person should look at
+    ERROR = "error"  # the BOM cannot be trusted as it stands; it is not synced without consent
+
+
+class FindingCode(StrEnum):
+    """The machine names of findings; stable, part of the public surface."""
+
+    # broken links (ERROR)
+    MISSING_FILE = "missing_file"
+    MISSING_OBJECT = "missing_object"
+    UNREADABLE_FILE = "unreadable_file"
+    LFS_POINTER = "lfs_pointer"
+    OUTSIDE_ROOT = "outside_root"
+    BROKEN_LINK = "broken_link"
+    CYCLE = "cycle"
+    TOO_DEEP = "too_deep"
+    # counted or left out by a rule
+    UNSET_LINK = "unset_link"
+    IN_DOCUMENT_LINK = "in_document_link"
+    SUB_ELEMENT_LINK = "sub_element_link"
+    SUPPRESSED = "suppressed"
+    EXCLUDED = "excluded"
+    MIRRORED = "mirrored"
+    VARIANT = "variant"
+    DRAFT_ARRAY = "draft_array"
+    LOCAL_GEOMETRY = "local_geometry"
+    FOREIGN_COMPONENT = "foreign_component"
+    NO_CONTAINER = "no_container"
+    STALE_ASSEMBLY_LINK = "stale_assembly_link"
+    LOST_ASSEMBLY = "lost_assembly"
+    EMPTY_BOM = "empty_bom"
+    CONSOLIDATION = "consolidation"
+    # identity
+    COPIED_IDENTITY = "copied_identity"
+    SHARED_IDENTITY = "shared_identity"
+    UNREGISTERED = "unregistered"
+    # against the server
+    UNREFERENCED = "unreferenced"
+    CONFLICT = "conflict"
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Place:
+    """An object in a file; ``doc_path`` as the document names itself, ``obj`` its FreeCAD ``Name``."""
+
+    doc_path: str
+    obj: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.doc_path}#{self.obj}" if self.obj else self.doc_path
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing a run noticed."""
+
+    code: FindingCode
+    severity: Severity
+    message: str
+    where: tuple[Place, ...] = ()
+
+    @property
+    def blocks(self) -> bool:
+        """True where the BOM is not to be synced unless the user says so."""
+        return self.severity is Severity.ERROR

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The values that travel: BOM entries, and what a comparison with the server says of them.
+
+All are frozen. Where a value was found (labels, paths of people) never takes part in equality.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+from silo.bom.findings import Finding, FindingCode, Severity
+
+
+@dataclass(frozen=True)
+class BomEntry:
+    """One BOM line as the CAD model has it: a component and how often its parent contains it directly.
+
+    doc_path
+        file of the component, as its document names it (``FileName``).
+    silo_uuid
+        identity found in the component, None while unregistered.
+    part_number, name
+        from the server, None until resolved.
+    quantity
+        instances per ONE parent (never multiplied down the tree).
+    level
+        nesting depth; direct children of the top assembly have level 1.
+    children
+        direct children, where the component is an assembly.
+    consolidation_warning
+        several individual links where one link array would do.
+    object_name, label
+        FreeCAD ``Name`` (with ``doc_path`` the component's key) and ``Label`` (for people only).
+    is_assembly
+        True for a sub-assembly, also for an empty one.
+    individual_links, link_objects
+        plain ``App::Link`` objects (no array), and all ``App::Link`` objects, that were counted.
+    instances
+        names of the objects in the parent's document that were counted, to select them on screen.
+    """
+
+    doc_path: str
+    silo_uuid: str | None = None
+    part_number: str | None = None
+    name: str | None = None
+    quantity: int = 1
+    level: int = 1
+    children: tuple[BomEntry, ...] = ()
+    consolidation_warning: bool = False
+    object_name: str = ""
+    label: str = field(default="", compare=False)
+    is_assembly: bool = False
+    individual_links: int = field(default=0, compare=False)
+    link_objects: int = field(default=0, compare=False)
+    instances: tuple[str, ...] = field(default=(), compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        # A caller may hand over any iterable; a frozen value holds a tuple.
+        object.__setattr__(self, "children", tuple(self.children))
+        object.__setattr__(self, "instances", tuple(self.instances))
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """(file, object): what a component is. Never a label, never the file alone."""
+        return (self.doc_path, self.object_name)
+
+
+@dataclass(frozen=True)
+class Extraction:
+    """What a walk found: the assembly itself, its entries, and everything worth telling."""
+
+    assembly: BomEntry
+    entries: tuple[BomEntry, ...] = ()
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def blocked(self) -> bool:
+        """True where a finding keeps this BOM from being synced."""
+        return any(f.severity is Severity.ERROR for f in self.findings)
+
+    def findings_of(self, *codes: FindingCode) -> tuple[Finding, ...]:
+        """The findings with one of these codes, in order."""
+        return tuple(f for f in self.findings if f.code in codes)
+
+
+class Row(Mapping[str, Any]):
+    """A frozen row that reads as a mapping (the spec's dicts) and as attributes; equal to an equal dict."""
+
+    def __getitem__(self, key: str) -> Any:
+        if key not in self._names():
+            raise KeyError(key)
+        return getattr(self, key)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names())
+
+    def __len__(self) -> int:
+        return len(self._names())
+
+    def _names(self) -> tuple[str, ...]:
+        return tuple(f.name for f in fields(self))  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True, eq=False)
+class BomChange(Row):
+    """A part number and its quantity (added, removed, unchanged, manual)."""
+
+    part_number: str
+    quantity: float | None
+
+    def __hash__(self) -> int:
+        return hash((self.part_number, self.quantity))
+
+
+@dataclass(frozen=True, eq=False)
+class QuantityChange(Row):
+    """A line that both sides have, with different quantities (changed, or a conflict with a manual line)."""
+
+    part_number: str
+    local_quantity: float
+    remote_quantity: float | None
+
+    def __hash__(self) -> int:
+        return hash((self.part_number, self.local_quantity, self.remote_quantity))
+
+
+@dataclass(frozen=True)
+class BomDiff:
+    """CAD against server, by the spec's §4 table.
+
+    added              in the assembly, not on the server          → will be added
+    quantity_changed   assembly line with another quantity         → will take the assembly's quantity
+    removed            assembly line, not in the assembly now      → stays, flagged unreferenced
+    unchanged          both, same quantity                         → nothing
+    manual             lines that people own                       → never touched, listed apart
+    conflicts          in the assembly, and manual with another quantity → a person decides
+    """
+
+    added: tuple[BomChange, ...] = ()
+    removed: tuple[BomChange, ...] = ()
+    quantity_changed: tuple[QuantityChange, ...] = ()
+    unchanged: tuple[BomChange, ...] = ()
+    manual: tuple[BomChange, ...] = ()
+    conflicts: tuple[QuantityChange, ...] = ()
+
+    @property
+    def changes_server(self) -> bool:
+        """True where a merge would write a line (unreferenced ones stay as they are)."""
+        return bool(self.added or self.quantity_changed)
+
+    @property
+    def drifted(self) -> bool:
+        """True where CAD and server differ in any way a check should report."""
+        return bool(self.added or self.removed or self.quantity_changed or self.conflicts)
+
+
+def rows_as_dicts(rows: Iterable[Row]) -> list[dict[str, Any]]:
+    """Plain dicts, for JSON."""
+    return [dict(row) for row in rows]
