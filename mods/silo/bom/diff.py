@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""CAD against server: what is new, gone, changed, equal, owned by people, or in conflict (spec bom-sync §4).
+
+The rules of this module:
+
+* a line is found by its part number; the numbers come from the server and compare as they are;
+* quantities compare as numbers: 12, 12.0 and "12" are equal;
+* a server line without ``source`` counts as ``assembly``;
+* a ``manual`` line, and one that is no component (``alternate``, ``reference``), belongs to people: it is
+  listed apart, never as removed or changed;
+* a component that exists as a manual line of the same quantity is there already (``unchanged``); with another
+  quantity it is a conflict, for a person to decide.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from silo.bom.model import BomChange, BomDiff, BomEntry, QuantityChange
+
+# Two quantities closer than this, relatively, are one: lengths pass through databases as floats.
+RELATIVE_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class _Line:
+    part_number: str
+    quantity: float | None
+
+
+def as_number(value: object) -> float | None:
+    """A quantity as a number: int, float, Decimal or a numeral; None where there is none."""
+    if value is None or isinstance(value, bool):
+        return None
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        return None
+    return number if math.isfinite(number) else None
+
+
+def same_quantity(a: object, b: object) -> bool:
+    """True where both are the same number."""
+    x, y = as_number(a), as_number(b)
+    if x is None or y is None:
+        return x is y
+    return math.isclose(x, y, rel_tol=RELATIVE_TOLERANCE, abs_tol=1e-12)
+
+
+def _whole(value: float | None) -> float | None:
+    # 12.0 is shown and sent as 12: a count reads as a count.
+    return int(value) if value is not None and value == int(value) else value
+
+
+def _local(entry: BomEntry | Mapping[str, Any]) -> _Line | None:
+    if isinstance(entry, BomEntry):
+        number, quantity = entry.part_number, float(entry.quantity)
+    else:
+        number = entry.get("child_part_number") or entry.get("part_number")
+        quantity = as_number(entry.get("quantity")) or 0.0
+    return _Line(number, quantity) if number else None
+
+
+def _summed(lines: Iterable[_Line]) -> dict[str, float | None]:
+    total: dict[str, float | None] = {}
+    for line in lines:
+        if line.part_number in total:
+            before = total[line.part_number]
+            total[line.part_number] = (before or 0.0) + (line.quantity or 0.0)
+        else:
+            total[line.part_number] = line.quantity
+    return {pn: _whole(q) for pn, q in total.items()}
+
+
+def is_manual(line: Mapping[str, Any]) -> bool:
+    """True where a line belongs to people: source ``manual``, or a relation that is no component."""
+    if (line.get("rel_type") or "component") != "component":
+        return True
+    return (line.get("source") or "assembly") == "manual"
+
+
+def diff_bom(
+    local_entries: Iterable[BomEntry | Mapping[str, Any]],
+    remote_entries: Iterable[Mapping[str, Any]],
+) -> BomDiff:
+    """Compare the assembly's direct children with the server's lines of the same parent.
+
+    local_entries
+        resolved entries (or mappings with ``child_part_number`` and ``quantity``); entries without a part
+        number are not compared. Several with one number are summed.
+    remote_entries
+        mappings with ``child_part_number``, ``quantity``, ``source`` and optionally ``rel_type``.
+    """
+    local = _summed(line for entry in local_entries if (line := _local(entry)) is not None)
+    assembly_lines: list[_Line] = []
+    manual_lines: list[_Line] = []
+    manual_components: list[_Line] = []
+    for remote in remote_entries:
+        line = _Line(remote["child_part_number"], as_number(remote.get("quantity")))
+        if is_manual(remote):
+            manual_lines.append(line)
+            if (remote.get("rel_type") or "component") == "component":
+                manual_components.append(line)
+        else:
+            assembly_lines.append(line)
+    return _compare(local, _summed(assembly_lines), _summed(manual_lines), _summed(manual_components))
+
+
+def _compare(
+    local: Mapping[str, float | None],
+    assembly: Mapping[str, float | None],
+    manual: Mapping[str, float | None],
+    manual_components: Mapping[str, float | None],
+) -> BomDiff:
+    added: list[BomChange] = []
+    changed: list[QuantityChange] = []
+    unchanged: list[BomChange] = []
+    conflicts: list[QuantityChange] = []
+    for number, wanted in local.items():
+        if wanted is None:
+            continue
+        in_manual = number in manual_components
+        if in_manual and not same_quantity(wanted, manual_components[number]):
+            conflicts.append(QuantityChange(number, wanted, manual_components[number]))
+        if number in assembly:
+            if same_quantity(wanted, assembly[number]):
+                unchanged.append(BomChange(number, wanted))
+            else:
+                changed.append(QuantityChange(number, wanted, assembly[number]))
+        elif not in_manual:
+            added.append(BomChange(number, wanted))
+        elif same_quantity(wanted, manual_components[number]):
+            unchanged.append(BomChange(number, wanted))
+    return BomDiff(
+        added=tuple(added),
+        removed=tuple(BomChange(n, q) for n, q in assembly.items() if n not in local),
+        quantity_changed=tuple(changed),
+        unchanged=tuple(unchanged),
+        manual=tuple(BomChange(n, q) for n, q in manual.items()),
+        conflicts=tuple(conflicts),
+    )

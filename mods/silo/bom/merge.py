@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The merge rules (spec bom-sync §4, "Merge Rules"), once, for the server, the fakes and the tests.
+
+=====================================  ===============================================================
+added                                  a new line, ``source`` assembly
+quantity changed (assembly line)       takes the assembly's quantity
+removed (assembly line, no component)  stays; flagged unreferenced, unflagged when it is referenced again
+unchanged                              nothing
+manual                                 never touched; another quantity than the assembly's is a conflict
+=====================================  ===============================================================
+
+Nothing is ever deleted by a merge.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from silo.bom.diff import diff_bom, is_manual
+from silo.bom.model import BomDiff, BomEntry
+
+
+@dataclass(frozen=True)
+class MergePlan:
+    """What a merge will write: the diff, and which unreferenced flags it sets and clears (part numbers)."""
+
+    diff: BomDiff
+    flag: tuple[str, ...] = ()
+    unflag: tuple[str, ...] = ()
+
+    @property
+    def writes(self) -> bool:
+        """True where applying the plan changes anything on the server."""
+        return bool(self.diff.added or self.diff.quantity_changed or self.flag or self.unflag)
+
+
+def plan_merge(
+    entries: Iterable[BomEntry | Mapping[str, Any]], lines: Iterable[Mapping[str, Any]]
+) -> MergePlan:
+    """Plan a merge of the assembly's direct children into the parent's lines; changes nothing itself.
+
+    entries
+        as in :func:`silo.bom.diff.diff_bom`.
+    lines
+        the server's lines; ``unreferenced_since`` (any true value) marks those flagged before.
+    """
+    known = list(lines)
+    diff = diff_bom(entries, known)
+    flagged = {
+        line["child_part_number"] for line in known if line.get("unreferenced_since") and not is_manual(line)
+    }
+    gone = [change.part_number for change in diff.removed]
+    return MergePlan(
+        diff=diff,
+        flag=tuple(number for number in gone if number not in flagged),
+        unflag=tuple(sorted(flagged.difference(gone))),
+    )
+
+
+def apply_merge(lines: Sequence[Mapping[str, Any]], plan: MergePlan, when: str) -> list[dict[str, Any]]:
+    """The lines after the merge: what people wrote on a line stays, nothing is deleted.
+
+    ``when`` is the time stamp written on newly unreferenced lines.
+    """
+    quantities = {change.part_number: change.local_quantity for change in plan.diff.quantity_changed}
+    flag, unflag = set(plan.flag), set(plan.unflag)
+    merged: list[dict[str, Any]] = []
+    for line in lines:
+        after = dict(line)
+        number = line["child_part_number"]
+        if not is_manual(line):
+            after["quantity"] = quantities.get(number, line.get("quantity"))
+            if number in flag:
+                after["unreferenced_since"] = when
+            if number in unflag:
+                after["unreferenced_since"] = None
+        merged.append(after)
+    merged.extend(
+        {
+            "child_part_number": change.part_number,
+            "quantity": change.quantity,
+            "source": "assembly",
+            "unreferenced_since": None,
+        }
+        for change in plan.diff.added
+    )
+    return merged
+
+
+def summary(diff: BomDiff) -> str:
+    """The sentence of the spec's event: ``BOM updated: 1 added, 1 quantity changed, 1 unreferenced``."""
+    parts = [
+        f"{len(diff.added)} added",
+        f"{len(diff.quantity_changed)} quantity changed",
+        f"{len(diff.removed)} unreferenced",
+    ]
+    if diff.conflicts:
+        parts.append(f"{len(diff.conflicts)} in conflict")
+    return "BOM updated: " + ", ".join(parts)
