@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Rigid-body algebra: mass, centre of mass and inertia tensor, moved and summed. numpy only, no I/O.
+
+Rules of this module:
+
+* SI: kg, m, kg m^2. A tensor is about the body's own centre of mass, in the axes of the frame at hand.
+* Off-diagonal elements are tensor elements (-∫xy dm), never "products of inertia" with the sign turned.
+* What can be done for N bodies at once is done in one numpy expression; 10 000 instances cost milliseconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from silo.bom.errors import InputError
+from silo.inertia.types import InertialProperties
+
+Floats = NDArray[np.float64]
+
+RIGID_TOLERANCE = 1e-6
+"""How far the columns of a placement may be from orthonormal (STEP files print about nine digits)."""
+
+CHECK_TOLERANCE = 1e-9
+"""Relative to the largest principal moment: what counts as rounding when a tensor is checked."""
+
+_EYE3 = np.eye(3)
+
+
+class TensorProblem(StrEnum):
+    """Why no rigid body can have these mass properties."""
+
+    NOT_FINITE = "not_finite"  # a value is NaN or infinite
+    NOT_SYMMETRIC = "not_symmetric"
+    ZERO_MASS = "zero_mass"  # physics engines refuse a moving link without mass
+    NEGATIVE_MASS = "negative_mass"
+    ZERO_INERTIA = "zero_inertia"  # a point mass: refused by MuJoCo on a moving link
+    NOT_POSITIVE_DEFINITE = "not_positive_definite"
+    TRIANGLE_INEQUALITY = "triangle_inequality"  # a principal moment exceeds the sum of the two others
+
+
+@dataclass(frozen=True, eq=False)
+class MassProps:
+    """Mass properties of one rigid body in one frame.
+
+    mass : float [kg]
+    com : (3,) float [m], in the frame
+    inertia : (3, 3) float [kg m^2], about ``com``, axes of the frame
+    """
+
+    mass: float
+    com: Floats
+    inertia: Floats
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mass", float(self.mass))
+        object.__setattr__(self, "com", _frozen(self.com, (3,), "com"))
+        object.__setattr__(self, "inertia", _frozen(self.inertia, (3, 3), "inertia"))
+
+    @classmethod
+    def nothing(cls) -> MassProps:
+        """No mass at all; the neutral element of :func:`combine`."""
+        return cls(0.0, np.zeros(3), np.zeros((3, 3)))
+
+    @classmethod
+    def from_inertial(cls, values: InertialProperties) -> MassProps:
+        """From the spec's plain type."""
+        v = values
+        rows = [[v.ixx, v.ixy, v.ixz], [v.ixy, v.iyy, v.iyz], [v.ixz, v.iyz, v.izz]]
+        return cls(v.mass, np.asarray(v.com, float), np.asarray(rows, float))
+
+    def transform(self, placement: ArrayLike) -> MassProps:
+        """The same body after ``placement`` ((4, 4), rigid or mirrored).
+
+        A placement that scales is refused (InputError): a mass says nothing about what scaling does to it.
+        Scaled *geometry* is handled exactly, by :func:`place`.
+        """
+        matrix = as_placement(placement)
+        if not is_rigid(matrix):
+            raise InputError(
+                "a body with a mass can be moved, turned and mirrored, but not scaled; "
+                f"the placement's axes have the lengths {np.linalg.norm(matrix[:3, :3], axis=0).tolist()}"
+            )
+        turn = matrix[:3, :3]
+        return MassProps(self.mass, turn @ self.com + matrix[:3, 3], turn @ self.inertia @ turn.T)
+
+    def about(self, point: ArrayLike) -> Floats:
+        """(3, 3) tensor [kg m^2] about ``point`` ((3,) [m]) instead of the centre of mass."""
+        return self.inertia + parallel_axis(
+            np.array([self.mass]), (self.com - np.asarray(point, float))[None, :]
+        )
+
+    def principal(self) -> tuple[Floats, Floats]:
+        """Principal moments ((3,) [kg m^2], ascending) and axes ((3, 3), columns, right-handed)."""
+        moments, axes = np.linalg.eigh((self.inertia + self.inertia.T) / 2)
+        if np.linalg.det(axes) < 0:
+            axes = axes * np.array([1.0, 1.0, -1.0])
+        return moments, axes
+
+    def check(self, tolerance: float = CHECK_TOLERANCE) -> tuple[TensorProblem, ...]:
+        """Everything that keeps this from being a rigid body; empty where all is well.
+
+        On eigenvalues, never on the diagonal: diag(.02, .02, .02) with ixy = .015 looks right and is not.
+        ``tolerance`` is relative to the largest principal moment; a flat plate (a + b = c) is fine.
+        """
+        if not (np.isfinite(self.mass) and np.isfinite(self.com).all() and np.isfinite(self.inertia).all()):
+            return (TensorProblem.NOT_FINITE,)
+        problems: list[TensorProblem] = []
+        scale = float(np.abs(self.inertia).max())
+        if np.abs(self.inertia - self.inertia.T).max() > tolerance * scale:
+            problems.append(TensorProblem.NOT_SYMMETRIC)
+        if self.mass <= 0:
+            problems.append(TensorProblem.ZERO_MASS if self.mass == 0 else TensorProblem.NEGATIVE_MASS)
+        if scale == 0:
+            return (*problems, TensorProblem.ZERO_INERTIA)
+        low, mid, high = self.principal()[0]
+        if low <= 0:
+            problems.append(TensorProblem.NOT_POSITIVE_DEFINITE)
+        if low + mid < high * (1 - tolerance):
+            problems.append(TensorProblem.TRIANGLE_INEQUALITY)
+        return tuple(problems)
+
+    def to_inertial(self) -> InertialProperties:
+        """As the spec's plain type, the tensor made exactly symmetric."""
+        t = (self.inertia + self.inertia.T) / 2
+        x, y, z = (float(c) for c in self.com)
+        return InertialProperties(
+            mass=self.mass,
+            com=(x, y, z),
+            ixx=float(t[0, 0]),
+            iyy=float(t[1, 1]),
+            izz=float(t[2, 2]),
+            ixy=float(t[0, 1]),
+            ixz=float(t[0, 2]),
+            iyz=float(t[1, 2]),
+        )
+
+
+def parallel_axis(masses: Floats, offsets: Floats) -> Floats:
+    """(3, 3) tensor [kg m^2] of point masses ((N,) [kg]) at ``offsets`` ((N, 3) [m]) about the origin."""
+    second = np.einsum("n,ni,nj->ij", masses, offsets, offsets)
+    result: Floats = np.trace(second) * _EYE3 - second
+    return result
+
+
+def combine(bodies: Sequence[MassProps]) -> MassProps:
+    """All bodies as one rigid body, in their common frame."""
+    if not bodies:
+        return MassProps.nothing()
+    return combine_arrays(
+        np.array([b.mass for b in bodies]),
+        np.array([b.com for b in bodies]),
+        np.array([b.inertia for b in bodies]),
+    )
+
+
+def combine_arrays(masses: ArrayLike, coms: ArrayLike, inertias: ArrayLike) -> MassProps:
+    """As :func:`combine`, from (N,) [kg], (N, 3) [m], (N, 3, 3) [kg m^2].
+
+    Without any mass the centre is the origin, since there is none.
+    """
+    mass = np.asarray(masses, float)
+    com = np.asarray(coms, float)
+    total = float(mass.sum())
+    if total == 0:
+        return MassProps(total, np.zeros(3), np.asarray(inertias, float).sum(axis=0).reshape(3, 3))
+    centre = (mass[:, None] * com).sum(axis=0) / total
+    tensor = np.asarray(inertias, float).sum(axis=0) + parallel_axis(mass, com - centre)
+    return MassProps(total, centre, (tensor + tensor.T) / 2)
+
+
+def place(
+    volumes: ArrayLike, coms: ArrayLike, units: ArrayLike, placements: ArrayLike
+) -> tuple[Floats, Floats, Floats]:
+    """Geometry of N instances after their placements.
+
+    volumes : (N,) [m^3]; coms : (N, 3) [m]; units : (N, 3, 3) [m^5], tensors per unit density about the coms
+    placements : (N, 4, 4); rigid, mirrored, or any invertible affine map (then exact as well: the second
+    moments S = tr(I)/2 - I of a body mapped by A become |det A| A S Aᵀ)
+
+    Returns volumes, coms and units in the outer frame.
+    """
+    volume = np.asarray(volumes, float)
+    matrix = np.asarray(placements, float)
+    turn = matrix[:, :3, :3]
+    unit = np.asarray(units, float)
+    com = np.einsum("nij,nj->ni", turn, np.asarray(coms, float)) + matrix[:, :3, 3]
+    moved = turn @ unit @ turn.transpose(0, 2, 1)
+    scaled = ~rigid_mask(matrix)
+    if scaled.any():
+        stretch = np.abs(np.linalg.det(turn[scaled]))
+        volume = volume.copy()
+        volume[scaled] *= stretch
+        moved[scaled] = _stretched(unit[scaled], turn[scaled], stretch)
+    return volume, com, moved
+
+
+def _stretched(unit: Floats, turn: Floats, stretch: Floats) -> Floats:
+    trace = np.trace(unit, axis1=1, axis2=2)[:, None, None]
+    second = trace / 2 * _EYE3 - unit
+    second = stretch[:, None, None] * (turn @ second @ turn.transpose(0, 2, 1))
+    result: Floats = np.trace(second, axis1=1, axis2=2)[:, None, None] * _EYE3 - second
+    return result
+
+
+def rigid_mask(placements: Floats, tolerance: float = RIGID_TOLERANCE) -> NDArray[np.bool_]:
+    """(N,) bool: which of the (N, 4, 4) placements neither scale nor shear (a mirror is rigid)."""
+    turn = placements[:, :3, :3]
+    off = np.abs(turn.transpose(0, 2, 1) @ turn - _EYE3)
+    result: NDArray[np.bool_] = off.max(axis=(1, 2)) <= tolerance
+    return result
+
+
+def is_rigid(placement: Floats, tolerance: float = RIGID_TOLERANCE) -> bool:
+    """True where a (4, 4) placement neither scales nor shears; a mirror is rigid."""
+    return bool(rigid_mask(placement[None], tolerance)[0])
+
+
+def as_placement(value: ArrayLike) -> Floats:
+    """A (4, 4) placement, checked: finite, last row 0 0 0 1, invertible (InputError otherwise)."""
+    matrix = np.asarray(value, float)
+    if matrix.shape != (4, 4):
+        raise InputError(f"a placement is a 4 x 4 matrix, got the shape {matrix.shape}")
+    if not np.isfinite(matrix).all() or not np.allclose(matrix[3], (0, 0, 0, 1), atol=1e-12):
+        raise InputError(
+            f"a placement needs finite numbers and the last row 0 0 0 1, got {matrix[3].tolist()}"
+        )
+    if abs(np.linalg.det(matrix[:3, :3])) < 1e-12:
+        raise InputError("a placement must be invertible; this one flattens the part")
+    return matrix
+
+
+def _frozen(value: ArrayLike, shape: tuple[int, ...], name: str) -> Floats:
+    array = np.array(value, dtype=np.float64)
+    if array.shape != shape:
+        raise InputError(f"{name}: wanted an array of shape {shape}, got {array.shape}")
+    array.flags.writeable = False
+    return array

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Geometry as the readers hand it over: prototypes measured once, instances that place them.
+
+SI throughout (m, m^3, m^5, kg/m^3). Arrays are numpy float64; the readers may pass lists. Volumes are
+positive: a reader that met an inside-out solid turns its sign, marks it ``reversed`` and adds a problem.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+class GeometryCode(StrEnum):
+    """The machine names of what a geometry reader noticed."""
+
+    NEGATIVE_VOLUME = "negative_volume"  # an inside-out solid; its sign was turned
+    INVALID_SHAPE = "invalid_shape"  # the kernel's own check fails
+    MESH_MISMATCH = "mesh_mismatch"  # |V_mesh - V_brep| above 2 %
+    NOT_CONVERGENT = "not_convergent"  # the integration did not reach its tolerance
+    STATED_VOLUME = "stated_volume"  # the file states another volume (above 1e-3)
+    STATED_CENTROID = "stated_centroid"
+    NO_SOLID = "no_solid"  # surfaces or wires only
+    NO_GEOMETRY = "no_geometry"  # nothing at all: an unresolved external file, an empty product
+    EXTERNAL_FILE = "external_file"  # a split assembly's file was found, or was not
+    NOT_WATERTIGHT = "not_watertight"
+    WINDING = "winding"
+    UNITS = "units"  # the unit was not stated, or is implausible
+    SCALED = "scaled"  # a placement that scales
+    BAKED = "baked"  # geometry far away from its own origin
+    NAME = "name"  # lost characters, an unnamed product named by climbing
+    READER = "reader"  # what the kernel complained about while reading
+
+
+@dataclass(frozen=True)
+class GeometryProblem:
+    """One thing a reader noticed. ``code`` is one of :class:`GeometryCode` (or a reader's own word)."""
+
+    code: str
+    message: str
+
+
+@dataclass(frozen=True, eq=False)
+class SolidProps:
+    """One solid of a prototype, in the prototype's axes.
+
+    volume_m3 : float [m^3], positive
+    com_m : (3,) [m]
+    inertia_unit : (3, 3) [m^5], tensor per unit density about ``com_m``
+    reversed : the file had it inside out
+    """
+
+    volume_m3: float
+    com_m: Floats
+    inertia_unit: Floats
+    reversed: bool = False
+
+    def __post_init__(self) -> None:
+        _freeze(self, "com_m", (3,))
+        _freeze(self, "inertia_unit", (3, 3))
+
+
+@dataclass(frozen=True, eq=False)
+class Prototype:
+    """One product's geometry, computed once, however often it is placed.
+
+    key
+        unique in its assembly (names are not: exports hold "Part 1" five times).
+    name
+        the product's name, for matching with the BOM.
+    volume_m3, com_m, inertia_unit
+        of all solids together: [m^3], (3,) [m], (3, 3) [m^5] per unit density about ``com_m``.
+    has_solid
+        False: surfaces, wires, or nothing; then the volume is 0.
+    step_density, step_material, stated_volume_m3
+        what the file says itself; [kg/m^3], name, [m^3]; None where it says nothing.
+    part_number
+        where the file has one besides the name.
+    mesh
+        a handle for preview and cross-check; nothing here looks into it.
+    """
+
+    key: str
+    name: str
+    solids: tuple[SolidProps, ...] = ()
+    volume_m3: float = 0.0
+    com_m: Floats = field(default_factory=lambda: np.zeros(3))
+    inertia_unit: Floats = field(default_factory=lambda: np.zeros((3, 3)))
+    has_solid: bool = True
+    problems: tuple[GeometryProblem, ...] = ()
+    step_density: float | None = None
+    step_material: str | None = None
+    stated_volume_m3: float | None = None
+    part_number: str | None = None
+    mesh: Any = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        _freeze(self, "com_m", (3,))
+        _freeze(self, "inertia_unit", (3, 3))
+
+
+@dataclass(frozen=True, eq=False)
+class Instance:
+    """One placed prototype.
+
+    path
+        instance names from the top assembly (not included) down to this one.
+    product_path
+        product names of the same levels.
+    prototype
+        key into ``Assembly.prototypes``.
+    transform
+        (4, 4) float, lengths in m: prototype axes → top assembly axes.
+    """
+
+    path: tuple[str, ...]
+    product_path: tuple[str, ...]
+    prototype: str
+    transform: Floats = field(default_factory=lambda: np.eye(4))
+
+    def __post_init__(self) -> None:
+        _freeze(self, "transform", (4, 4))
+
+    @property
+    def name(self) -> str:
+        """The path as people write it: ``arm/forearm/bolt``."""
+        return "/".join(self.path)
+
+
+@dataclass(frozen=True, eq=False)
+class Assembly:
+    """All geometry of one file (or one FreeCAD assembly).
+
+    problems
+        of the file as a whole; those of one product are on its prototype.
+    source, unit
+        the file's path as given, and the length unit it states ("mm", "inch", …; "" where none).
+    frames
+        placements ((4, 4), m) of sub-assemblies by instance path, where the reader knows them.
+    """
+
+    name: str
+    prototypes: Mapping[str, Prototype]
+    instances: tuple[Instance, ...]
+    problems: tuple[GeometryProblem, ...] = ()
+    source: str = ""
+    unit: str = ""
+    frames: Mapping[tuple[str, ...], Floats] = field(default_factory=dict)
+
+
+def _freeze(owner: object, name: str, shape: tuple[int, ...]) -> None:
+    array = np.array(getattr(owner, name), dtype=np.float64).reshape(shape)
+    array.flags.writeable = False
+    object.__setattr__(owner, name, array)
