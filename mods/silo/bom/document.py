@@ -36,9 +36,9 @@ class ObjectLike(Protocol):
     """A FreeCAD document object.
 
     Optional: ``Name``, ``Label``, ``TypeId``, ``PropertiesList``, ``Group``, ``LinkedObject`` (an object,
-    None, or a tuple ``(object, sub_name)``), ``ElementCount``, ``ElementList``, ``Visibility``, ``ScaleVector``,
-    ``ScaleList``, ``LinkCopyOnChangeSource``, ``Suppressed``, ``SiloBomExclude``, ``SiloItemId``, ``SiloUUID``,
-    and for Draft arrays ``Base`` and ``Count``.
+    None, or a tuple ``(object, sub_name)``), ``ElementCount``, ``ElementList``, ``Visibility``,
+    ``ScaleVector``, ``ScaleList``, ``LinkCopyOnChangeSource``, ``Suppressed``, ``SiloBomExclude``,
+    ``SiloItemId``, ``SiloUUID``, ``LinkProblem`` (ours, below), and for Draft arrays ``Base`` and ``Count``.
     """
 
     @property
@@ -55,10 +55,33 @@ def derived(obj: object, type_name: str) -> bool:
 
 def own(obj: object, name: str, default: Any = None) -> Any:
     """The object's own property ``name``; never that of a link's target."""
+    value = getattr(obj, name, default)
+    # Most optional properties are unset on most objects; only a value that matters is worth asking the
+    # (much dearer) list of the object's own properties.
+    if not value or value is default:
+        return value
     names: Sequence[str] | None = getattr(obj, "PropertiesList", None)
-    if names is not None and name not in names:
-        return default
-    return getattr(obj, name, default)
+    return value if names is None or name in names else default
+
+
+def same_document(a: object, b: object) -> bool:
+    """True where both are one document: the same object, or two objects of one file."""
+    if a is b or a == b:
+        return True
+    path = getattr(a, "FileName", "")
+    return bool(path) and path == getattr(b, "FileName", "")
+
+
+def object_name(obj: object) -> str:
+    """The object's ``Name``; for an object that has none, something that tells it from any other."""
+    name = getattr(obj, "Name", None)
+    return name if isinstance(name, str) and name else f"object-{id(obj):x}"
+
+
+def label_of(obj: object) -> str:
+    """The object's ``Label``, for people only."""
+    label = getattr(obj, "Label", None)
+    return label if isinstance(label, str) and label else object_name(obj)
 
 
 def document_property(doc: object, name: str) -> Any:

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Where a component's Silo identity is written, and what it means to find one twice.
+
+Read in this order (the real Silo writes ``SiloItemId`` on objects, the spec ``SiloUUID`` on documents):
+
+1. the object's own ``SiloItemId``, then its own ``SiloUUID``;
+2. ``Meta["SiloUUID/<object Name>"]`` of its document: one file may give several parts, and FreeCAD 0.20 has
+   no document properties but keeps ``Meta``;
+3. the document's ``SiloUUID`` property;
+4. ``Meta["SiloUUID"]`` of its document.
+
+Part numbers are never parsed, and never taken from labels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+
+from silo.bom.document import document_property, object_name, own
+from silo.bom.findings import Finding, FindingCode, Place, Severity
+from silo.bom.model import BomEntry
+
+META_KEY = "SiloUUID"
+
+
+def meta_key(obj_name: str = "") -> str:
+    """The key in ``Meta`` for the whole document, or for one of its objects."""
+    return f"{META_KEY}/{obj_name}" if obj_name else META_KEY
+
+
+def _text(value: object) -> str | None:
+    return value.strip() or None if isinstance(value, str) else None
+
+
+def identity_of(obj: object) -> str | None:
+    """The Silo UUID of a component (the real part or assembly, not a link to it); None while unregistered."""
+    for name in ("SiloItemId", "SiloUUID"):
+        if found := _text(own(obj, name)):
+            return found
+    doc = getattr(obj, "Document", None)
+    if doc is None:
+        return None
+    meta = getattr(doc, "Meta", None)
+    known: Mapping[str, str] = meta if isinstance(meta, Mapping) else {}
+    return (
+        _text(known.get(meta_key(object_name(obj))))
+        or _text(document_property(doc, "SiloUUID"))
+        or _text(known.get(META_KEY))
+    )
+
+
+def walk_entries(entries: Iterable[BomEntry]) -> Iterator[BomEntry]:
+    """Every distinct component below, each once, parents before children."""
+    seen: set[tuple[str, str]] = set()
+    stack = list(reversed(tuple(entries)))
+    while stack:
+        entry = stack.pop()
+        if entry.key in seen:
+            continue
+        seen.add(entry.key)
+        yield entry
+        stack.extend(reversed(entry.children))
+
+
+def identity_findings(entries: Iterable[BomEntry]) -> tuple[Finding, ...]:
+    """One UUID in two files ("copied identity"), or on two parts of one file ("shared identity")."""
+    users: dict[str, dict[tuple[str, str], BomEntry]] = {}
+    for entry in walk_entries(entries):
+        if entry.silo_uuid:
+            users.setdefault(entry.silo_uuid.lower(), {})[entry.key] = entry
+    findings = []
+    for uuid, components in users.items():
+        if len(components) < 2:
+            continue
+        where = tuple(Place(path, obj) for path, obj in components)
+        files = list(dict.fromkeys(path for path, _ in components))
+        if len(files) > 1:
+            code = FindingCode.COPIED_IDENTITY
+            message = (
+                f"{len(files)} files carry the same Silo identity {uuid}: {', '.join(files)}. "
+                "Is it the same part, or is one of them a new part that needs its own number?"
+            )
+        else:
+            code = FindingCode.SHARED_IDENTITY
+            names = ", ".join(entry.label for entry in components.values())
+            message = (
+                f"{len(components)} components of {files[0]} share the Silo identity {uuid}: {names}. "
+                "They will count as one item; register them apart if they are different parts."
+            )
+        findings.append(Finding(code, Severity.WARNING, message, where))
+    return tuple(findings)

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What an object in an assembly is: a component, a container, local geometry, or neither.
+
+``container.Group`` is flattened through plain folders and also lists joints, sheets and boolean operands
+(measured); so the type decides, never the mere presence of an attribute, which links forward.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from enum import Enum, auto
+from typing import Any
+
+from silo.bom.document import derived, own
+from silo.bom.targets import is_assembly_link, is_link
+
+
+class Kind(Enum):
+    """The role of an object in a BOM."""
+
+    LINK = auto()  # a component, ElementCount times
+    ASSEMBLY_LINK = auto()  # one instance of an assembly; its own Group holds copies
+    LINK_GROUP = auto()  # a bundle of links: its ElementList counts
+    CONTAINER = auto()  # an inline part or assembly: what it holds counts in the parent
+    FOLDER = auto()  # a plain folder: its content is flattened into the parent's Group already
+    DRAFT_ARRAY = auto()  # Count instances of Base
+    FOREIGN = auto()  # a part of another add-on, with its shape inside and no link
+    LOCAL = auto()  # geometry modelled in this very file
+    NOTHING = auto()  # joints, sheets, sketches, datums, variables
+
+
+_NO_FOLDERS = ("Assembly::JointGroup", "Assembly::BomGroup", "Assembly::ViewGroup", "Assembly::SnapshotGroup")
+_NO_GEOMETRY = ("Part::Part2DObject", "Part::Datum", "PartDesign::SubShapeBinder", "App::DatumElement")
+_GEOMETRY = ("Part::Feature", "Mesh::Feature", "Points::Feature")
+
+
+def has_own(obj: object, *names: str) -> bool:
+    """True where the object itself (no link target) has all these properties."""
+    listed: Sequence[str] | None = getattr(obj, "PropertiesList", None)
+    return all(name in listed if listed is not None else hasattr(obj, name) for name in names)
+
+
+def kind_of(obj: object) -> Kind:
+    """The role of a member of a container."""
+    if is_link(obj):
+        return Kind.LINK
+    if is_assembly_link(obj):
+        return Kind.ASSEMBLY_LINK
+    if derived(obj, "App::LinkGroup"):
+        return Kind.LINK_GROUP
+    if derived(obj, "App::Part"):  # also Assembly::AssemblyObject
+        return Kind.CONTAINER
+    if derived(obj, "App::DocumentObjectGroup"):
+        return Kind.NOTHING if any(derived(obj, name) for name in _NO_FOLDERS) else Kind.FOLDER
+    if derived(obj, "Part::FeaturePython"):
+        return _python_kind(obj)
+    if any(derived(obj, name) for name in _NO_GEOMETRY):
+        return Kind.NOTHING
+    return Kind.LOCAL if any(derived(obj, name) for name in _GEOMETRY) else Kind.NOTHING
+
+
+def _python_kind(obj: object) -> Kind:
+    if has_own(obj, "Base", "Count"):
+        return Kind.DRAFT_ARRAY
+    if has_own(obj, "sourceFile", "a2p_Version"):
+        return Kind.FOREIGN
+    return Kind.CONTAINER if is_assembly3(obj) else Kind.LOCAL
+
+
+def is_assembly3(obj: object) -> bool:
+    """An Assembly3 container: ``Group`` = [constraints, elements, parts]; only its parts are components."""
+    return derived(obj, "Part::FeaturePython") and has_own(obj, "BuildShape", "Freeze", "Group")
+
+
+def members(container: object) -> Iterable[Any]:
+    """The objects that lie in a container, in document order."""
+    if derived(container, "App::LinkGroup"):
+        return getattr(container, "ElementList", None) or ()
+    group: Sequence[Any] = getattr(container, "Group", None) or ()
+    if is_assembly3(container):
+        return (getattr(group[-1], "Group", None) or ()) if group else ()
+    return group
+
+
+def is_container(obj: object) -> bool:
+    """True where an object (the real one, no link) may hold components."""
+    if derived(obj, "App::Part") or derived(obj, "App::LinkGroup") or is_assembly3(obj):
+        return True
+    # A Body keeps its features to itself; anything else with members may hold links.
+    return not derived(obj, "Part::Feature") and bool(own(obj, "Group"))
+
+
+def is_named_assembly(obj: object) -> bool:
+    """True where an object says of itself that it is an assembly, whatever it holds."""
+    if derived(obj, "Assembly::AssemblyObject") or is_assembly3(obj):
+        return True
+    return derived(obj, "App::Part") and own(obj, "Type") == "Assembly"

@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The walker's notebook: what was seen, in plain words, each thing once however often it is met."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from silo.bom.document import LinkProblem, label_of, object_name
+from silo.bom.findings import Finding, FindingCode, Place, Severity
+from silo.bom.model import BomEntry
+
+_Slot = tuple[FindingCode, str]
+
+_BROKEN_TEXT = {
+    FindingCode.MISSING_FILE: "The file {file} is missing",
+    FindingCode.MISSING_OBJECT: "{file} no longer holds the object {obj}",
+    FindingCode.UNREADABLE_FILE: "The file {file} cannot be read ({detail})",
+    FindingCode.LFS_POINTER: "{file} is a Git LFS pointer, not the file itself; fetch it with `git lfs pull`",
+    FindingCode.OUTSIDE_ROOT: "{file} lies outside the folder that may be read",
+    FindingCode.UNSET_LINK: "A link was never given a target",
+    FindingCode.CYCLE: "A chain of links leads back to itself",
+    FindingCode.BROKEN_LINK: "A link has lost its target",
+}
+
+
+def place_of(obj: Any) -> Place:
+    """Where an object is."""
+    return Place(getattr(getattr(obj, "Document", None), "FileName", "") or "", object_name(obj))
+
+
+def _names(labels: Sequence[str], most: int = 8) -> str:
+    shown = ", ".join(labels[:most])
+    return f"{shown} and {len(labels) - most} more" if len(labels) > most else shown
+
+
+@dataclass
+class _Note:
+    severity: Severity
+    message: str
+    where: list[Place] = field(default_factory=list)
+    users: list[str] = field(default_factory=list)
+    tail: str = ""
+
+    def text(self) -> str:
+        if not self.tail:
+            return self.message
+        return f"{self.message}; {self.tail.format(users=_names(list(dict.fromkeys(self.users))))}."
+
+
+class Notes:
+    """Collects findings while walking; the same fact from several places becomes one finding."""
+
+    def __init__(self) -> None:
+        self._notes: dict[_Slot, _Note] = {}
+
+    def findings(self) -> tuple[Finding, ...]:
+        """All findings, in the order in which they were first met."""
+        return tuple(
+            Finding(code, note.severity, note.text(), tuple(dict.fromkeys(note.where)))
+            for (code, _), note in self._notes.items()
+        )
+
+    def any_blocking(self) -> bool:
+        """True where a finding keeps the BOM from being synced."""
+        return any(note.severity is Severity.ERROR for note in self._notes.values())
+
+    def _add(
+        self, code: FindingCode, about: str, severity: Severity, message: str, obj: Any, tail: str = ""
+    ) -> None:
+        note = self._notes.setdefault((code, about), _Note(severity, message, tail=tail))
+        note.where.append(place_of(obj))
+        note.users.append(label_of(obj))
+
+    def broken(self, link: Any, problem: LinkProblem | None) -> None:
+        """One finding per missing file or object, naming what uses it."""
+        problem = problem or LinkProblem(FindingCode.BROKEN_LINK)
+        code = problem.code if problem.code in _BROKEN_TEXT else FindingCode.BROKEN_LINK
+        by_object = code is FindingCode.MISSING_OBJECT
+        about = f"{problem.file}#{problem.obj}" if by_object or not problem.file else problem.file
+        text = _BROKEN_TEXT[code].format(
+            file=problem.file or "a linked file",
+            obj=problem.obj or "that it is asked for",
+            detail=problem.detail or "unknown reason",
+        )
+        unset = code is FindingCode.UNSET_LINK
+        if not problem.file and not by_object:
+            about = str(place_of(link))
+        self._add(
+            code,
+            about,
+            Severity.WARNING if unset else Severity.ERROR,
+            text,
+            link,
+            "not counted: {users}" if unset else "used by {users}",
+        )
+
+    def cycle(self, link: Any, ring: Sequence[tuple[str, str]]) -> None:
+        path = " → ".join(f"{file}#{obj}" for file, obj in ring)
+        self._add(
+            FindingCode.CYCLE,
+            str(sorted(set(ring))),
+            Severity.ERROR,
+            f"An assembly contains itself: {path}",
+            link,
+            "the ring is closed by {users}",
+        )
+
+    def too_deep(self, obj: Any, levels: int) -> None:
+        self._add(
+            FindingCode.TOO_DEEP,
+            "",
+            Severity.ERROR,
+            f"The assembly is nested more than {levels} levels deep; nothing below was read",
+            obj,
+            "cut at {users}",
+        )
+
+    def suppressed(self, obj: Any) -> None:
+        self._each(FindingCode.SUPPRESSED, obj, Severity.INFO, "is suppressed and not counted")
+
+    def excluded(self, link: Any, target: Any = None) -> None:
+        by = "itself" if target is None else f"its part {label_of(target)}"
+        self._each(
+            FindingCode.EXCLUDED,
+            link,
+            Severity.INFO,
+            f"is excluded by SiloBomExclude on {by} and not counted",
+        )
+
+    def mirrored(self, link: Any, target: Any) -> None:
+        self._each(
+            FindingCode.MIRRORED,
+            link,
+            Severity.WARNING,
+            f"is a mirrored {label_of(target)} and counted as one; the other hand of a part usually needs "
+            "a number of its own",
+        )
+
+    def variant(self, link: Any, target: Any) -> None:
+        self._each(
+            FindingCode.VARIANT,
+            link,
+            Severity.WARNING,
+            f"is a variant of {label_of(target)} (copy on change) and counted as one of it",
+        )
+
+    def draft_array(self, array: Any, base: Any, count: int) -> None:
+        self._each(
+            FindingCode.DRAFT_ARRAY,
+            array,
+            Severity.INFO,
+            f"is a Draft array: counted as {count} × {label_of(base)}",
+        )
+
+    def foreign(self, obj: Any) -> None:
+        self._each(
+            FindingCode.FOREIGN_COMPONENT,
+            obj,
+            Severity.WARNING,
+            "was imported by another add-on (A2plus) without a link and is not counted",
+        )
+
+    def sub_element(self, link: Any, element: str) -> None:
+        self._each(
+            FindingCode.SUB_ELEMENT_LINK,
+            link,
+            Severity.INFO,
+            f"is a reference to {element} of a part, not a component",
+        )
+
+    def in_document(self, link: Any, target: Any, *, holds_components: bool) -> None:
+        if holds_components:
+            text = (
+                f"links to {label_of(target)} in this same file and is not counted, though that holds "
+                "components of other files; move it to a file of its own to count it"
+            )
+        else:
+            text = f"links to {label_of(target)} in this same file: construction geometry, not counted"
+        severity = Severity.WARNING if holds_components else Severity.INFO
+        self._each(FindingCode.IN_DOCUMENT_LINK, link, severity, text)
+
+    def stale(self, link: Any, target: Any, gone: Sequence[str], new: Sequence[str]) -> None:
+        parts = [f"no longer there: {_names(gone)}"] if gone else []
+        parts += [f"not shown: {_names(new)}"] if new else []
+        self._each(
+            FindingCode.STALE_ASSEMBLY_LINK,
+            link,
+            Severity.WARNING,
+            f"shows an old state of {label_of(target)} ({'; '.join(parts)}); the BOM counts the real one",
+        )
+
+    def _each(self, code: FindingCode, obj: Any, severity: Severity, text: str) -> None:
+        self._add(code, str(place_of(obj)), severity, f"{label_of(obj)} {text}.", obj)
+
+    def local_geometry(self, container: Any, objects: Sequence[Any]) -> None:
+        """One finding per assembly: what is modelled in its own file is no component."""
+        if not objects:
+            return
+        labels = [label_of(obj) for obj in objects]
+        what = "object is" if len(labels) == 1 else "objects are"
+        self._add(
+            FindingCode.LOCAL_GEOMETRY,
+            str(place_of(container)),
+            Severity.INFO,
+            f"{len(labels)} {what} modelled in {label_of(container)} itself and not counted: "
+            f"{_names(labels)}.",
+            container,
+        )
+
+    def container(self, top: Any) -> None:
+        """The links lie in the document itself, in no assembly or part."""
+        if getattr(top, "is_document_root", False):
+            self._add(
+                FindingCode.NO_CONTAINER,
+                "",
+                Severity.WARNING,
+                "The components lie in the document itself, in no assembly; they were counted.",
+                top,
+            )
+
+    def empty(self, head: BomEntry) -> None:
+        self._notes[FindingCode.EMPTY_BOM, ""] = _Note(
+            Severity.WARNING,
+            f"{head.label} holds no components that are linked from other files, so its BOM is empty.",
+            [Place(head.doc_path, head.object_name)],
+        )

@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""From Silo UUIDs to part numbers (spec bom-sync §2), in as few requests as the server allows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Protocol
+
+from silo.bom.findings import Finding, FindingCode, Place, Severity
+from silo.bom.identity import walk_entries
+from silo.bom.model import BomEntry
+
+
+class ItemLookup(Protocol):
+    """What is needed of a client. ``get_items_by_uuid(uuids)`` is used where the client has it."""
+
+    def get_item_by_uuid(self, uuid: str, /) -> Mapping[str, Any] | None: ...
+
+
+Known = Mapping[str, Mapping[str, Any] | None]
+
+
+def look_up(uuids: Iterable[str], api_client: ItemLookup) -> Known:
+    """The items of these UUIDs, each asked for once; None (or absent) where the server has none."""
+    wanted = list(dict.fromkeys(uuids))
+    batch = getattr(api_client, "get_items_by_uuid", None)
+    if callable(batch) and wanted:
+        found: Mapping[str, Mapping[str, Any]] = batch(wanted)
+        return {uuid: found.get(uuid) or found.get(uuid.lower()) for uuid in wanted}
+    return {uuid: api_client.get_item_by_uuid(uuid) for uuid in wanted}
+
+
+def resolve_part_numbers(
+    entries: Sequence[BomEntry], api_client: ItemLookup
+) -> tuple[list[BomEntry], list[BomEntry]]:
+    """Give each entry its part number and name.
+
+    Returns (resolved, unresolved): resolved entries in order, with resolved children, several with one part
+    number summed into one line; unresolved components of every level, each once. An unresolved sub-assembly
+    keeps its (resolved) children.
+    """
+    known = look_up((e.silo_uuid for e in walk_entries(entries) if e.silo_uuid), api_client)
+    return resolve_with(entries, known)
+
+
+def resolve_with(entries: Sequence[BomEntry], known: Known) -> tuple[list[BomEntry], list[BomEntry]]:
+    """:func:`resolve_part_numbers` against items fetched before; pure."""
+    missing: dict[tuple[str, str], BomEntry] = {}
+    done: dict[int, tuple[BomEntry, bool]] = {}
+
+    def one(entry: BomEntry) -> tuple[BomEntry, bool]:
+        # Nested assemblies share their values; each distinct value is resolved once.
+        if (before := done.get(id(entry))) is not None:
+            return before
+        item = known.get(entry.silo_uuid) if entry.silo_uuid else None
+        if item is None:
+            missing.setdefault(entry.key, entry)
+        children = several(entry.children)
+        number = item["part_number"] if item is not None else None
+        name = (item.get("name") or item.get("description") or number) if item is not None else None
+        result = (replace(entry, part_number=number, name=name, children=tuple(children)), item is not None)
+        done[id(entry)] = result
+        return result
+
+    def several(group: Iterable[BomEntry]) -> list[BomEntry]:
+        return merge_lines(entry for entry, found in map(one, group) if found)
+
+    resolved = several(entries)
+    unresolved = [replace(entry, children=one(entry)[0].children) for entry in missing.values()]
+    return resolved, unresolved
+
+
+def merge_lines(entries: Iterable[BomEntry]) -> list[BomEntry]:
+    """Entries of one parent with one part number become one line with the summed quantity."""
+    lines: dict[str, BomEntry] = {}
+    for entry in entries:
+        number = entry.part_number or ""
+        before = lines.get(number)
+        if before is None:
+            lines[number] = entry
+            continue
+        lines[number] = replace(
+            before,
+            quantity=before.quantity + entry.quantity,
+            consolidation_warning=before.consolidation_warning or entry.consolidation_warning,
+            individual_links=before.individual_links + entry.individual_links,
+            link_objects=before.link_objects + entry.link_objects,
+            instances=before.instances + entry.instances,
+        )
+    return list(lines.values())
+
+
+def consolidation_message(entry: BomEntry) -> str:
+    """The spec's console warning (§6), with the count of individual links."""
+    who = entry.part_number or entry.label or entry.object_name or entry.doc_path
+    count = entry.individual_links
+    if count > 1:
+        what = f"{count} individual links"
+    elif count == 1:
+        what = "1 individual link beside a link array"
+    else:
+        what = f"{entry.link_objects} link arrays" if entry.link_objects > 1 else "several links"
+    advice = "Consider using a link array (ElementCount) for cleaner assembly management."
+    return f"[Silo BOM] {who} has {what}. {advice}"
+
+
+def consolidation_findings(entries: Iterable[BomEntry]) -> tuple[Finding, ...]:
+    """The consolidation warnings of a tree, each component once."""
+    return tuple(
+        Finding(
+            FindingCode.CONSOLIDATION,
+            Severity.INFO,
+            consolidation_message(entry),
+            (Place(entry.doc_path, entry.object_name),),
+        )
+        for entry in walk_entries(entries)
+        if entry.consolidation_warning
+    )
+
+
+def unregistered_findings(unresolved: Iterable[BomEntry]) -> tuple[Finding, ...]:
+    """Components without a Silo part number: left out of the BOM, never in silence."""
+    return tuple(
+        Finding(
+            FindingCode.UNREGISTERED,
+            Severity.WARNING,
+            f"{entry.label or entry.object_name} has no Silo part number and is left out of the BOM "
+            "until it is registered.",
+            (Place(entry.doc_path, entry.object_name),),
+        )
+        for entry in unresolved
+    )
