@@ -3,16 +3,28 @@
 
 Tolerant when reading: unknown keys are ignored, the forms of the real Silo are accepted beside the spec's
 (``bom.merged`` beside ``bom_merge``, ``part_number`` beside ``item``, ``description`` where there is no
-``name``). Exact when writing: the spec's keys.
+``name``, null where there is nothing). Exact when writing: the spec's keys, whole quantities as whole numbers.
+Write with ``model_dump(mode="json", by_alias=True, exclude_none=True)``.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Mapping
 from datetime import datetime
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, AliasChoices, BaseModel, ConfigDict, Field, model_validator
+from pydantic import (
+    AfterValidator,
+    AliasChoices,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    WithJsonSchema,
+    model_validator,
+)
 
 Source = Literal["assembly", "manual"]
 
@@ -23,16 +35,71 @@ class Wire(BaseModel):
     model_config = ConfigDict(extra="ignore", populate_by_name=True)
 
 
+class Answer(Wire):
+    """Base of what a server sends. The real Silo sends null where it has nothing; that reads as unset."""
+
+    model_config = ConfigDict(coerce_numbers_to_str=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _none_is_unset(cls, data: Any) -> Any:
+        return {k: v for k, v in data.items() if v is not None} if type(data) is dict else data
+
+
+class Record(Answer, Mapping[str, Any]):
+    """An answer that also reads as a mapping: ``item["part_number"]`` and ``item.part_number`` are one.
+
+    The spec's listings (and :mod:`silo.bom`) take mappings; people and type checkers like attributes.
+    """
+
+    def __getitem__(self, key: str) -> Any:
+        if key not in type(self).model_fields:
+            raise KeyError(key)
+        return getattr(self, key)
+
+    def __iter__(self) -> Iterator[str]:  # type: ignore[override]
+        return iter(type(self).model_fields)
+
+    def __len__(self) -> int:
+        return len(type(self).model_fields)
+
+
 def _finite_positive(value: float) -> float:
     if not math.isfinite(value) or value <= 0:
         raise ValueError(f"quantity: wanted a finite number above 0, got {value}")
     return value
 
 
-Quantity = Annotated[float, AfterValidator(_finite_positive)]
+def _shortest(value: float) -> float:
+    # The spec writes 12, never 12.0; a server that counts in integers refuses the latter.
+    return int(value) if value == value and abs(value) < 2**53 and value == int(value) else value
 
 
-class Item(Wire):
+def _known_source(value: Any) -> Any:
+    # A source we do not know is somebody's: only lines that say "assembly" may be changed by a merge.
+    if isinstance(value, str):
+        word = value.strip().lower() or "assembly"
+        return word if word == "assembly" else "manual"
+    return value
+
+
+def _designators(value: Any) -> Any:
+    if isinstance(value, str):
+        return [part for part in value.replace(",", " ").split() if part]
+    return value
+
+
+_Shortest = PlainSerializer(_shortest, return_type=int | float)
+Number = Annotated[float, _Shortest, WithJsonSchema({"type": "number"})]
+Quantity = Annotated[
+    float,
+    AfterValidator(_finite_positive),
+    _Shortest,
+    WithJsonSchema({"type": "number", "exclusiveMinimum": 0}),
+]
+
+
+class Item(Record):
     """An item of the PLM. ``id`` is its stable UUID; the part number may be renamed."""
 
     id: str = Field(validation_alias=AliasChoices("id", "uuid"))
@@ -48,12 +115,6 @@ class Item(Wire):
     thumbnail_key: str | None = None
     properties: dict[str, Any] = Field(default_factory=dict)
 
-    @model_validator(mode="before")
-    @classmethod
-    def _none_is_unset(cls, data: Any) -> Any:
-        # The real Silo sends null where it has nothing; for us that is the default.
-        return {k: v for k, v in data.items() if v is not None} if isinstance(data, dict) else data
-
     @model_validator(mode="after")
     def _name_or_description(self) -> Item:
         # The spec reads item["name"]; the real Silo's display text is `description`.
@@ -62,29 +123,26 @@ class Item(Wire):
         return self
 
 
-class BomLine(Wire):
+class BomLine(Record):
     """A BOM line as the server has it. ``unreferenced_since`` is set while no assembly component uses it."""
 
     id: str | None = None
     parent_part_number: str | None = None
     child_part_number: str
+    child_id: str | None = None
     child_description: str = ""
     rel_type: str = "component"
-    quantity: float | None = None
+    quantity: Number | None = None
     unit: str | None = None
-    reference_designators: list[str] = Field(default_factory=list)
+    reference_designators: Annotated[list[str], BeforeValidator(_designators)] = Field(default_factory=list)
     find_number: str | None = None
     notes: str | None = None
     child_revision: int | None = None
-    source: Source = "assembly"
+    effective_revision: int | None = None
+    source: Annotated[Source, BeforeValidator(_known_source)] = "assembly"
     unreferenced_since: datetime | None = None
     depth: int | None = None
     metadata: dict[str, Any] = Field(default_factory=dict)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _none_is_unset(cls, data: Any) -> Any:
-        return {k: v for k, v in data.items() if v is not None} if isinstance(data, dict) else data
 
 
 class MergeEntry(Wire):
@@ -113,22 +171,22 @@ class MergeRequest(Wire):
     document: SourceDocument | None = None
 
 
-class QuantityLine(Wire):
+class QuantityLine(Answer):
     """A part number with its quantity."""
 
     part_number: str
-    quantity: float | None = None
+    quantity: Number | None = None
 
 
-class QuantityUpdate(Wire):
+class QuantityUpdate(Answer):
     """A part number with its quantity before and after."""
 
     part_number: str
-    old_quantity: float | None = None
-    new_quantity: float
+    old_quantity: Number | None = None
+    new_quantity: Number
 
 
-class MergeDiff(Wire):
+class MergeDiff(Answer):
     """What a merge did, or would do. ``unchanged_count`` is the real Silo's short form in events."""
 
     added: list[QuantityLine] = Field(default_factory=list)
@@ -138,17 +196,17 @@ class MergeDiff(Wire):
     unchanged_count: int | None = Field(default=None, exclude=True)
 
 
-class MergeWarning(Wire):
+class MergeWarning(Answer):
     """``unreferenced`` or ``conflict``; for a conflict both quantities are given."""
 
     type: str
     part_number: str
     message: str = ""
-    assembly_quantity: float | None = None
-    server_quantity: float | None = None
+    assembly_quantity: Number | None = None
+    server_quantity: Number | None = None
 
 
-class MergeResult(Wire):
+class MergeResult(Answer):
     """The answer to a merge request."""
 
     status: str = "merged"
@@ -159,7 +217,7 @@ class MergeResult(Wire):
     version: int | None = None
 
 
-class MergeEvent(Wire):
+class MergeEvent(Answer):
     """The SSE event of a merge: the spec's ``bom_merge``, or the real Silo's ``bom.merged``."""
 
     type: str = "bom_merge"
@@ -173,10 +231,129 @@ class MergeEvent(Wire):
     warnings: list[MergeWarning] = Field(default_factory=list)
 
 
-class ErrorBody(Wire):
+class ErrorBody(Answer):
     """The one shape of every HTTP error. ``problems`` lists all bad entries at once, with their index."""
 
     error: str
     message: str = ""
     problems: list[str] = Field(default_factory=list)
     path: list[str] = Field(default_factory=list)
+
+
+class ByUuidRequest(Wire):
+    """``POST /api/items/by-uuid``: many identities in one question."""
+
+    uuids: list[str]
+
+
+class ByUuidAnswer(Answer):
+    """The items that exist; an unknown or archived UUID has none."""
+
+    items: list[Item] = Field(default_factory=list)
+
+
+class ItemCreate(Wire):
+    """``POST /api/items``. The server makes the part number from schema and category."""
+
+    schema_name: str = Field(alias="schema", default="kindred-rd")
+    category: str = Field(min_length=1)
+    description: str = ""
+    name: str | None = None
+    item_type: str = "part"
+    projects: list[str] | None = None
+    sourcing_type: str | None = None
+    long_description: str | None = None
+    properties: dict[str, Any] | None = None
+
+
+class ItemUpdate(Wire):
+    """``PUT /api/items/{partNumber}``: in place, but with ``properties`` it makes a new revision."""
+
+    part_number: str | None = None
+    description: str | None = None
+    name: str | None = None
+    item_type: str | None = None
+    sourcing_type: str | None = None
+    long_description: str | None = None
+    properties: dict[str, Any] | None = None
+    comment: str | None = None
+
+
+class PartNumberRequest(Wire):
+    """``POST /api/generate-part-number``: a preview, it may be asked as often as one likes."""
+
+    schema_name: str = Field(alias="schema", default="kindred-rd")
+    category: str = Field(min_length=1)
+
+
+class PartNumberAnswer(Answer):
+    """The number that the next item of this category would get."""
+
+    part_number: str
+
+
+class Revision(Record):
+    """A revision of an item; ``file_checksum`` is the SHA-256 of its file, in hex."""
+
+    revision_number: int = Field(validation_alias=AliasChoices("revision_number", "revision", "number"))
+    file_key: str | None = None
+    file_name: str | None = Field(default=None, validation_alias=AliasChoices("file_name", "filename"))
+    file_checksum: str | None = Field(
+        default=None, validation_alias=AliasChoices("file_checksum", "checksum", "sha256")
+    )
+    file_size: int | None = None
+    comment: str = ""
+    status: str = "draft"
+    labels: list[str] = Field(default_factory=list)
+    properties: dict[str, Any] = Field(default_factory=dict)
+    created_by: str | None = None
+    created_at: datetime | None = None
+
+
+class FlatLine(Record):
+    """A line of the flat BOM: a part and how many of it the whole tree holds."""
+
+    part_number: str = Field(validation_alias=AliasChoices("part_number", "child_part_number"))
+    description: str = Field(default="", validation_alias=AliasChoices("description", "child_description"))
+    total_quantity: Number | None = Field(
+        default=None, validation_alias=AliasChoices("total_quantity", "quantity")
+    )
+    unit: str | None = None
+
+
+class WhereUsedLine(Record):
+    """A parent that has the item on its BOM."""
+
+    parent_part_number: str = Field(validation_alias=AliasChoices("parent_part_number", "part_number"))
+    parent_description: str = Field(
+        default="", validation_alias=AliasChoices("parent_description", "description")
+    )
+    quantity: Number | None = None
+    unit: str | None = None
+    rel_type: str = "component"
+    source: Annotated[Source, BeforeValidator(_known_source)] = "assembly"
+
+
+class User(Record):
+    """Who a token belongs to."""
+
+    username: str
+    display_name: str = ""
+    role: str = ""
+    auth_source: str = ""
+
+
+class ServerState(Record):
+    """``GET /ready`` and the ``server.state`` event: ``normal``, ``read-only`` or ``degraded``."""
+
+    mode: str = "normal"
+    status: str = ""
+    version: str = ""
+    sse_clients: int | None = None
+
+
+class CategoryInfo(Record):
+    """A category of a part-number schema, such as ``F01``, "Screws and Bolts"."""
+
+    code: str
+    description: str = ""
