@@ -9,8 +9,10 @@
     │   └── ConfigError         the configuration is missing or contradicts itself
     ├── RemoteError             the server's, or the way to it
     │   ├── UnreachableError    no answer (no network, refused, timed out)
-    │   ├── AuthError           401: who are you; 403: you may not
+    │   ├── AuthError           401: who are you
+    │   │   └── ForbiddenError  403: you may not
     │   ├── NotFoundError       404
+    │   │   └── RouteMissingError  404, 405, 501: this server does not know the request at all
     │   ├── RejectedError       400, 413, 422: the server names what it does not accept
     │   ├── ReadOnlyError       503: the server takes no changes now
     │   └── ServerFaultError    any other 5xx, or an answer that cannot be understood
@@ -73,17 +75,31 @@ class UnreachableError(RemoteError):
 
 
 class AuthError(RemoteError):
-    """401: the token is missing or wrong; 403: its role is too low."""
+    """401: the token is missing or wrong."""
 
     status_hint = 401
     code = "unauthorized"
 
 
+class ForbiddenError(AuthError):
+    """403: the token is known, but its role is too low."""
+
+    status_hint = 403
+    code = "forbidden"
+
+
 class NotFoundError(RemoteError):
-    """404: the server has no such item, revision or route."""
+    """404: the server has no such item or revision."""
 
     status_hint = 404
     code = "not_found"
+
+
+class RouteMissingError(NotFoundError):
+    """404, 405, 501: the server does not know the request at all; it is older, or no Silo."""
+
+    status_hint = 404
+    code = "no_route"
 
 
 class RejectedError(RemoteError):
