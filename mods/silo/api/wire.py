@@ -3,7 +3,7 @@
 
 Tolerant when reading: unknown keys are ignored, the forms of the real Silo are accepted beside the spec's
 (``bom.merged`` beside ``bom_merge``, ``part_number`` beside ``item``, ``description`` where there is no
-``name``, null where there is nothing). Exact when writing: the spec's keys, whole quantities as whole numbers.
+``name``, null where there is nothing). Exact when writing: the spec's keys, whole quantities as integers.
 Write with ``model_dump(mode="json", by_alias=True, exclude_none=True)``.
 """
 
