@@ -111,7 +111,9 @@ class Instance:
     """One placed prototype.
 
     path
-        instance names from the top assembly (not included) down to this one.
+        instance names from the top assembly (not included) down to this one. Unique in the assembly: a
+        reader that meets a name again among siblings appends ``#2``, ``#3``, … (Onshape names instances by
+        their product, so that two legs are both "leg"; without this they would become one link).
     product_path
         product names of the same levels.
     prototype
