@@ -120,6 +120,7 @@ class _Walker:
             level=level,
             object_name=name,
             label=label_of(obj),
+            document_label=getattr(obj.Document, "Label", "") or "",
             is_assembly=is_named_assembly(obj),
         )
 

@@ -37,6 +37,8 @@ class BomEntry:
         True for a sub-assembly, also for an empty one.
     individual_links, link_objects
         plain ``App::Link`` objects (no array), and all ``App::Link`` objects, that were counted.
+    document_label
+        ``Label`` of the component's document (the spec pre-fills names from it).
     instances
         names of the objects in the parent's document that were counted, to select them on screen.
     """
@@ -55,6 +57,7 @@ class BomEntry:
     individual_links: int = field(default=0, compare=False)
     link_objects: int = field(default=0, compare=False)
     instances: tuple[str, ...] = field(default=(), compare=False, repr=False)
+    document_label: str = field(default="", compare=False, repr=False)
 
     def __post_init__(self) -> None:
         # A caller may hand over any iterable; a frozen value holds a tuple.

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What to propose for a component that has no item yet: name, type and category (spec bom-sync §2, §6).
+
+Only a proposal: a person confirms it, or says ``--yes``. Part numbers are made by the server.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from silo.bom.identity import walk_entries
+from silo.bom.model import BomEntry
+
+_SUFFIX = re.compile(r"\.fcstd$", re.IGNORECASE)
+_WORD = re.compile(r"[^\W\d_]{3,}")
+# Labels that FreeCAD gives by itself say nothing of the part.
+_GENERIC = re.compile(
+    r"(?:body|part|assembly|model|unnamed|link|compound|solid|fusion|cut)[ _]?\d*$", re.IGNORECASE
+)
+# In the order of preference, for components whose name fits no category.
+_PART_WORDS = ("part", "machin", "custom", "manufactur", "component", "mechanic")
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """How a component would be registered."""
+
+    entry: BomEntry
+    name: str
+    item_type: str
+    category: str
+
+
+def clean_name(text: str) -> str:
+    """A label as a name for people: no file suffix, no control characters, single spaces."""
+    text = _SUFFIX.sub("", unicodedata.normalize("NFC", text))
+    printable = "".join(" " if unicodedata.category(c) in ("Cc", "Cf", "Zl", "Zp") else c for c in text)
+    return " ".join(printable.replace("_", " ").split())[:200]
+
+
+def crowded_files(entries: Iterable[BomEntry]) -> frozenset[str]:
+    """Files that give more than one component of this tree."""
+    files = Counter(entry.doc_path for entry in walk_entries(entries))
+    return frozenset(path for path, count in files.items() if count > 1)
+
+
+def proposed_name(entry: BomEntry, *, shares_file: bool = False) -> str:
+    """The document's label (spec §2), or the object's where its file gives several components."""
+    of_document, of_object = clean_name(entry.document_label), clean_name(entry.label)
+    if shares_file and of_object and not _GENERIC.match(of_object):
+        return of_object
+    return of_document or of_object or "Unnamed component"
+
+
+def _stems(text: str) -> set[str]:
+    words = {word.casefold() for word in _WORD.findall(text)}
+    return {word[:-1] if word.endswith("s") and len(word) > 3 else word for word in words}
+
+
+def proposed_category(entry: BomEntry, name: str, categories: Mapping[str, str]) -> str:
+    """The category code that fits best; "" where there is none to choose from.
+
+    categories
+        code → description, in the schema's order.
+    """
+    of_assemblies = {code for code, text in categories.items() if "assembl" in text.casefold()}
+    fitting = [code for code in categories if (code in of_assemblies) == entry.is_assembly]
+    if not fitting:
+        return next(iter(categories), "")
+    words = _stems(name)
+    scored = [(len(words & _stems(categories[code])), code) for code in fitting]
+    best = max(score for score, _ in scored)
+    if best and not entry.is_assembly:
+        return next(code for score, code in scored if score == best)
+    for wanted in () if entry.is_assembly else _PART_WORDS:
+        for code in fitting:
+            if wanted in categories[code].casefold():
+                return code
+    return fitting[0]
+
+
+def propose(entry: BomEntry, categories: Mapping[str, str], *, shares_file: bool = False) -> Proposal:
+    """Type from the document, name from the label, category from the schema."""
+    name = proposed_name(entry, shares_file=shares_file)
+    return Proposal(
+        entry=entry,
+        name=name,
+        item_type="assembly" if entry.is_assembly else "part",
+        category=proposed_category(entry, name, categories),
+    )

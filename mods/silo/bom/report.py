@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""A BOM as plain data for machines: the JSON of ``silo-mod bom``, and the flat list. Pure."""
+
+from __future__ import annotations
+
+import os.path
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from silo.bom.findings import Finding, Place
+from silo.bom.model import BomDiff, BomEntry, Extraction, rows_as_dicts
+
+
+def relative(path: str, base: str) -> str:
+    """``path`` as seen from the folder ``base``, with ``/``; unchanged where there is no such way."""
+    if not path or not base:
+        return path
+    try:
+        return os.path.relpath(path, base).replace(os.sep, "/")
+    except ValueError:  # another Windows drive
+        return path.replace(os.sep, "/")
+
+
+def base_of(extraction: Extraction) -> str:
+    """The folder that paths are told relative to: that of the top file."""
+    return os.path.dirname(extraction.assembly.doc_path)
+
+
+def entry_json(entry: BomEntry, base: str) -> dict[str, Any]:
+    """One entry with its children; quantities per one parent."""
+    return {
+        "doc_path": relative(entry.doc_path, base),
+        "object": entry.object_name,
+        "label": entry.label,
+        "silo_uuid": entry.silo_uuid,
+        "part_number": entry.part_number,
+        "name": entry.name,
+        "quantity": entry.quantity,
+        "level": entry.level,
+        "consolidation_warning": entry.consolidation_warning,
+        "children": [entry_json(child, base) for child in entry.children],
+    }
+
+
+def finding_json(finding: Finding, base: str) -> dict[str, Any]:
+    """One finding; places are ``file#object`` relative to the top file's folder."""
+    return {
+        "code": finding.code.value,
+        "severity": finding.severity.value,
+        "message": shorten(finding.message, base),
+        "where": [str(Place(relative(place.doc_path, base), place.obj)) for place in finding.where],
+    }
+
+
+def shorten(message: str, base: str) -> str:
+    """A message without the long folder that all its paths share."""
+    return message.replace(base.rstrip("/\\") + os.sep, "") if base else message
+
+
+def bom_json(extraction: Extraction, findings: Sequence[Finding] | None = None) -> dict[str, Any]:
+    """The whole BOM of an assembly."""
+    base = base_of(extraction)
+    head = extraction.assembly
+    return {
+        "assembly": {
+            "doc_path": relative(head.doc_path, base),
+            "object": head.object_name,
+            "label": head.label,
+            "silo_uuid": head.silo_uuid,
+            "part_number": head.part_number,
+            "name": head.name,
+        },
+        "entries": [entry_json(entry, base) for entry in extraction.entries],
+        "findings": [finding_json(f, base) for f in (extraction.findings if findings is None else findings)],
+    }
+
+
+def flat_counts(entries: Iterable[BomEntry]) -> dict[tuple[str, str], int]:
+    """Instances of each component in the whole assembly, sub-assemblies included."""
+    below: dict[int, dict[tuple[str, str], int]] = {}
+
+    def subtree(entry: BomEntry) -> dict[tuple[str, str], int]:
+        # Nested assemblies share their values; each distinct one is counted once.
+        if (known := below.get(id(entry))) is not None:
+            return known
+        total = {entry.key: 1}
+        for child in entry.children:
+            for key, count in subtree(child).items():
+                total[key] = total.get(key, 0) + count * child.quantity
+        below[id(entry)] = total
+        return total
+
+    everything: dict[tuple[str, str], int] = {}
+    for entry in entries:
+        for key, count in subtree(entry).items():
+            everything[key] = everything.get(key, 0) + count * entry.quantity
+    return everything
+
+
+def flat_json(extraction: Extraction) -> list[dict[str, Any]]:
+    """``[{"doc_path", "object", "quantity"}]``: quantities multiplied down the tree."""
+    base = base_of(extraction)
+    return [
+        {"doc_path": relative(path, base), "object": name, "quantity": count}
+        for (path, name), count in flat_counts(extraction.entries).items()
+    ]
+
+
+def diff_json(diff: BomDiff) -> dict[str, Any]:
+    """A comparison with the server."""
+    return {
+        "added": rows_as_dicts(diff.added),
+        "quantity_changed": rows_as_dicts(diff.quantity_changed),
+        "removed": rows_as_dicts(diff.removed),
+        "unchanged": rows_as_dicts(diff.unchanged),
+        "manual": rows_as_dicts(diff.manual),
+        "conflicts": rows_as_dicts(diff.conflicts),
+    }

@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The whole BOM sync on one page: extract → resolve → diff → merge (spec bom-sync, "Data Flow").
+
+::
+
+    document ── extract ──▶ Extraction ── resolve ──▶ Resolved ── compare ──▶ MergePlan ── merge ──▶ Outcome
+    (FreeCAD,               (frozen)     (by UUID)   (frozen)     (server's   (frozen)     (one     (frozen)
+     FCStd)                                                        lines)                  request)
+
+What a run needs from the server is fetched before each pure step; nothing here knows where the document came
+from or who shows the result. Nothing is ever deleted, and manual lines are never touched: that is the
+server's rule too, so a faulty client cannot break it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Any, Protocol
+
+from silo.api.wire import MergeEntry, MergeRequest, MergeResult, SourceDocument
+from silo.bom.diff import diff_bom
+from silo.bom.errors import SiloError
+from silo.bom.findings import Finding, FindingCode, Severity
+from silo.bom.identity import walk_entries
+from silo.bom.links import extract, extract_bom_links
+from silo.bom.merge import MergePlan, plan_merge
+from silo.bom.model import BomEntry, Extraction
+from silo.bom.resolve import (
+    ItemLookup,
+    consolidation_findings,
+    look_up,
+    resolve_part_numbers,
+    resolve_with,
+    unregistered_findings,
+)
+
+__all__ = [
+    "Outcome",
+    "Resolved",
+    "Status",
+    "compare",
+    "diff_bom",
+    "extract",
+    "extract_bom_links",
+    "resolve",
+    "resolve_part_numbers",
+    "sync",
+    "sync_tree",
+]
+
+
+class SyncApi(ItemLookup, Protocol):
+    """What a sync needs of a Silo; :class:`silo.api.client.SiloClient` has it."""
+
+    def get_bom(self, part_number: str, /) -> Sequence[Any]: ...
+
+    def merge_bom(self, part_number: str, request: MergeRequest, /) -> MergeResult: ...
+
+
+class Status(StrEnum):
+    """How the sync of one assembly ended."""
+
+    MERGED = "merged"  # the server's BOM took the changes
+    UNCHANGED = "unchanged"  # nothing to change, nothing was sent
+    DRY_RUN = "dry_run"  # this is what would change; nothing was sent
+    BLOCKED = "blocked"  # a broken link: not sent, so that nothing reads as removed
+    UNREGISTERED = "unregistered"  # the assembly itself has no part number yet
+    FAILED = "failed"  # the server or the way to it
+
+
+@dataclass(frozen=True)
+class Resolved:
+    """One assembly with its direct children as the server knows them."""
+
+    assembly: BomEntry
+    entries: tuple[BomEntry, ...]
+    unresolved: tuple[BomEntry, ...]
+    findings: tuple[Finding, ...]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one assembly's sync."""
+
+    status: Status
+    resolved: Resolved
+    plan: MergePlan | None = None
+    result: MergeResult | None = None
+    error: SiloError | None = None
+
+    @property
+    def assembly(self) -> BomEntry:
+        return self.resolved.assembly
+
+
+def resolve(extraction: Extraction, api: ItemLookup) -> Resolved:
+    """Give the assembly and all its components their part numbers, in one look-up for the whole tree."""
+    head = extraction.assembly
+    uuids = [e.silo_uuid for e in walk_entries((head, *extraction.entries)) if e.silo_uuid]
+    known = look_up(uuids, api)
+    entries, unresolved = resolve_with(extraction.entries, known)
+    item = known.get(head.silo_uuid) if head.silo_uuid else None
+    if item is not None:
+        number = str(item["part_number"])
+        head = replace(head, part_number=number, name=item.get("name") or item.get("description") or number)
+    return Resolved(
+        assembly=head,
+        entries=tuple(entries),
+        unresolved=tuple(unresolved),
+        findings=(
+            *extraction.findings,
+            *consolidation_findings(entries),
+            *unregistered_findings(unresolved),
+        ),
+    )
+
+
+def compare(resolved: Resolved, api: SyncApi) -> MergePlan:
+    """What a merge would do, against the server's lines as they are now."""
+    number = resolved.assembly.part_number
+    if number is None:
+        return plan_merge(resolved.entries, ())
+    return plan_merge(resolved.entries, [_line(line) for line in api.get_bom(number)])
+
+
+def _line(line: Any) -> Mapping[str, Any]:
+    return line if isinstance(line, Mapping) else line.model_dump()
+
+
+def sync(
+    resolved: Resolved,
+    api: SyncApi,
+    *,
+    sync_id: str,
+    allow_missing: bool = False,
+    dry_run: bool = False,
+    document: SourceDocument | None = None,
+) -> Outcome:
+    """Bring one assembly's direct children to the server.
+
+    sync_id
+        names this attempt; the same id sent again gives the same answer and changes nothing twice.
+    allow_missing
+        sync although links are broken: what they stood for will read as unreferenced.
+    """
+    number = resolved.assembly.part_number
+    if number is None:
+        return Outcome(Status.UNREGISTERED, resolved)
+    try:
+        plan = compare(resolved, api)
+        if blocking(resolved) and not allow_missing:
+            return Outcome(Status.BLOCKED, resolved, plan)
+        if dry_run:
+            return Outcome(Status.DRY_RUN, resolved, plan)
+        if not plan.writes:
+            return Outcome(Status.UNCHANGED, resolved, plan)
+        result = api.merge_bom(number, merge_request(resolved, sync_id, document))
+    except SiloError as error:
+        return Outcome(Status.FAILED, resolved, error=error)
+    return Outcome(Status.MERGED, resolved, plan, result)
+
+
+def merge_request(resolved: Resolved, sync_id: str, document: SourceDocument | None = None) -> MergeRequest:
+    """The request of spec §5: the direct children only."""
+    entries = [
+        MergeEntry(child_part_number=entry.part_number or "", quantity=entry.quantity)
+        for entry in resolved.entries
+    ]
+    return MergeRequest(entries=entries, sync_id=sync_id, document=document)
+
+
+def blocking(resolved: Resolved) -> tuple[Finding, ...]:
+    """The findings that keep this assembly from being synced: those in its own file, and loops anywhere."""
+    anywhere = (FindingCode.CYCLE, FindingCode.TOO_DEEP)
+    mine = resolved.assembly.doc_path
+    return tuple(
+        finding
+        for finding in resolved.findings
+        if finding.severity is Severity.ERROR
+        and (finding.code in anywhere or any(place.doc_path == mine for place in finding.where))
+    )
+
+
+def assemblies(resolved: Resolved) -> Iterator[Resolved]:
+    """The assembly and its sub-assemblies, each once, children before parents."""
+    seen: set[tuple[str, str]] = set()
+
+    def below(entries: Sequence[BomEntry]) -> Iterator[BomEntry]:
+        for entry in entries:
+            if entry.is_assembly and entry.key not in seen:
+                seen.add(entry.key)
+                yield from below(entry.children)
+                yield entry
+
+    # Sub-assemblies without a number hang in `unresolved`; their own sub-assemblies are synced all the same.
+    for entry in below((*resolved.unresolved, *resolved.entries)):
+        yield replace(resolved, assembly=entry, entries=entry.children)
+    yield resolved
+
+
+def sync_tree(
+    resolved: Resolved,
+    api: SyncApi,
+    *,
+    sync_id: Callable[[], str],
+    allow_missing: bool = False,
+    dry_run: bool = False,
+    describe: Callable[[BomEntry], SourceDocument | None] = lambda _entry: None,
+) -> Iterator[Outcome]:
+    """Sync an assembly with all its sub-assemblies, leaves first; one failure does not stop the others."""
+    for one in assemblies(resolved):
+        yield sync(
+            one,
+            api,
+            sync_id=sync_id(),
+            allow_missing=allow_missing,
+            dry_run=dry_run,
+            document=describe(one.assembly),
+        )
