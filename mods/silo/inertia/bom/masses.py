@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Mass cells of a BOM: number, unit, rounding quantum. "0.3 kg*", "1.234,5 g", "10.5 oz", "- None -".
+
+A cell is either empty (in any of the spellings below), a mass, or a problem that is told with its line. It is
+never None in silence.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import unicodedata
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from silo.inertia.bom.numbers import Mark, Number, parse_number
+
+_POUND = 0.45359237  # exactly, by definition (NIST Handbook 44, appendix C)
+
+MASS_UNITS: dict[str, float] = {
+    **dict.fromkeys(("kg", "kgs", "kilo", "kilogram", "kilograms", "kilogramm", "kilogramme"), 1.0),
+    **dict.fromkeys(("kilogrammes", "kilogramo", "kilogramos", "chilogrammo", "chilogrammi"), 1.0),
+    **dict.fromkeys(("キログラム", "千克", "公斤"), 1.0),
+    **dict.fromkeys(("g", "gr", "gram", "grams", "gramm", "gramme", "grammes", "gramo", "gramos"), 1e-3),
+    **dict.fromkeys(("grammo", "grammi", "グラム", "克"), 1e-3),
+    **dict.fromkeys(("mg", "milligram", "milligrams", "milligramm", "milligramme", "毫克"), 1e-6),
+    **dict.fromkeys(("µg", "μg", "ug", "microgram", "micrograms"), 1e-9),
+    **dict.fromkeys(("t", "to", "tonne", "tonnes", "tonnen", "toneladas", "tonnellate"), 1e3),
+    **dict.fromkeys(("metric ton", "metric tons", "トン", "吨"), 1e3),
+    **dict.fromkeys(("lb", "lbs", "lbm", "pound", "pounds", "pfund", "livres", "libras", "libbre"), _POUND),
+    **dict.fromkeys(("ポンド", "磅"), _POUND),
+    **dict.fromkeys(
+        ("oz", "ozm", "ounce", "ounces", "unze", "unzen", "onces", "onzas", "オンス"), _POUND / 16
+    ),
+    **dict.fromkeys(("slug", "slugs"), _POUND * 9.80665 / 0.3048),
+}
+"""Unit → kg. "Mg" is missing on purpose: it may mean megagram or a careless mg."""
+
+# What Onshape and others write for "nothing" in the languages whose headers we know.
+_EMPTY = {
+    "", "-", "--", "---", "–", "—", "?", "n/a", "na", "n.a.", "none", "no value", "null", "nan", "unknown",
+    "not set", "unset", "keine", "keiner", "keines", "kein wert", "ohne", "nicht zugewiesen", "aucun",
+    "aucune", "aucune valeur", "sans valeur", "ninguno", "ninguna", "sin valor", "nessuno", "nessuna",
+    "nessun valore", "なし", "値なし", "無し", "无", "无值", "無", "没有值",
+}  # fmt: skip
+
+
+def is_empty(cell: str) -> bool:
+    """True where a cell says "nothing": empty, "No value", "- None -", and their translations."""
+    text = unicodedata.normalize("NFKC", cell).strip().casefold()
+    inner = re.fullmatch(r"[-–—]\s*(.*?)\s*[-–—]", text)
+    return text in _EMPTY or (inner is not None and inner[1] in _EMPTY)
+
+
+@dataclass(frozen=True, slots=True)
+class MassCell:
+    """What one cell says.
+
+    kg
+        the mass, None where the cell is empty or unreadable.
+    quantum_kg
+        half the weight of the last written digit: the mass is ``kg`` ± this.
+    unit
+        the unit it was read in, "" where none was written.
+    overridden
+        marked by hand ("0.3 kg*").
+    mark, ambiguous
+        see :class:`~silo.inertia.bom.numbers.Number`.
+    problem
+        why it could not be read, or could be read two ways; None where all is well.
+    """
+
+    kg: float | None = None
+    quantum_kg: float = 0.0
+    unit: str = ""
+    overridden: bool = False
+    mark: Mark | None = None
+    ambiguous: bool = False
+    problem: str | None = None
+
+
+_CELL = re.compile(
+    r"(?P<number>[+\-−]?\s*[\d.,](?:[\d.,\s'’]*[\d.,])?(?:[eE][+\-−]?\d+)?)"
+    r"\s*(?P<unit>[^\d*]*?)(?P<star>\*?)"
+)
+
+
+def parse_mass(text: str, *, mark: Mark | None = None, unit: str | None = None) -> MassCell:
+    """One cell as a mass. ``mark``: the column's decimal mark, ``unit``: its header's; None: unknown."""
+    if is_empty(text):
+        return MassCell()
+    cell = re.sub(r"^\((.*)\)$", r"\1", unicodedata.normalize("NFKC", text).strip()).lstrip("≈~ ").strip()
+    found = _CELL.fullmatch(cell)
+    if found is None:
+        return MassCell(problem="is no mass")
+    number = parse_number(re.sub(r"^([+\-−])\s+", r"\1", found["number"]), mark)
+    if number is None:
+        return MassCell(problem="has no number that can be read")
+    written = found["unit"].strip().rstrip(".")
+    factor = unit_factor(written or unit or "kg")
+    if factor is None:
+        return MassCell(problem=f"has the unknown unit “{written or unit}”")
+    return _cell(number, factor, written or unit or "", bool(found["star"]))
+
+
+def _cell(number: Number, factor: float, unit: str, overridden: bool) -> MassCell:
+    value = number.value * factor
+    if not math.isfinite(value):
+        return MassCell(problem="is not finite")
+    if value < 0:
+        return MassCell(problem="is negative")
+    return MassCell(
+        kg=value,
+        quantum_kg=number.step * factor / 2,
+        unit=unit,
+        overridden=overridden,
+        mark=number.mark,
+        ambiguous=number.ambiguous,
+    )
+
+
+def unit_factor(unit: str) -> float | None:
+    """kg per ``unit``; None where it is no unit of mass. Case is ignored except for Mg."""
+    text = unit.strip()
+    if text == "Mg":
+        return None
+    return MASS_UNITS.get(text) or MASS_UNITS.get(unicodedata.normalize("NFKC", text).casefold())
+
+
+def column_mark(cells: Iterable[str]) -> Mark | None:
+    """The decimal mark that a column's unambiguous cells agree on; None where they show none, or both."""
+    marks = {cell.mark for cell in map(parse_mass, cells) if cell.mark is not None}
+    return marks.pop() if len(marks) == 1 else None

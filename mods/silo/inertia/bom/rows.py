@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The values a BOM is read into: entries, warnings, and the table that keeps every row."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+
+class BomCode(StrEnum):
+    """The machine names of what reading a BOM noticed."""
+
+    FILE = "bom_file"  # how the file had to be read
+    NO_NAME = "bom_row_without_name"
+    ROW_LENGTH = "bom_row_length"
+    DUPLICATE_NAME = "bom_duplicate_name"
+    UNREADABLE_MASS = "bom_mass_unreadable"
+    AMBIGUOUS_MASS = "bom_mass_ambiguous"
+    MASS_WITHOUT_UNIT = "bom_mass_without_unit"
+    UNREADABLE_QUANTITY = "bom_quantity_unreadable"
+    MISSING_COLUMN = "bom_missing_column"
+
+
+@dataclass(frozen=True)
+class BomWarning:
+    """One thing worth telling about the BOM; ``line`` of the file (1 = first), 0 where it is no one line."""
+
+    code: BomCode
+    message: str
+    line: int = 0
+    name: str = ""
+
+    def __str__(self) -> str:
+        return f"line {self.line}: {self.message}" if self.line else self.message
+
+
+@dataclass(frozen=True)
+class BOMEntry:
+    """One row of a BOM (spec bom-inertia, Task 1: ``name``, ``material``, ``mass_kg``; the rest is ours).
+
+    name
+        as written, stripped.
+    material
+        None where none is assigned.
+    mass_kg
+        mass of ONE piece [kg], None where the BOM has none.
+    quantity
+        pieces per one parent; None where the file does not say or cannot be read.
+    quantum_kg
+        half of the last digit the file shows: the mass is ``mass_kg`` ± this.
+    overridden
+        the mass is marked as set by hand.
+    item, level, parent, has_children
+        structure: the item number ("1.1.2"), nesting depth (1 = top), index of the parent row in the table's
+        ``rows`` (None at the top), and whether rows hang below this one (a sub-assembly).
+    line
+        of the file, for people; not part of equality.
+    """
+
+    name: str
+    material: str | None
+    mass_kg: float | None
+    part_number: str = ""
+    description: str = ""
+    quantity: float | None = None
+    quantum_kg: float = 0.0
+    overridden: bool = False
+    item: str = ""
+    level: int = 1
+    parent: int | None = None
+    has_children: bool = False
+    line: int = field(default=0, compare=False)
+
+    @property
+    def has_mass(self) -> bool:
+        """True where the BOM gives a mass; 0 kg is one."""
+        return self.mass_kg is not None
+
+    @property
+    def has_material(self) -> bool:
+        """True where a material is assigned."""
+        return self.material is not None
+
+    @property
+    def data(self) -> tuple[str | None, float | None]:
+        """What decides a mass; rows with equal data need not be told apart."""
+        return (self.material, self.mass_kg)
+
+
+class BomTable(Mapping[str, BOMEntry]):
+    """All rows of a BOM; as a mapping, name → entry.
+
+    Under a name that several rows share, the mapping gives the *first* row, ``warnings`` says so with the
+    lines, and ``rows_named`` gives them all. Calculations use ``rows``, never the mapping.
+    """
+
+    def __init__(
+        self, rows: tuple[BOMEntry, ...], warnings: tuple[BomWarning, ...] = (), source: str = ""
+    ) -> None:
+        self.rows = rows
+        self.warnings = warnings
+        self.source = source
+        self._first: dict[str, BOMEntry] = {}
+        for row in rows:
+            self._first.setdefault(row.name, row)
+
+    def __getitem__(self, name: str) -> BOMEntry:
+        return self._first[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._first)
+
+    def __len__(self) -> int:
+        return len(self._first)
+
+    def __repr__(self) -> str:
+        return f"BomTable({len(self.rows)} rows, {len(self)} names, {len(self.warnings)} warnings)"
+
+    def rows_named(self, name: str) -> tuple[BOMEntry, ...]:
+        """Every row with this name, in the file's order."""
+        return tuple(row for row in self.rows if row.name == name)
+
+    def total_quantity(self, row: BOMEntry) -> float | None:
+        """Pieces in the whole product: its quantity times that of every parent; None where one is unknown."""
+        total = row.quantity
+        parent = row.parent
+        while total is not None and parent is not None:
+            above = self.rows[parent]
+            total = None if above.quantity is None else total * above.quantity
+            parent = above.parent
+        return total
+
+    def ancestors(self, row: BOMEntry) -> tuple[BOMEntry, ...]:
+        """The rows above, nearest first."""
+        found: list[BOMEntry] = []
+        parent = row.parent
+        while parent is not None:
+            found.append(self.rows[parent])
+            parent = self.rows[parent].parent
+        return tuple(found)
+
+
+def as_table(entries: Mapping[str, BOMEntry]) -> BomTable:
+    """Any mapping name → entry as a table; a table passes unchanged."""
+    if isinstance(entries, BomTable):
+        return entries
+    rows = tuple(entry if entry.name == name else _renamed(entry, name) for name, entry in entries.items())
+    return BomTable(rows)
+
+
+def _renamed(entry: BOMEntry, name: str) -> BOMEntry:
+    return BOMEntry(**{**entry.__dict__, "name": name})
