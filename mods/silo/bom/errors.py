@@ -16,9 +16,10 @@
     │   ├── RejectedError       400, 413, 422: the server names what it does not accept
     │   ├── ReadOnlyError       503: the server takes no changes now
     │   └── ServerFaultError    any other 5xx, or an answer that cannot be understood
-    └── ConflictError           nobody's: two truths met (409)
-        ├── CycleError          the BOM would contain itself
-        └── VersionConflictError  412: somebody else changed it first
+    ├── ConflictError           nobody's: two truths met (409)
+    │   ├── CycleError          the BOM would contain itself
+    │   └── VersionConflictError  412: somebody else changed it first
+    └── CancelledError          a person stopped it; not a failure
 
 A message says what was wanted, what was got, where, and what to do.
 """
@@ -149,3 +150,10 @@ class VersionConflictError(ConflictError):
 
     status_hint = 412
     code = "version_conflict"
+
+
+class CancelledError(SiloError):
+    """A person stopped it. Nothing is wrong; what was done before the stop stays done."""
+
+    status_hint = 499
+    code = "cancelled"
