@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Material rows from files: the package's table, a user's CSV or TOML."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+import tomllib
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from silo.bom.errors import ConfigError
+from silo.inertia.materials.density import parse_density, unit_factor
+from silo.inertia.materials.table import Material
+
+
+@cache
+def package_rows() -> tuple[Material, ...]:
+    """The table that comes with the package (``materials/table.csv``)."""
+    text = (files("silo.inertia.materials") / "table.csv").read_text("utf-8")
+    return _csv_rows(text, "table.csv")
+
+
+def user_rows(path: Path | str) -> tuple[Material, ...]:
+    """A user's table, by suffix.
+
+    ``.csv``: columns ``name``, ``density`` (kg/m^3, or as the header says: ``density (g/cm3)``; a cell may
+    carry its own unit), optional ``aliases`` (separated by ``;``), ``source``, ``family``.
+    ``.toml``: ``[materials]`` with ``"My alloy" = 2810``, ``= "2.81 g/cm3"`` or
+    ``= { density = …, aliases = […] }``.
+
+    All bad rows are told together, in one ConfigError.
+    """
+    path = Path(path)
+    try:
+        text = path.read_text("utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: the material table cannot be read ({error})") from error
+    if path.suffix.lower() == ".csv":
+        return _csv_rows(text, str(path))
+    if path.suffix.lower() == ".toml":
+        return _toml_rows(text, str(path))
+    raise ConfigError(f"{path}: a material table is a .csv or .toml file")
+
+
+def _csv_rows(text: str, source: str) -> tuple[Material, ...]:
+    reader = csv.DictReader(io.StringIO(text))
+    heads = {re.sub(r"[\s(\[].*", "", head).casefold(): head for head in reader.fieldnames or () if head}
+    if not {"name", "density"} <= heads.keys():
+        raise ConfigError(f"{source}: wanted columns “name” and “density”, got {reader.fieldnames}")
+    unit = re.search(r"[(\[](.+)[)\]]", heads["density"])
+    factor = unit_factor(unit[1]) if unit else 1.0
+    if factor is None:
+        raise ConfigError(f"{source}: unknown density unit in the header “{heads['density']}”")
+    rows: list[Material] = []
+    problems: list[str] = []
+    for record in reader:
+        cells = {key: (record.get(head) or "").strip() for key, head in heads.items()}
+        row = _material(
+            cells["name"],
+            cells["density"],
+            [alias.strip() for alias in cells.get("aliases", "").split(";") if alias.strip()],
+            cells.get("source", "") or source,
+            cells.get("family", ""),
+            factor,
+        )
+        if isinstance(row, str):
+            problems.append(f"line {reader.line_num}: {row}")
+        else:
+            rows.append(row)
+    return _checked(rows, problems, source)
+
+
+def _toml_rows(text: str, source: str) -> tuple[Material, ...]:
+    try:
+        table = tomllib.loads(text).get("materials", {})
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{source}: this is no TOML ({error})") from error
+    if not isinstance(table, dict) or not table:
+        raise ConfigError(f"{source}: wanted a table [materials] with name = density")
+    rows: list[Material] = []
+    problems: list[str] = []
+    for name, value in table.items():
+        given: dict[str, Any] = value if isinstance(value, dict) else {"density": value}
+        aliases = given.get("aliases", [])
+        row = _material(
+            str(name),
+            str(given.get("density", "")),
+            [str(alias) for alias in aliases] if isinstance(aliases, list) else [],
+            str(given.get("source", source)),
+            str(given.get("family", "")),
+            1.0,
+        )
+        if isinstance(row, str):
+            problems.append(f"materials.{name}: {row}")
+        else:
+            rows.append(row)
+    return _checked(rows, problems, source)
+
+
+def _material(
+    name: str, density: str, aliases: list[str], source: str, family: str, factor: float
+) -> Material | str:
+    value = parse_density(density)
+    if not name or value is None:
+        return f"wanted a name and a density above 0, got “{name}” and “{density}”"
+    bare = re.fullmatch(r"[\d.,eE+\-]+", density) is not None
+    return Material(name, value * factor if bare else value, tuple(aliases), source, family)
+
+
+def _checked(rows: list[Material], problems: list[str], source: str) -> tuple[Material, ...]:
+    if problems:
+        raise ConfigError(f"{source}: " + "; ".join(problems))
+    return tuple(rows)
