@@ -34,13 +34,13 @@ class RegistrationApi(Protocol):
 
     def create_item(
         self,
-        *,
         schema: str,
         category: str,
         description: str,
+        *,
         item_type: str,
         properties: Mapping[str, Any],
-        item_id: str,
+        idempotency_key: str,
     ) -> Mapping[str, Any]: ...
 
 
@@ -72,8 +72,8 @@ class Journal:
             return {}
         except (OSError, ValueError) as error:
             raise InputError(
-                f"{self.path}: the journal of unfinished registrations cannot be read ({error}). Mend or move "
-                "it away; items registered in an interrupted run may then exist without a file that names them."
+                f"{self.path}: the journal of unfinished registrations cannot be read ({error}). Mend or "
+                "move it away; items of an interrupted run may then exist without a file that names them."
             ) from error
         return {str(k): str(v) for k, v in known.items()} if isinstance(known, dict) else {}
 
@@ -131,12 +131,12 @@ def register(
         item = _made_before(api, proposal, wanted) if begun else None
         if item is None:
             item = api.create_item(
-                schema=schema,
-                category=proposal.category,
-                description=proposal.name,
+                schema,
+                proposal.category,
+                proposal.name,
                 item_type=proposal.item_type,
                 properties={**(properties or {}), REGISTRATION_PROPERTY: wanted},
-                item_id=wanted,
+                idempotency_key=wanted,
             )
         item_id = str(item["id"])
         if item_id != wanted:

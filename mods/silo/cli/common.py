@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What the commands share: options, opening files, reaching the server."""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from silo.bom.errors import DocumentError
+from silo.bom.links import extract
+from silo.bom.model import BomEntry, Extraction
+from silo.bom.roots import choose_assembly
+
+if TYPE_CHECKING:
+    from silo.api.client import SiloClient
+    from silo.api.wire import SourceDocument
+
+Commands = Any  # argparse keeps the type of its sub-parsers to itself
+
+
+def add_command(commands: Commands, name: str, help_text: str, example: str) -> argparse.ArgumentParser:
+    """A sub-command with its help and an example."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        name,
+        help=help_text,
+        description=help_text[0].upper() + help_text[1:] + ".",
+        epilog=f"example:\n  {example}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    return parser
+
+
+def add_server_options(parser: argparse.ArgumentParser) -> None:
+    """``--server`` and ``--token``."""
+    group = parser.add_argument_group("server")
+    group.add_argument("--server", metavar="URL", help="address of the Silo server (else SILO_API_URL)")
+    group.add_argument("--token", help="API token (else SILO_API_TOKEN, which other users cannot read)")
+
+
+def add_assembly_options(parser: argparse.ArgumentParser) -> None:
+    """``TOP.FCStd`` and ``--assembly``."""
+    parser.add_argument("top", metavar="TOP.FCStd", help="the assembly's file")
+    parser.add_argument("--assembly", metavar="NAME", help="the assembly to read, where a file holds several")
+
+
+def add_json_option(parser: argparse.ArgumentParser) -> None:
+    """``--json``."""
+    parser.add_argument("--json", action="store_true", help="print JSON for machines")
+
+
+@contextmanager
+def client_of(args: argparse.Namespace) -> Iterator[SiloClient]:
+    """A client for the server that the options, the environment or the configuration name."""
+    from silo.api.client import SiloClient
+    from silo.api.config import resolve_server
+
+    where = resolve_server(getattr(args, "server", None), getattr(args, "token", None))
+    with SiloClient(where.url, where.token, verify=where.verify) as client:
+        yield client
+
+
+def read_assembly(top: str, assembly: str | None = None) -> Extraction:
+    """The BOM of a file, read without FreeCAD."""
+    from silo.fcstd import Library
+
+    with Library() as library:
+        document = library.open(top)
+        return extract(choose_assembly(document, assembly))
+
+
+def print_json(data: Any) -> None:
+    """JSON on standard output."""
+    json.dump(data, sys.stdout, indent=2, ensure_ascii=False)
+    sys.stdout.write("\n")
+
+
+def source_document(entry: BomEntry) -> SourceDocument:
+    """Which file, with which content, an assembly's BOM was taken from."""
+    from silo.api.wire import SourceDocument
+
+    return SourceDocument(file=os.path.basename(entry.doc_path), sha256=sha256_of(entry.doc_path))
+
+
+def sha256_of(path: str) -> str:
+    """The hash of a file's content."""
+    try:
+        with open(path, "rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise DocumentError(path, error.strerror or str(error)) from error
+
+
+def documents_in(tops: list[str]) -> list[str]:
+    """The files that are meant: a folder stands for all FCStd files below it, backups left out."""
+    found: list[str] = []
+    for top in tops:
+        path = Path(top)
+        if path.is_dir():
+            found += sorted(str(p) for p in path.rglob("*") if p.suffix.lower() == ".fcstd" and p.is_file())
+        else:
+            found.append(top)
+    return list(dict.fromkeys(found))

@@ -1,0 +1,231 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""``silo-mod demo``: the main job, start to end, on a real assembly and a server of its own.
+
+Everything happens in a temporary folder: the example's files are copied, the server's database is new, and
+nothing of the user's is touched. ``--keep`` leaves the server running to look at the pages.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import queue
+import secrets
+import shutil
+import tempfile
+import uuid
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from silo.api.activity import activity_text
+from silo.bom.errors import InputError, ServerFaultError
+from silo.bom.model import Extraction
+from silo.bom.report import base_of
+from silo.bom_sync import Outcome, Status, resolve, sync_tree
+from silo.cli import common, show
+from silo.cli.common import Commands
+from silo.cli.diff import names_of
+from silo.cli.register import proposals_for, register_all
+from silo.cli.serve import need_server_extra
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from silo.api.client import SiloClient
+    from silo.api.wire import MergeEvent
+
+EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "gearbox"
+TOP = "TopAssembly.FCStd"
+# Left without a number on purpose, to show what becomes of such parts.
+UNREGISTERED = "MotorMount"
+EVENT_SECONDS = 20.0
+
+
+def register(commands: Commands) -> None:
+    """Add the command."""
+    parser = common.add_command(
+        commands,
+        "demo",
+        "sync a real assembly with a temporary server and show what happens",
+        "silo-mod demo --keep",
+    )
+    parser.add_argument("--keep", action="store_true", help="leave the server running until Ctrl-C")
+    parser.add_argument("--port", type=int, default=0, help="port of the server (default: a free one)")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the demo."""
+    need_server_extra()
+    if not (EXAMPLE / TOP).is_file():
+        raise InputError(
+            f"the example {EXAMPLE / TOP} is not there; the demo runs from a checkout of silo-mod"
+        )
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="silo-demo-")))
+        stack.enter_context(_private_data(folder / "data"))
+        demo = stack.enter_context(_demo(folder, args.port))
+        demo.play()
+        if args.keep:
+            demo.stay()
+    return 0
+
+
+@contextmanager
+def _private_data(folder: Path) -> Iterator[None]:
+    """The journal of registrations of the demo is not the user's."""
+    before = os.environ.get("XDG_DATA_HOME")
+    os.environ["XDG_DATA_HOME"] = str(folder)
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ["XDG_DATA_HOME"]
+        else:
+            os.environ["XDG_DATA_HOME"] = before
+
+
+@contextmanager
+def _demo(folder: Path, port: int) -> Iterator[Demo]:
+    from silo_server.run import running_server
+
+    from silo.api.client import SiloClient
+
+    model = folder / "gearbox"
+    shutil.copytree(EXAMPLE, model, ignore=shutil.ignore_patterns("*.py", "__pycache__", "*.md"))
+    token = "silo_" + secrets.token_hex(20)
+    database = f"sqlite:///{folder / 'silo.db'}"
+    with (
+        running_server(database, token=token, port=port) as server,
+        SiloClient(server.base_url, server.token) as client,
+        _merge_events(client) as events,
+    ):
+        yield Demo(model / TOP, client, events, show.console(), getattr(server, "login_url", ""))
+
+
+@contextmanager
+def _merge_events(client: SiloClient) -> Iterator[queue.Queue[MergeEvent]]:
+    """The merges that the server announces, as they come."""
+    from silo.api.events import EventListener
+
+    merges: queue.Queue[MergeEvent] = queue.Queue()
+    listener = EventListener(client, on_event=lambda event: merges.put(event.merge) if event.merge else None)
+    listener.start()
+    try:
+        yield merges
+    finally:
+        listener.stop()
+
+
+class Demo:
+    """The story, step by step."""
+
+    def __init__(
+        self, top: Path, client: SiloClient, events: queue.Queue[MergeEvent], out: Console, login_url: str
+    ) -> None:
+        self.top, self.client, self.events, self.out, self.login_url = top, client, events, out, login_url
+        self.step = 0
+
+    def say(self, text: str) -> None:
+        self.step += 1
+        self.out.print()
+        self.out.rule(f"[bold]{self.step}  {text}", align="left")
+
+    def play(self) -> None:
+        """All steps."""
+        self.out.print(f"Silo server on {self.client.base_url}, database in a temporary folder.")
+        extraction = self._read("Read the assembly from its files")
+        self._register(extraction)
+        self._sync("First sync: sub-assemblies before their parents")
+        self._sync("Second sync: nothing changed, nothing is sent")
+        self._edit()
+        self._sync("Third sync")
+        self._finish()
+
+    def _read(self, title: str) -> Extraction:
+        self.say(title)
+        extraction = common.read_assembly(str(self.top))
+        self.out.print(show.bom_tree(extraction))
+        self.out.print(show.findings_text(extraction.findings, base_of(extraction)))
+        return extraction
+
+    def _register(self, extraction: Extraction) -> None:
+        self.say("Register the components; one is left without a number")
+        proposals = [
+            p
+            for p in proposals_for(extraction, self.client, "kindred-rd")
+            if UNREGISTERED not in Path(p.entry.doc_path).name
+        ]
+        for done in register_all(proposals, extraction, self.client, schema="kindred-rd"):
+            if done.error is not None:
+                raise done.error
+            self.out.print(f"✓ {done.part_number}  {done.proposal.name}", markup=False)
+
+    def _sync(self, title: str) -> list[Outcome]:
+        self.say(title)
+        whole = resolve(common.read_assembly(str(self.top)), self.client)
+        outcomes = list(
+            sync_tree(whole, self.client, sync_id=lambda: str(uuid.uuid4()), describe=common.source_document)
+        )
+        names = names_of(whole)
+        for outcome in outcomes:
+            self.out.print(show.outcome_text(outcome))
+            if outcome.error is not None:
+                raise outcome.error
+            if outcome.status is Status.MERGED and outcome.plan is not None:
+                self.out.print(show.diff_table(outcome.plan.diff, names))
+        self._activity(outcomes, unregistered=len(whole.unresolved))
+        return outcomes
+
+    def _activity(self, outcomes: list[Outcome], unregistered: int) -> None:
+        """The boxes of the Activity pane, from the events that the server sent."""
+        for outcome in outcomes:
+            if outcome.status is not Status.MERGED:
+                continue
+            try:
+                event = self.events.get(timeout=EVENT_SECONDS)
+            except queue.Empty:
+                raise ServerFaultError(
+                    f"the server merged {outcome.assembly.part_number}, but its event did not arrive "
+                    f"within {EVENT_SECONDS:g} s"
+                ) from None
+            is_top = outcome is outcomes[-1]
+            box = activity_text(
+                event.item,
+                event,
+                resolve_url=self.client.web_url(event.resolve_url),
+                unregistered=unregistered if is_top else 0,
+            )
+            self.out.print(show.activity_box(box))
+
+    def _edit(self) -> None:
+        from silo.cli.demo_edit import remove_from_assembly, set_element_count
+
+        self.say("Edit: the cover goes, four more bolts come, a person adds glue in Silo")
+        remove_from_assembly(self.top, "Cover")
+        before, after = set_element_count(self.top, "BoltArray", added=4)
+        number = resolve(common.read_assembly(str(self.top)), self.client).assembly.part_number or ""
+        glue = self.client.create_item("kindred-rd", "C01", "Thread locker", item_type="consumable")
+        self.client.add_bom_line(number, glue.part_number, quantity=1)
+        self.out.print("- Cover removed from the assembly")
+        self.out.print(f"~ bolt array: {before} → {after} elements")
+        self.out.print(f"✎ {glue.part_number} Thread locker added to {number} by hand, on the server")
+
+    def _finish(self) -> None:
+        number = resolve(common.read_assembly(str(self.top)), self.client).assembly.part_number or ""
+        page = self.client.web_url(f"/items/{number}/bom")
+        self.out.print()
+        self.out.print(f"The page where a person decides: {page}", markup=False)
+
+    def stay(self) -> None:
+        """Leave the server running to look at."""
+        if self.login_url:
+            self.out.print(f"Log in here: {self.login_url}", markup=False)
+        self.out.print("The server runs until Ctrl-C; its data is then removed.")
+        try:
+            while True:
+                self.events.get()
+        except KeyboardInterrupt:
+            self.out.print("\nStopped.")

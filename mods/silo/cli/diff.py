@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""``silo-mod diff``: the preview, and the drift check for CI."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from silo.bom.identity import walk_entries
+from silo.bom.report import base_of, diff_json, finding_json, relative
+from silo.bom_sync import Resolved, assemblies, blocking, compare, resolve
+from silo.cli import common
+from silo.cli.common import Commands
+
+
+def register(commands: Commands) -> None:
+    """Add the command."""
+    parser = common.add_command(
+        commands,
+        "diff",
+        "compare an assembly's BOM with the server's; changes nothing",
+        "silo-mod diff TopAssembly.FCStd --check",
+    )
+    common.add_assembly_options(parser)
+    parser.add_argument("--recursive", action="store_true", help="compare the sub-assemblies too")
+    parser.add_argument("--check", action="store_true", help="exit 1 where CAD and server differ, for CI")
+    common.add_json_option(parser)
+    common.add_server_options(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the comparison; with ``--check`` 1 on drift, on broken links and on unregistered components."""
+    extraction = common.read_assembly(args.top, args.assembly)
+    with common.client_of(args) as client:
+        whole = resolve(extraction, client)
+        chosen = list(assemblies(whole)) if args.recursive else [whole]
+        compared = [(one, compare(one, client).diff) for one in chosen]
+    base = base_of(extraction)
+    drifted = bool(whole.unresolved or whole.assembly.part_number is None) or any(
+        diff.drifted or blocking(one) for one, diff in compared
+    )
+    if args.json:
+        data = [{**_head(one, base), "diff": diff_json(diff)} for one, diff in compared]
+        findings = [finding_json(f, base) for f in whole.findings]
+        common.print_json({"drift": drifted, "assemblies": data, "findings": findings})
+    else:
+        _show(whole, compared, base)
+    return 1 if args.check and drifted else 0
+
+
+def _head(one: Resolved, base: str) -> dict[str, Any]:
+    head = one.assembly
+    return {
+        "doc_path": relative(head.doc_path, base),
+        "object": head.object_name,
+        "part_number": head.part_number,
+        "name": head.name,
+    }
+
+
+def names_of(resolved: Resolved) -> dict[str, str]:
+    """Part number → name, of everything resolved."""
+    known = walk_entries((resolved.assembly, *resolved.entries, *resolved.unresolved))
+    return {entry.part_number: entry.name or "" for entry in known if entry.part_number}
+
+
+def _show(whole: Resolved, compared: list[tuple[Resolved, Any]], base: str) -> None:
+    from silo.cli import show
+
+    out = show.console()
+    names = names_of(whole)
+    for one, diff in compared:
+        head = one.assembly
+        out.print(show.entry_text(head, base) if head.part_number else f"{head.label} (no part number yet)")
+        out.print(show.diff_table(diff, names))
+        out.print()
+    out.print(show.findings_text(whole.findings, base))

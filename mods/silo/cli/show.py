@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""How results look on a terminal: a tree, tables, the Activity box. Text of others is shown as text."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Sequence
+
+from rich.console import Console, Group, RenderableType
+from rich.panel import Panel
+from rich.table import Table
+from rich.text import Text
+from rich.tree import Tree
+
+from silo.api.activity import ActivityText
+from silo.bom.findings import Finding, Severity
+from silo.bom.model import BomDiff, BomEntry, Extraction
+from silo.bom.report import base_of, relative, shorten
+from silo.bom_sync import Outcome, Status
+
+_MARK = {
+    Severity.ERROR: ("✗", "bold red"),
+    Severity.WARNING: ("⚠", "yellow"),
+    Severity.INFO: ("·", "dim"),
+}
+# A tree longer than this helps nobody on a terminal; --json has it all.
+_MOST_LINES = 2000
+
+
+def console(*, stderr: bool = False) -> Console:
+    """The terminal; plain text where the output is a file or a pipe."""
+    return Console(stderr=stderr, highlight=False, soft_wrap=not sys.stdout.isatty())
+
+
+def plain(text: str) -> str:
+    """Text of a file or a server without control characters: it may not steer the terminal."""
+    return "".join(c if c.isprintable() else "�" for c in text)
+
+
+def entry_text(entry: BomEntry, base: str) -> Text:
+    """One line of the tree."""
+    text = Text(f"{entry.quantity} × ", style="bold")
+    if entry.part_number:
+        text.append(plain(entry.part_number), "cyan").append("  ").append(plain(entry.name or ""))
+    else:
+        text.append(plain(entry.document_label or entry.label or entry.object_name))
+    where = relative(entry.doc_path, base)
+    text.append(f"  {plain(where)}#{plain(entry.object_name)}", "dim")
+    return text
+
+
+def bom_tree(extraction: Extraction) -> Tree:
+    """The multi-level BOM; quantities are per one parent."""
+    base = base_of(extraction)
+    head = extraction.assembly
+    title = Text(plain(head.part_number or head.document_label or head.label), "bold")
+    if head.name:
+        title.append("  ").append(plain(head.name))
+    tree = Tree(title)
+    left = [_MOST_LINES]
+
+    def grow(branch: Tree, entries: Iterable[BomEntry]) -> None:
+        for entry in entries:
+            if left[0] <= 0:
+                branch.add(Text("… more; --json tells all", "dim"))
+                return
+            left[0] -= 1
+            grow(branch.add(entry_text(entry, base)), entry.children)
+
+    grow(tree, extraction.entries)
+    return tree
+
+
+def flat_table(rows: Sequence[dict[str, object]]) -> Table:
+    """The flat BOM."""
+    table = Table(box=None, pad_edge=False)
+    for title, justify in (("Quantity", "right"), ("File", "left"), ("Object", "left")):
+        table.add_column(title, justify=justify)  # type: ignore[arg-type]
+    for row in rows:
+        table.add_row(
+            str(row["quantity"]), Text(plain(str(row["doc_path"]))), Text(plain(str(row["object"])))
+        )
+    return table
+
+
+def findings_text(findings: Iterable[Finding], base: str = "") -> Group:
+    """Findings, the worst first."""
+    order = {Severity.ERROR: 0, Severity.WARNING: 1, Severity.INFO: 2}
+    lines = []
+    for finding in sorted(findings, key=lambda f: order[f.severity]):
+        mark, style = _MARK[finding.severity]
+        lines.append(Text(f"{mark} ", style).append(plain(shorten(finding.message, base)), ""))
+    return Group(*lines)
+
+
+def _quantity(value: float | None) -> str:
+    return "?" if value is None else f"{value:g}"
+
+
+def diff_table(diff: BomDiff, names: dict[str, str]) -> RenderableType:
+    """CAD against server, one row per line that differs or is a person's own."""
+    table = Table(box=None, pad_edge=False)
+    for title, justify in (
+        ("", "left"),
+        ("Part number", "left"),
+        ("Name", "left"),
+        ("Quantity", "right"),
+        ("", "left"),
+    ):
+        table.add_column(title, justify=justify)  # type: ignore[arg-type]
+
+    def row(mark: str, style: str, number: str, quantity: str, note: str) -> None:
+        table.add_row(
+            Text(mark, style),
+            Text(plain(number), style),
+            Text(plain(names.get(number, ""))),
+            quantity,
+            Text(note, "dim"),
+        )
+
+    for line in diff.added:
+        row("+", "green", line.part_number, _quantity(line.quantity), "new in the assembly")
+    for change in diff.quantity_changed:
+        quantity = f"{_quantity(change.remote_quantity)} → {_quantity(change.local_quantity)}"
+        row("~", "yellow", change.part_number, quantity, "quantity changed")
+    for change in diff.conflicts:
+        quantity = f"CAD {_quantity(change.local_quantity)}, Silo {_quantity(change.remote_quantity)}"
+        row("⚡", "magenta", change.part_number, quantity, "manual line; a person decides")
+    for line in diff.removed:
+        row("⚠", "yellow", line.part_number, _quantity(line.quantity), "not referenced by the assembly; kept")
+    disputed = {change.part_number for change in diff.conflicts}
+    for line in diff.manual:
+        if line.part_number not in disputed:
+            row("✎", "blue", line.part_number, _quantity(line.quantity), "manual line; not touched")
+    if not table.row_count:
+        return Text(f"No differences: {len(diff.unchanged)} lines agree.", "green")
+    return Group(table, Text(f"{len(diff.unchanged)} lines unchanged.", "dim"))
+
+
+_STATUS = {
+    Status.MERGED: ("✓", "green", "BOM merged"),
+    Status.UNCHANGED: ("✓", "green", "no change, nothing was sent"),
+    Status.DRY_RUN: ("·", "cyan", "preview only, nothing was sent"),
+    Status.BLOCKED: (
+        "✗",
+        "red",
+        "not synced: links are broken (see below; --allow-missing syncs all the same)",
+    ),
+    Status.UNREGISTERED: (
+        "⚠",
+        "yellow",
+        "not synced: the assembly has no Silo part number (silo-mod register)",
+    ),
+    Status.FAILED: ("✗", "red", "not synced"),
+}
+
+
+def outcome_text(outcome: Outcome) -> Text:
+    """One line: which assembly, and what became of it."""
+    mark, style, words = _STATUS[outcome.status]
+    head = outcome.assembly
+    who = " ".join(filter(None, (head.part_number, head.name))) or head.document_label or head.label
+    text = Text(f"{mark} ", style).append(plain(who), "bold").append(f": {words}")
+    if outcome.error is not None:
+        text.append(f": {plain(str(outcome.error))}")
+    return text
+
+
+def activity_box(activity: ActivityText) -> Panel:
+    """The Activity pane's box (spec §6)."""
+    body = Text()
+    body.append(f"📋 {plain(activity.headline)}\n", "bold")
+    body.append(plain(activity.counts))
+    if activity.resolve_url:
+        body.append(f"\n[View in Silo →] {plain(activity.resolve_url)}", "cyan")
+    if activity.unregistered:
+        body.append(f"\n{plain(activity.unregistered)}\n", "yellow").append("[Register Parts...]", "cyan")
+    return Panel(body, title="Database Activity", title_align="left", expand=False, padding=(0, 1))

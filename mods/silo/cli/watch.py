@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""``silo-mod watch``: what happens on the server, live."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import queue
+import sys
+from typing import TYPE_CHECKING
+
+from silo.api.activity import activity_text
+from silo.cli import common
+from silo.cli.common import Commands
+
+if TYPE_CHECKING:
+    from silo.api.client import SiloClient
+    from silo.api.sse import ServerEvent
+
+
+def register(commands: Commands) -> None:
+    """Add the command."""
+    parser = common.add_command(
+        commands,
+        "watch",
+        "show the server's events as they happen (Ctrl-C ends)",
+        "silo-mod watch --item A01-0001",
+    )
+    parser.add_argument("--item", metavar="PART_NUMBER", help="only events of this item")
+    parser.add_argument("--count", type=int, metavar="N", help="end after N events")
+    common.add_json_option(parser)
+    common.add_server_options(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print events until told to stop; the connection is made anew whenever it is lost."""
+    from silo.api.events import EventListener
+
+    events: queue.Queue[ServerEvent | str] = queue.Queue()
+    with common.client_of(args) as client:
+        client.whoami()  # a wrong address or token is told at once, not retried for ever
+        listener = EventListener(client, on_event=events.put, on_state=lambda state: events.put(str(state)))
+        listener.start()
+        try:
+            return _print(args, client, events)
+        finally:
+            listener.stop()
+
+
+def _print(args: argparse.Namespace, client: SiloClient, events: queue.Queue[ServerEvent | str]) -> int:
+    shown = 0
+    while args.count is None or shown < args.count:
+        event = events.get()
+        if isinstance(event, str):
+            print(f"[{event}]", file=sys.stderr)
+            continue
+        if event.type == "heartbeat" or (args.item and event.item != args.item):
+            continue
+        shown += 1
+        if args.json:
+            print(
+                json.dumps({"id": event.id, "type": event.type, "data": event.data}, ensure_ascii=False),
+                flush=True,
+            )
+        else:
+            _show(client, event)
+    return 0
+
+
+def _show(client: SiloClient, event: ServerEvent) -> None:
+    from silo.cli import show
+
+    out = show.console()
+    if event.merge is not None:
+        url = client.web_url(event.merge.resolve_url) if event.merge.resolve_url else ""
+        out.print(show.activity_box(activity_text(event.merge.item, event.merge, resolve_url=url)))
+        return
+    out.print(show.plain(f"{event.type}  {event.item or ''}"), markup=False)
