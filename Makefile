@@ -4,11 +4,12 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.silo-mod-installed
 
-.PHONY: help demo test check setup docs clean
+.PHONY: help demo test test-machine check setup docs clean
 
 help:
 	@echo "make demo   set up and sync a real assembly with the embedded server"
 	@echo "make test   set up and run the tests"
+	@echo "make test-machine  the tests that need FreeCAD or Chromium on the machine"
 	@echo "make check  ruff, mypy, import directions"
 
 setup: $(STAMP)
@@ -23,7 +24,10 @@ demo: setup
 	$(BIN)/silo-mod demo
 
 test: setup
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -m "not freecad and not browser"
+
+test-machine: setup
+	$(BIN)/python -m pytest -m "freecad or browser"
 
 check: setup
 	$(BIN)/ruff check .
