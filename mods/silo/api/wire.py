@@ -22,7 +22,11 @@ from pydantic import (
     ConfigDict,
     Field,
     PlainSerializer,
+    SerializerFunctionWrapHandler,
+    ValidatorFunctionWrapHandler,
     WithJsonSchema,
+    WrapValidator,
+    model_serializer,
     model_validator,
 )
 
@@ -90,6 +94,17 @@ def _designators(value: Any) -> Any:
 
 
 _Shortest = PlainSerializer(_shortest, return_type=int | float)
+
+
+def _time_or_none(value: Any, read: ValidatorFunctionWrapHandler) -> Any:
+    # A time stamp is for people to see; one that cannot be read must not cost the whole answer.
+    try:
+        return read(value)
+    except ValueError:
+        return None
+
+
+Time = Annotated[datetime | None, WrapValidator(_time_or_none)]
 Number = Annotated[float, _Shortest, WithJsonSchema({"type": "number"})]
 Quantity = Annotated[
     float,
@@ -108,8 +123,8 @@ class Item(Record):
     description: str = ""
     item_type: str = "part"
     current_revision: int = 0
-    created_at: datetime | None = None
-    updated_at: datetime | None = None
+    created_at: Time = None
+    updated_at: Time = None
     sourcing_type: str | None = None
     long_description: str | None = None
     thumbnail_key: str | None = None
@@ -140,7 +155,7 @@ class BomLine(Record):
     child_revision: int | None = None
     effective_revision: int | None = None
     source: Annotated[Source, BeforeValidator(_known_source)] = "assembly"
-    unreferenced_since: datetime | None = None
+    unreferenced_since: Time = None
     depth: int | None = None
     metadata: dict[str, Any] = Field(default_factory=dict)
 
@@ -169,6 +184,12 @@ class MergeRequest(Wire):
     sync_id: str | None = None
     dry_run: bool = False
     document: SourceDocument | None = None
+
+    @model_serializer(mode="wrap")
+    def _as_the_spec(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        # `dry_run` is ours; where it says nothing, the request is exactly the spec's.
+        data: dict[str, Any] = write(self)
+        return data if self.dry_run else {key: value for key, value in data.items() if key != "dry_run"}
 
 
 class QuantityLine(Answer):
@@ -223,7 +244,7 @@ class MergeEvent(Answer):
     type: str = "bom_merge"
     item: str = Field(validation_alias=AliasChoices("item", "part_number"))
     user: str = ""
-    timestamp: datetime | None = None
+    timestamp: Time = None
     summary: str = ""
     diff: MergeDiff = Field(default_factory=MergeDiff)
     resolve_url: str = ""
@@ -238,58 +259,6 @@ class ErrorBody(Answer):
     message: str = ""
     problems: list[str] = Field(default_factory=list)
     path: list[str] = Field(default_factory=list)
-
-
-class ByUuidRequest(Wire):
-    """``POST /api/items/by-uuid``: many identities in one question."""
-
-    uuids: list[str]
-
-
-class ByUuidAnswer(Answer):
-    """The items that exist; an unknown or archived UUID has none."""
-
-    items: list[Item] = Field(default_factory=list)
-
-
-class ItemCreate(Wire):
-    """``POST /api/items``. The server makes the part number from schema and category."""
-
-    schema_name: str = Field(alias="schema", default="kindred-rd")
-    category: str = Field(min_length=1)
-    description: str = ""
-    name: str | None = None
-    item_type: str = "part"
-    projects: list[str] | None = None
-    sourcing_type: str | None = None
-    long_description: str | None = None
-    properties: dict[str, Any] | None = None
-
-
-class ItemUpdate(Wire):
-    """``PUT /api/items/{partNumber}``: in place, but with ``properties`` it makes a new revision."""
-
-    part_number: str | None = None
-    description: str | None = None
-    name: str | None = None
-    item_type: str | None = None
-    sourcing_type: str | None = None
-    long_description: str | None = None
-    properties: dict[str, Any] | None = None
-    comment: str | None = None
-
-
-class PartNumberRequest(Wire):
-    """``POST /api/generate-part-number``: a preview, it may be asked as often as one likes."""
-
-    schema_name: str = Field(alias="schema", default="kindred-rd")
-    category: str = Field(min_length=1)
-
-
-class PartNumberAnswer(Answer):
-    """The number that the next item of this category would get."""
-
-    part_number: str
 
 
 class Revision(Record):
@@ -307,7 +276,7 @@ class Revision(Record):
     labels: list[str] = Field(default_factory=list)
     properties: dict[str, Any] = Field(default_factory=dict)
     created_by: str | None = None
-    created_at: datetime | None = None
+    created_at: Time = None
 
 
 class FlatLine(Record):
@@ -350,10 +319,3 @@ class ServerState(Record):
     status: str = ""
     version: str = ""
     sse_clients: int | None = None
-
-
-class CategoryInfo(Record):
-    """A category of a part-number schema, such as ``F01``, "Screws and Bolts"."""
-
-    code: str
-    description: str = ""

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The client's questions about BOMs (spec bom-sync §5, silo-contract §1.5)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from silo.api.bodies import LineBody, body
+from silo.api.caller import LISTS, Caller, Params
+from silo.api.transport import Cancel
+from silo.api.wire import BomLine, FlatLine, MergeRequest, MergeResult, WhereUsedLine
+from silo.bom.errors import NotFoundError, RouteMissingError
+
+
+class BomCalls(Caller):
+    """Reading and merging BOMs."""
+
+    def get_bom(self, part_number: str, /) -> list[BomLine]:
+        """The BOM lines directly below an item."""
+        reply = self._get(f"the BOM of {part_number}", *_bom(part_number))
+        return reply.models(BomLine, *LISTS)
+
+    def get_bom_version(self, part_number: str, /) -> str | None:
+        """The version of the BOM as it is now, for ``if_match``; None where the server keeps none."""
+        return self._get(f"the BOM of {part_number}", *_bom(part_number)).version()
+
+    def get_bom_expanded(self, part_number: str, /, depth: int | None = None) -> list[BomLine]:
+        """All lines below an item, ``depth`` levels or as many as the server gives.
+
+        Each line says its own ``depth``. Raises :class:`silo.bom.errors.ConflictError` for a ring.
+        """
+        params: Params = {} if depth is None else {"depth": depth}
+        subject = f"the whole BOM of {part_number}"
+        reply = self._get(subject, *_bom(part_number), "expanded", params=params)
+        return reply.models(BomLine, "expanded_bom", *LISTS)
+
+    def get_bom_flat(self, part_number: str, /) -> list[FlatLine]:
+        """The parts below an item with their total quantities."""
+        reply = self._get(f"the flat BOM of {part_number}", *_bom(part_number), "flat")
+        return reply.models(FlatLine, "flat_bom", *LISTS)
+
+    def where_used(self, part_number: str, /) -> list[WhereUsedLine]:
+        """The parents that have this item on their BOM."""
+        reply = self._get(f"the uses of {part_number}", *_bom(part_number), "where-used")
+        return reply.models(WhereUsedLine, "where_used", "parents", *LISTS)
+
+    def merge_bom(
+        self,
+        part_number: str,
+        request: MergeRequest,
+        /,
+        *,
+        if_match: int | str | None = None,
+        cancelled: Cancel | None = None,
+    ) -> MergeResult:
+        """Merge an assembly's direct children into its BOM (spec §5).
+
+        With a ``sync_id`` the request is repeated when the way breaks: the server gives its first answer.
+
+        Raises :class:`NotFoundError` for an unknown assembly but :class:`RouteMissingError` for a server
+        without merge, :class:`RejectedError` with all bad entries, :class:`CycleError`,
+        :class:`VersionConflictError` for ``if_match``, :class:`ReadOnlyError`.
+        """
+        headers = {} if if_match is None else {"If-Match": '"{}"'.format(str(if_match).strip('"'))}
+        try:
+            reply = self._change(
+                "POST",
+                f"the BOM of {part_number}",
+                *_bom(part_number),
+                "merge",
+                body=request,
+                headers=headers,
+                repeatable=bool(request.sync_id or request.dry_run),
+                cancelled=cancelled,
+            )
+        except NotFoundError as error:
+            raise self._what_is_missing(part_number, error) from error
+        return reply.model(MergeResult)
+
+    def add_bom_line(self, part_number: str, child: str, /, **values: Any) -> BomLine:
+        """Add a line by hand (``source`` manual): ``quantity``, ``unit``, ``notes``, ``find_number``, …
+
+        The fields are those of :class:`silo.api.bodies.LineBody`. A merge never touches such a line.
+        """
+        line = body(LineBody, {"quantity": 1, **values, "child_part_number": child}, "a BOM line")
+        reply = self._change("POST", f"{child} on the BOM of {part_number}", *_bom(part_number), body=line)
+        return reply.model(BomLine)
+
+    def update_bom_line(self, part_number: str, child: str, /, **changes: Any) -> BomLine:
+        """Change a line by hand; the fields are those of :class:`silo.api.bodies.LineBody`."""
+        line = body(LineBody, changes, "a BOM line")
+        subject = f"{child} on the BOM of {part_number}"
+        return self._change("PUT", subject, *_bom(part_number), child, body=line).model(BomLine)
+
+    def remove_bom_line(self, part_number: str, child: str, /) -> None:
+        """Remove a line: what a person decides, a merge never does."""
+        self._delete(f"{child} on the BOM of {part_number}", *_bom(part_number), child)
+
+    def _what_is_missing(self, part_number: str, error: NotFoundError) -> NotFoundError:
+        # The status alone does not say whether assembly or route is unknown; the item's own address does.
+        host = self._address.host
+        try:
+            self._get(f"item {part_number}", "items", part_number)
+        except NotFoundError:
+            return NotFoundError(f"{host} has no item {part_number}; register the assembly first ({error})")
+        return RouteMissingError(
+            f"{host} knows {part_number} but not how to merge a BOM; it needs a newer Silo ({error})"
+        )
+
+
+def _bom(part_number: str) -> tuple[str, str, str]:
+    return ("items", part_number, "bom")

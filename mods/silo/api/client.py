@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""``SiloClient``: a Silo server as Python calls. A method is one question, :mod:`silo.api.transport` asks it.
+
+What comes back are the wire models, which also read as mappings. What goes wrong is one of
+:mod:`silo.bom.errors`. Methods that may take long accept ``cancelled``, anything like a
+:class:`threading.Event`; it is looked at before each attempt, between the pieces of an answer and in pauses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import closing
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import requests
+
+from silo.api import files
+from silo.api.address import ServerAddress
+from silo.api.boms import BomCalls
+from silo.api.items import ItemCalls
+from silo.api.multipart import Progress
+from silo.api.sse import ServerEvent
+from silo.api.stream import SILENCE, HttpEventStream, open_stream
+from silo.api.transport import Call, Cancel, Retries, Timeouts, Transport, stop_if
+from silo.api.wire import Revision, ServerState, User
+
+
+class SiloClient(ItemCalls, BomCalls):
+    """A Silo server.
+
+    base_url
+        ``https://host[:port]``; an address with a path of its own is used as it is.
+    token
+        ``silo_…``; sent to this server only, never shown or logged.
+    timeout
+        seconds: one number, or (connect, read). ``total_timeout`` bounds a whole answer.
+    session
+        a :class:`requests.Session` of one's own (adapters, proxies); else the client makes one.
+    verify
+        True, False (no check of the certificate), or the path of a file with certificate authorities.
+    silence
+        seconds after which an event stream without a byte counts as dead.
+
+    May be shared between threads. Close it, or use it as a context manager.
+    """
+
+    def __init__(
+        self,
+        base_url: str,
+        token: str | None = None,
+        *,
+        timeout: float | tuple[float, float] = (5.0, 30.0),
+        total_timeout: float = 300.0,
+        session: requests.Session | None = None,
+        verify: bool | str | Path = True,
+        retries: Retries | None = None,
+        silence: float = SILENCE,
+    ) -> None:
+        connect, read = timeout if isinstance(timeout, tuple) else (timeout, timeout)
+        self._address = ServerAddress.parse(base_url)
+        self._silence = silence
+        self._transport = Transport(
+            self._address,
+            token,
+            timeouts=Timeouts(connect, read, total_timeout),
+            retries=retries or Retries(),
+            verify=verify if isinstance(verify, bool) else str(verify),
+            session=session,
+        )
+
+    def __repr__(self) -> str:
+        return f"SiloClient({self.base_url!r}, token={'set' if self._transport.has_token else 'none'})"
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Give the connections back."""
+        self._transport.close()
+
+    @property
+    def base_url(self) -> str:
+        """The address of the server's pages, without a slash at the end."""
+        return self._address.web_root
+
+    def web_url(self, path: str, /) -> str:
+        """The full address of a page such as ``resolve_url``; :class:`InputError` for another server's."""
+        return self._address.web(path)
+
+    def whoami(self) -> User:
+        """Who the token belongs to; raises :class:`silo.bom.errors.AuthError` where it is not accepted."""
+        return self._get("who we are", "auth", "me").model(User)
+
+    def ready(self) -> ServerState:
+        """Whether the server takes changes: ``normal``, ``read-only`` or ``degraded``."""
+        return ServerState.model_validate(self._state("ready"))
+
+    def health(self) -> dict[str, Any]:
+        """What the server says of its own health."""
+        return self._state("health")
+
+    def _state(self, name: str) -> dict[str, Any]:
+        call = Call("GET", f"{self._address.web_root}/{name}", f"/{name}", repeatable=False)
+        with self._transport.opened(call) as response:
+            reply = self._transport.reply(response, call)
+        # A server that is not ready says so with 503, and why in the same form.
+        return reply.mapping(accept=(503,))
+
+    def revisions(self, part_number: str, /) -> list[Revision]:
+        """The revisions of an item, newest first."""
+        reply = self._get(f"the revisions of {part_number}", "items", part_number, "revisions")
+        found = reply.models(Revision, "revisions", "items", "data")
+        return sorted(found, key=lambda revision: revision.revision_number, reverse=True)
+
+    def upload_file(
+        self,
+        part_number: str,
+        path: Path | str,
+        comment: str = "",
+        properties: Mapping[str, Any] | None = None,
+        on_progress: Progress | None = None,
+        *,
+        file_name: str | None = None,
+        idempotency_key: str | None = None,
+        cancelled: Cancel | None = None,
+    ) -> Revision:
+        """Send a file as a new revision, streamed; never repeated by itself (see :mod:`silo.api.outbox`).
+
+        Raises :class:`silo.bom.errors.DocumentError` for a file that cannot be read.
+        """
+        return files.upload(
+            self._transport,
+            part_number,
+            Path(path),
+            comment,
+            properties,
+            on_progress,
+            file_name=file_name,
+            idempotency_key=idempotency_key,
+            cancelled=cancelled,
+        )
+
+    def download_file(
+        self,
+        part_number: str,
+        path: Path | str,
+        revision: int | None = None,
+        on_progress: Progress | None = None,
+        *,
+        cancelled: Cancel | None = None,
+    ) -> str:
+        """Fetch the latest file of an item, or that of a revision, to ``path``; gives its SHA-256 in hex.
+
+        The bytes may differ from those uploaded: a server re-packs some formats.
+        """
+        return files.download(
+            self._transport, part_number, Path(path), revision, on_progress, cancelled=cancelled
+        )
+
+    def open_events(self, last_event_id: str | None = None) -> HttpEventStream:
+        """Open the event stream; :class:`silo.api.events.EventListener` keeps one open for good."""
+        return open_stream(self._transport, last_event_id, self._silence)
+
+    def events(
+        self, last_event_id: str | None = None, *, cancelled: Cancel | None = None
+    ) -> Iterator[ServerEvent]:
+        """The events from one connection, heartbeats included, until the server ends it.
+
+        ``last_event_id`` replays what came after. ``cancelled`` is looked at with each event.
+        Raises :class:`silo.bom.errors.UnreachableError` when the stream falls silent or breaks.
+        """
+        with closing(self.open_events(last_event_id)) as stream:
+            for event in stream:
+                stop_if(cancelled)
+                yield event

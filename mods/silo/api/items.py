@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The client's questions about items, identities, numbers and schemas (silo-contract §1.3, §1.6)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+from uuid import UUID
+
+from silo.api.bodies import ItemBody, ItemChanges, NumberAnswer, NumberBody, UuidsBody, body
+from silo.api.caller import LISTS, Caller
+from silo.api.replies import WebPageError
+from silo.api.schemas import categories_of
+from silo.api.transport import Cancel, stop_if
+from silo.api.wire import Item
+from silo.bom.errors import NotFoundError, RejectedError, RouteMissingError, SiloError
+
+MAX_UUIDS = 500
+"""Identities in one batch question."""
+
+MAX_WORKERS = 8
+"""Questions at once where the server has no batch look-up."""
+
+
+class ItemCalls(Caller):
+    """Finding and making items."""
+
+    # None until known: an older server has no batch look-up, and is asked for it only once.
+    _has_batch: bool | None = None
+    _is_silo: bool | None = None
+
+    def get_item_by_uuid(self, uuid: str, /) -> Item | None:
+        """The item with this identity; None where the server has none (unknown, archived, or no UUID)."""
+        if not uuid.strip(". "):
+            return None
+        try:
+            return self._get(f"item {uuid}", "items", "by-uuid", uuid).model(Item)
+        except WebPageError:
+            if self._speaks_silo():
+                return None
+            raise
+        except RouteMissingError:
+            # "No such route" must not read as "not registered": people would register everything again.
+            raise
+        except (NotFoundError, RejectedError):
+            return None
+
+    def get_items_by_uuid(
+        self, uuids: Iterable[str], /, *, cancelled: Cancel | None = None
+    ) -> dict[str, Item]:
+        """The items of these identities, by the identity as it was given; unknown ones are left out.
+
+        One request per 500 where the server offers the batch look-up, else a bounded pool of single ones.
+        """
+        wanted = list(dict.fromkeys(uuid for uuid in uuids if uuid))
+        found: dict[str, Item] = {}
+        for start in range(0, len(wanted), MAX_UUIDS):
+            stop_if(cancelled)
+            chunk = wanted[start : start + MAX_UUIDS]
+            batch = self._batch(chunk, cancelled) if self._has_batch is not False else None
+            found.update(self._one_by_one(chunk, cancelled) if batch is None else batch)
+        return found
+
+    def _batch(self, uuids: Sequence[str], cancelled: Cancel | None) -> dict[str, Item] | None:
+        try:
+            reply = self._change(
+                "POST",
+                f"{len(uuids)} items",
+                *("items", "by-uuid"),
+                body=UuidsBody(uuids=list(uuids)),
+                repeatable=True,
+                cancelled=cancelled,
+            )
+        except NotFoundError:
+            self._has_batch = False
+            return None
+        except RejectedError:
+            # One malformed identity spoils the batch; asked one by one, only that one is unknown.
+            return None
+        self._has_batch = True
+        known = {item.id.lower(): item for item in reply.models(Item, *LISTS)}
+        return {uuid: known[uuid.lower()] for uuid in uuids if uuid.lower() in known}
+
+    def _one_by_one(self, uuids: Sequence[str], cancelled: Cancel | None) -> dict[str, Item]:
+        def one(uuid: str) -> Item | None:
+            stop_if(cancelled)
+            return self.get_item_by_uuid(uuid)
+
+        with ThreadPoolExecutor(min(MAX_WORKERS, len(uuids)), "silo-lookup") as pool:
+            try:
+                items = list(pool.map(one, uuids))
+            except BaseException:
+                # One failed, so the rest is not wanted any more.
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise
+        return {uuid: item for uuid, item in zip(uuids, items, strict=True) if item is not None}
+
+    def _speaks_silo(self) -> bool:
+        if self._is_silo is None:
+            try:
+                self._get("its items", "items", params={"limit": 1}).models(Item, *LISTS)
+                self._is_silo = True
+            except SiloError:
+                self._is_silo = False
+        return self._is_silo
+
+    def get_item(self, part_number: str, /) -> Item:
+        """The item with this part number; raises :class:`NotFoundError` where there is none."""
+        return self._get(f"item {part_number}", "items", part_number).model(Item)
+
+    def search_items(
+        self, query: str = "", *, item_type: str | None = None, limit: int = 50, offset: int = 0
+    ) -> list[Item]:
+        """Items that fit the words; without words all, page by page."""
+        params: dict[str, str | int] = {"limit": limit, "offset": offset}
+        if item_type:
+            params["item_type"] = item_type
+        if query:
+            try:
+                reply = self._get(f"items like {query!r}", "items", "search", params={"q": query, **params})
+                return reply.models(Item, *LISTS)
+            except NotFoundError:
+                # A server without the fuzzy search may still filter its list.
+                params["search"] = query
+        return self._get("its items", "items", params=params).models(Item, *LISTS)
+
+    def create_item(
+        self,
+        schema: str,
+        category: str,
+        description: str = "",
+        *,
+        name: str | None = None,
+        item_type: str = "part",
+        properties: Mapping[str, Any] | None = None,
+        projects: Sequence[str] | None = None,
+        sourcing_type: str | None = None,
+        long_description: str | None = None,
+        idempotency_key: str | None = None,
+    ) -> Item:
+        """Create an item; the server makes its part number from schema and category.
+
+        ``idempotency_key``, a new UUID, makes a repeat give the first one's item where the server honours it.
+        """
+        values = {
+            "schema": schema,
+            "category": category,
+            "description": description or name or "",
+            "name": name,
+            "item_type": item_type,
+            # Our server takes the identity from the client, which makes a repeat find the item.
+            "id": idempotency_key if is_uuid(idempotency_key) else None,
+            "properties": dict(properties) if properties is not None else None,
+            "projects": list(projects) if projects is not None else None,
+            "sourcing_type": sourcing_type,
+            "long_description": long_description,
+        }
+        headers = {"Idempotency-Key": idempotency_key} if idempotency_key else {}
+        reply = self._change(
+            "POST", "a new item", "items", body=body(ItemBody, values, "an item"), headers=headers
+        )
+        return reply.model(Item)
+
+    def update_item(self, part_number: str, /, **changes: Any) -> Item:
+        """Change fields of an item (those of :class:`silo.api.bodies.ItemChanges`).
+
+        ``properties`` makes a new revision (with ``comment``); the rest changes in place.
+        """
+        content = body(ItemChanges, changes, "an item")
+        reply = self._change("PUT", f"item {part_number}", "items", part_number, body=content)
+        # Some servers answer a change with no content.
+        if not reply.content.strip():
+            return self.get_item(content.part_number or part_number)
+        return reply.model(Item)
+
+    def generate_part_number(self, schema: str, category: str) -> str:
+        """The number that the next item of this category would get: a preview, nothing is reserved."""
+        wanted = body(NumberBody, {"schema": schema, "category": category}, "a part number")
+        reply = self._change("POST", f"a number in {category}", "generate-part-number", body=wanted)
+        return reply.model(NumberAnswer).part_number
+
+    def get_schema(self, name: str = "kindred-rd") -> dict[str, Any]:
+        """The part-number schema as the server describes it."""
+        return self._get(f"schema {name}", "schemas", name).mapping()
+
+    def categories(self, name: str = "kindred-rd") -> dict[str, str]:
+        """The categories of a schema: code → description, in the schema's order."""
+        return categories_of(self.get_schema(name))
+
+    def get_schema_form(self, name: str = "kindred-rd", category: str | None = None) -> dict[str, Any]:
+        """The form descriptor of a schema; from a server before February 2026 its properties instead."""
+        params = {"category": category} if category else {}
+        try:
+            return self._get(f"the form of {name}", "schemas", name, "form", params=params).mapping()
+        except NotFoundError:
+            reply = self._get(f"the properties of {name}", "schemas", name, "properties", params=params)
+            return reply.mapping()
+
+
+def is_uuid(text: str | None) -> bool:
+    """True for a UUID in its usual form."""
+    try:
+        return text is not None and str(UUID(text)) == text.lower()
+    except ValueError:
+        return False

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Reading a part-number schema, in the forms that servers give it; pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+
+def categories_of(schema: Mapping[str, Any]) -> dict[str, str]:
+    """The categories of a schema: ``{"F01": "Screws and Bolts"}``, in the schema's own order.
+
+    Accepts ``categories`` or the ``category`` segment's ``values``, each as a mapping code → text or as a
+    list of objects or bare codes. An unknown form gives an empty mapping.
+    """
+    direct = schema.get("categories")
+    if direct:
+        return dict(_read(direct))
+    for segment in _segments(schema.get("segments")):
+        if segment.get("name") == "category":
+            return dict(_read(segment.get("values") or segment.get("options")))
+    return {}
+
+
+def _segments(value: Any) -> Iterator[Mapping[str, Any]]:
+    if isinstance(value, Mapping):
+        yield from ({"name": name, **body} for name, body in value.items() if isinstance(body, Mapping))
+    elif isinstance(value, list):
+        yield from (body for body in value if isinstance(body, Mapping))
+
+
+def _read(values: Any) -> Iterator[tuple[str, str]]:
+    if isinstance(values, Mapping):
+        pairs = [(code, body) for code, body in values.items()]
+    elif isinstance(values, list):
+        pairs = [(body, body) if isinstance(body, str) else (None, body) for body in values]
+    else:
+        return
+    for code, body in pairs:
+        if isinstance(body, Mapping):
+            code = code or body.get("code") or body.get("value")
+            body = body.get("description") or body.get("name") or body.get("label") or ""
+        if code:
+            yield str(code), str(body) if body != code else ""

@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Server-sent events: bytes in, typed events out. No network and no threads in here.
+
+``sseclient-py`` reads the fields of one event; the framing around it is ours, since a stream may be cut at
+any byte, may mix line ends, and must not hand over the half event that a dropped connection leaves.
+
+Both dialects come out as one: the spec's ``bom_merge`` and the real Silo's ``bom.merged`` are ``bom_merge``.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import sseclient
+from pydantic import ValidationError
+
+from silo.api.wire import MergeEvent
+from silo.bom.errors import ServerFaultError
+
+MERGE = "bom_merge"
+HEARTBEAT = "heartbeat"
+STATE = "server.state"
+RESET = "reset"
+
+_SAME = {"bom.merged": MERGE, "bom_merged": MERGE, "bom.merge": MERGE}
+_ID = re.compile(rb"^id: ?(.*)$", re.MULTILINE)
+_MARK = b"\xef\xbb\xbf"
+
+
+@dataclass(frozen=True)
+class ServerEvent:
+    """One event.
+
+    id
+        for ``Last-Event-ID``; None where the server gave none.
+    type
+        canonical: ``bom_merge``, ``item.created``, ``item.updated``, ``item.deleted``, ``revision.created``,
+        ``server.state``, ``heartbeat``, ``reset`` (what was seen before may be stale: read again), or the
+        server's own word.
+    data
+        the JSON as it came; the text where it is none.
+    merge
+        the typed content of a ``bom_merge``; None where that cannot be read (``data`` still has it).
+    """
+
+    id: str | None
+    type: str
+    data: Any = None
+    merge: MergeEvent | None = field(default=None, compare=False)
+
+    @property
+    def item(self) -> str | None:
+        """The part number that the event is about, in either dialect."""
+        if self.merge is not None:
+            return self.merge.item
+        number = self.data.get("part_number", self.data.get("item")) if isinstance(self.data, dict) else None
+        return number if isinstance(number, str) else None
+
+    @property
+    def mode(self) -> str | None:
+        """The mode in a ``server.state`` event."""
+        mode = self.data.get("mode") if self.type == STATE and isinstance(self.data, dict) else None
+        return mode if isinstance(mode, str) else None
+
+
+class SseParser:
+    """A stream of bytes, fed in pieces of any size, as events.
+
+    Raises :class:`ServerFaultError` for a single event above ``max_bytes``: a stream without an end of line
+    must not fill the memory.
+    """
+
+    def __init__(self, max_bytes: int = 16 << 20) -> None:
+        self._max = max_bytes
+        self._start: bytes | None = b""
+        self._after_cr = False
+        self._buffer = bytearray()
+        self.last_event_id: str | None = None
+
+    def feed(self, chunk: bytes) -> list[ServerEvent]:
+        """The events that this piece completes."""
+        searched = max(0, len(self._buffer) - 1)
+        self._buffer += self._normal(self._without_mark(chunk))
+        events: list[ServerEvent] = []
+        while (end := self._buffer.find(b"\n\n", searched)) >= 0:
+            block = bytes(self._buffer[:end])
+            del self._buffer[: end + 2]
+            searched = 0
+            self.last_event_id = _marker(block) or self.last_event_id
+            event = read_block(block)
+            if event is not None:
+                events.append(event)
+        if len(self._buffer) > self._max:
+            raise ServerFaultError(
+                f"the event stream sent one event above {self._max / 1e6:.0f} MB, which is refused"
+            )
+        return events
+
+    def _without_mark(self, chunk: bytes) -> bytes:
+        # A byte order mark may lead the stream, and it may arrive in three pieces.
+        if self._start is None:
+            return chunk
+        self._start += chunk
+        if len(self._start) < len(_MARK) and _MARK.startswith(self._start):
+            return b""
+        chunk, self._start = self._start.removeprefix(_MARK), None
+        return chunk
+
+    def _normal(self, chunk: bytes) -> bytes:
+        # A CR ends its line at once; a LF right after it, be it in the next piece, belongs to it.
+        if self._after_cr and chunk:
+            chunk = chunk.removeprefix(b"\n")
+            self._after_cr = False
+            if not chunk:
+                return b""
+        self._after_cr = chunk.endswith(b"\r")
+        return chunk.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+
+
+def parse(chunks: Iterable[bytes]) -> Iterator[ServerEvent]:
+    """The events of a stream; a half one at its end is dropped (the server sends it again)."""
+    parser = SseParser()
+    for chunk in chunks:
+        yield from parser.feed(chunk)
+
+
+def read_block(block: bytes) -> ServerEvent | None:
+    """The event of one block of lines; None for a comment or a block without data."""
+    text = block.decode("utf-8", "replace")
+    raw = next(sseclient.SSEClient(iter([f"{text}\n\n".encode()])).events(), None)
+    if raw is None:
+        return None
+    data = _json(raw.data)
+    name = raw.event
+    if name == "message" and isinstance(data, dict) and isinstance(data.get("type"), str):
+        name = data["type"]
+    kind = _SAME.get(name, name)
+    return ServerEvent(_marker(block), kind, data, _merge(data) if kind == MERGE else None)
+
+
+def _marker(block: bytes) -> str | None:
+    # A server may set the id without an event, to say from where to go on.
+    found = _ID.findall(block)
+    return found[-1].decode("utf-8", "replace") or None if found and b"\0" not in found[-1] else None
+
+
+def _json(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        return text
+
+
+def _merge(data: Any) -> MergeEvent | None:
+    if not isinstance(data, dict):
+        return None
+    try:
+        return MergeEvent.model_validate({**data, "type": MERGE})
+    except ValidationError:
+        return None

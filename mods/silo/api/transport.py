@@ -1,0 +1,324 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""One request, done with care: time-outs, bounded repeats, redirects, bounded answers, and the token.
+
+The rules of this module:
+
+* a request is repeated only where that is harmless (``Call.repeatable``), a few times, with growing pauses;
+* the token goes to the configured server only, never along a redirect to another, never from https to http;
+* a changing request (POST, PUT) follows a redirect only within the configured server and with its body;
+* an answer has an upper size and an upper duration, however slowly it drips.
+"""
+
+from __future__ import annotations
+
+import random
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, field
+from email.utils import parsedate_to_datetime
+from typing import Any, Protocol
+from urllib.parse import urljoin, urlsplit
+
+import requests
+from requests.adapters import HTTPAdapter
+from requests.auth import AuthBase
+
+from silo.api.address import Origin, ServerAddress, may_carry_token, origin_of
+from silo.api.failures import Where, translated
+from silo.api.replies import Reply, error_of
+from silo.bom.errors import (
+    AuthError,
+    CancelledError,
+    ConfigError,
+    ServerFaultError,
+    SiloError,
+    UnreachableError,
+)
+
+MAX_REDIRECTS = 5
+MAX_ERROR = 1 << 20
+_BUSY = (408, 429, 502, 503, 504)
+_CHUNK = 1 << 16
+
+
+class Cancel(Protocol):
+    """What tells a long call to stop; :class:`threading.Event` is one."""
+
+    def is_set(self) -> bool: ...
+
+    def wait(self, timeout: float | None = None) -> bool: ...
+
+
+@dataclass(frozen=True)
+class Timeouts:
+    """Seconds: to connect, between two pieces of an answer, and for a whole answer."""
+
+    connect: float = 5.0
+    read: float = 30.0
+    total: float = 300.0
+
+
+@dataclass(frozen=True)
+class Retries:
+    """How often to try in all, the first pause and the longest one (seconds)."""
+
+    tries: int = 3
+    first: float = 0.25
+    longest: float = 10.0
+
+    def pause(self, attempt: int, chance: float, told: float | None) -> float | None:
+        """Seconds to wait after failed attempt number ``attempt`` (from 1); None means give up.
+
+        ``chance`` in [0, 1) spreads many clients out; ``told`` is the server's own Retry-After.
+        """
+        if attempt >= self.tries or (told is not None and told > self.longest):
+            return None
+        return (
+            told
+            if told is not None
+            else min(self.longest, self.first * 2.0 ** (attempt - 1)) * (0.5 + chance)
+        )
+
+
+@dataclass(frozen=True)
+class Call:
+    """One request. ``body`` makes the content anew for each attempt.
+
+    ``endless`` answers (downloads) may take as long as they come at all.
+    """
+
+    method: str
+    url: str
+    subject: str
+    params: Mapping[str, str | int] = field(default_factory=dict)
+    body: Callable[[], Any] | None = None
+    headers: Mapping[str, str] = field(default_factory=dict)
+    repeatable: bool = False
+    max_bytes: int = 64 << 20
+    endless: bool = False
+    cancelled: Cancel | None = None
+
+    @property
+    def writing(self) -> bool:
+        return self.method not in ("GET", "HEAD")
+
+
+class _Bearer(AuthBase):
+    # Given as `auth` for every request, also without a token: otherwise requests would look into ~/.netrc and
+    # send whatever it finds there.
+    def __init__(self, token: str | None) -> None:
+        self._token = token
+
+    def __call__(self, request: requests.PreparedRequest) -> requests.PreparedRequest:
+        if self._token:
+            request.headers["Authorization"] = f"Bearer {self._token}"
+        return request
+
+    def __repr__(self) -> str:
+        return "Bearer ***" if self._token else "no token"
+
+
+def clean_token(token: str | None) -> str | None:
+    """The token without blanks around it; a :class:`ConfigError`, without quoting it, if it is unusable."""
+    token = (token or "").strip()
+    if not all("!" <= c <= "~" for c in token):
+        raise ConfigError("the token holds blanks or characters that HTTP does not allow; copy it again")
+    return token or None
+
+
+class Transport:
+    """Sends calls to one server over a :class:`requests.Session`; safe to share between threads."""
+
+    def __init__(
+        self,
+        address: ServerAddress,
+        token: str | None,
+        *,
+        timeouts: Timeouts,
+        retries: Retries,
+        verify: bool | str = True,
+        session: requests.Session | None = None,
+        pause: Callable[[float], None] = time.sleep,
+        clock: Callable[[], float] = time.monotonic,
+        chance: Callable[[], float] = random.random,
+    ) -> None:
+        self.address = address
+        self.timeouts = timeouts
+        self._retries = retries
+        self._token = clean_token(token)
+        self._verify = verify
+        self._session = session or _new_session()
+        self._pause, self._clock, self._chance = pause, clock, chance
+
+    @property
+    def has_token(self) -> bool:
+        return self._token is not None
+
+    def where(self, subject: str) -> Where:
+        """For messages about this server."""
+        return Where(self.address.host, subject, self.timeouts.connect, self.timeouts.read)
+
+    def close(self) -> None:
+        self._session.close()
+
+    def send(self, call: Call) -> Reply:
+        """The server's good answer; raises one of :mod:`silo.bom.errors` for everything else."""
+        attempt = 0
+        while True:
+            attempt += 1
+            stop_if(call.cancelled)
+            error, told = self._attempt(call)
+            if isinstance(error, Reply):
+                return error
+            again = isinstance(error, UnreachableError) or told is not None
+            wait = self._retries.pause(attempt, self._chance(), told) if call.repeatable and again else None
+            if wait is None:
+                raise error
+            self._rest(wait, call.cancelled)
+
+    def _attempt(self, call: Call) -> tuple[Reply | SiloError, float | None]:
+        try:
+            with self.opened(call) as response:
+                reply = self.reply(response, call)
+        except UnreachableError as error:
+            return error, None
+        if reply.ok:
+            return reply, None
+        told = _retry_after(reply) if reply.status in _BUSY else None
+        return error_of(reply, writing=call.writing), told
+
+    @contextmanager
+    def opened(self, call: Call, read_timeout: float | None = None) -> Iterator[requests.Response]:
+        """The response with its body still unread, redirects followed; closed at the end."""
+        with closing(self.open(call, read_timeout)) as response:
+            yield response
+
+    def open(self, call: Call, read_timeout: float | None = None) -> requests.Response:
+        """As :meth:`opened`, for the caller to close."""
+        url, params, home = call.url, dict(call.params), self.address.origin
+        for _ in range(MAX_REDIRECTS + 1):
+            carry = may_carry_token(home, origin_of(url))
+            response = self._exchange(call, url, params, carry, read_timeout)
+            if not response.is_redirect:
+                return response
+            with closing(response):
+                url, params = self._next_url(call, url, response), {}
+        raise ServerFaultError(
+            f"{self.where(call.subject).asked} redirects in a circle; check the server address"
+        )
+
+    def _exchange(
+        self, call: Call, url: str, params: dict[str, Any], carry: bool, read_timeout: float | None
+    ) -> requests.Response:
+        # A server on this computer is never behind a proxy, whatever the environment says of the others.
+        proxies = {"no_proxy": self.address.origin[1]} if self.address.is_loopback else None
+        with translated(self.where(call.subject)):
+            return self._session.request(
+                call.method,
+                url,
+                params=params,
+                data=call.body() if call.body else None,
+                headers=dict(call.headers),
+                auth=_Bearer(self._token if carry else None),
+                timeout=(self.timeouts.connect, read_timeout or self.timeouts.read),
+                allow_redirects=False,
+                stream=True,
+                verify=self._verify,
+                proxies=proxies,
+            )
+
+    def _next_url(self, call: Call, url: str, response: requests.Response) -> str:
+        with translated(self.where(call.subject)):
+            target = urljoin(url, response.headers["Location"])
+            here, there = origin_of(url), origin_of(target)
+        _check_redirect(call, self.address, here, there, target, response.status_code)
+        return target
+
+    def reply(self, response: requests.Response, call: Call) -> Reply:
+        """The response, read whole within the call's bounds."""
+        content = b"".join(self.pieces(response, call))
+        return Reply(response.status_code, content, self.where(call.subject), response.headers, self._token)
+
+    def pieces(self, response: requests.Response, call: Call) -> Iterator[bytes]:
+        """The body as it comes, each piece at once; ends by error when it is too much or takes too long."""
+        where = self.where(call.subject)
+        deadline = self._clock() + self.timeouts.total
+        size = 0
+        with translated(where):
+            while piece := read_some(response):
+                stop_if(call.cancelled)
+                size += len(piece)
+                if size > call.max_bytes:
+                    raise ServerFaultError(
+                        f"{where.asked} answered more than {call.max_bytes / 1e6:.0f} MB, which is refused"
+                    )
+                yield piece
+                if self._clock() > deadline and not call.endless:
+                    raise UnreachableError(
+                        f"{where.asked} took more than {self.timeouts.total:g} s to answer; try again later"
+                    )
+
+    def _rest(self, seconds: float, cancelled: Cancel | None) -> None:
+        if cancelled is None:
+            self._pause(seconds)
+        else:
+            cancelled.wait(seconds)
+            stop_if(cancelled)
+
+
+def read_some(response: requests.Response) -> bytes:
+    """What has arrived, decoded; waits for the first byte only; empty at the end."""
+    # `iter_content` would wait until a chunk is full, and a server that drips could hold us for ever.
+    raw = response.raw
+    if hasattr(raw, "read1"):
+        return bytes(raw.read1(_CHUNK, decode_content=True) or b"")
+    return bytes(raw.read(_CHUNK, decode_content=True))
+
+
+def stop_if(cancelled: Cancel | None) -> None:
+    """Raise :class:`CancelledError` where the caller asked to stop."""
+    if cancelled is not None and cancelled.is_set():
+        raise CancelledError("stopped; what was sent before stays sent")
+
+
+def _check_redirect(
+    call: Call, home: ServerAddress, here: Origin, there: Origin, target: str, status: int
+) -> None:
+    shown = f"{there[0]}://{urlsplit(target).netloc}"
+    path = urlsplit(target).path.rstrip("/")
+    if path.endswith("/login") and there[1] == here[1]:
+        raise AuthError(f"{home.host} wants a login; give a valid token (SILO_API_TOKEN, or the settings)")
+    if here[0] == "https" and there[0] == "http":
+        raise ServerFaultError(f"{home.host} redirects from https to {shown}, which is not secure: refused")
+    if call.writing and not (status in (307, 308) and may_carry_token(here, there)):
+        raise ServerFaultError(
+            f"{home.host} redirects a change to {shown}: not followed. If that is the Silo server, "
+            "set it as the server address"
+        )
+
+
+def _retry_after(reply: Reply) -> float | None:
+    text = reply.headers.get("Retry-After", "").strip()
+    if text.isascii() and text.isdigit():
+        return float(text[:9])
+    try:
+        return max(0.0, parsedate_to_datetime(text).timestamp() - time.time())
+    except (ValueError, TypeError, OverflowError):
+        return None
+
+
+def _new_session() -> requests.Session:
+    session = requests.Session()
+    adapter = HTTPAdapter(pool_connections=4, pool_maxsize=16, max_retries=0)
+    session.mount("http://", adapter)
+    session.mount("https://", adapter)
+    # The token is the only thing that says who we are; a session cookie would outlive its withdrawal.
+    session.cookies.set_policy(_no_cookies())
+    return session
+
+
+def _no_cookies() -> Any:
+    from http.cookiejar import DefaultCookiePolicy
+
+    return DefaultCookiePolicy(allowed_domains=[])
