@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Which server, which token: options first, then the environment, then the user's configuration file.
+
+The file is TOML, readable by its owner only::
+
+    [server]
+    url = "https://silo.example.com"
+    token = "silo_…"
+    verify = true            # or false, or the path of a file with certificate authorities
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import stat
+import tempfile
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from silo.api.address import ServerAddress
+from silo.bom.errors import ConfigError
+from silo.folders import config_folder
+
+log = logging.getLogger("silo.api")
+
+URL, TOKEN, VERIFY = "SILO_API_URL", "SILO_API_TOKEN", "SILO_SSL_VERIFY"
+
+_YES, _NO = ("1", "true", "yes", "on"), ("0", "false", "no", "off")
+_HOW = (
+    "Start one on this computer with `silo-mod serve` (it prints its address and a token), then set "
+    f"{URL} and {TOKEN}, or give --server and --token"
+)
+
+
+@dataclass(frozen=True)
+class ServerSettings:
+    """Where the server is. ``url_from`` and ``token_from`` say who said so, for people."""
+
+    url: str
+    token: str | None = field(default=None, repr=False)
+    verify: bool | str = True
+    url_from: str = ""
+    token_from: str = ""
+
+
+def config_path(env: Mapping[str, str] = os.environ) -> Path:
+    """The configuration file, whether it exists or not."""
+    return config_folder(env) / "config.toml"
+
+
+def resolve_server(
+    server: str | None = None,
+    token: str | None = None,
+    verify: bool | str | None = None,
+    *,
+    env: Mapping[str, str] = os.environ,
+    path: Path | None = None,
+) -> ServerSettings:
+    """Find server and token; raises :class:`ConfigError` that says how to get one where there is none.
+
+    A token in the file belongs to the server in the file: it is not sent to another one that an option or the
+    environment names.
+    """
+    path = path or config_path(env)
+    stored = _server_table(path)
+    file_url, file_token = _text(stored, "url", path), _text(stored, "token", path)
+    url, url_from = _first(("--server", server), (URL, env.get(URL)), (str(path), file_url))
+    if url is None:
+        raise ConfigError(f"no Silo server is configured. {_HOW}, or write both into {path}")
+    if file_url is None or not _same_server(url, file_url):
+        file_token = None
+    found, token_from = _first(("--token", token), (TOKEN, env.get(TOKEN)), (str(path), file_token))
+    return ServerSettings(
+        url=url,
+        token=found,
+        verify=_verify(verify, env.get(VERIFY), stored.get("verify"), path),
+        url_from=url_from,
+        token_from=token_from,
+    )
+
+
+def load_config(path: Path) -> dict[str, Any]:
+    """The whole file as TOML tables; empty where there is none."""
+    try:
+        with path.open("rb") as file:
+            _warn_if_open(path, os.fstat(file.fileno()).st_mode)
+            return tomllib.load(file)
+    except FileNotFoundError:
+        return {}
+    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: the configuration cannot be read ({error}); mend or remove it") from error
+
+
+def save_config(
+    url: str,
+    token: str | None = None,
+    verify: bool | str = True,
+    *,
+    path: Path | None = None,
+    env: Mapping[str, str] = os.environ,
+) -> Path:
+    """Remember server and token; the file's other settings stay. Gives the file's path (mode 0600)."""
+    ServerAddress.parse(url)
+    path = path or config_path(env)
+    config = load_config(path)
+    table = {**config.get("server", {}), "url": url, "verify": verify}
+    table.pop("token", None)
+    config["server"] = {**table, "token": token} if token else table
+    _write_private(path, _toml(config))
+    return path
+
+
+def _server_table(path: Path) -> dict[str, Any]:
+    table = load_config(path).get("server", {})
+    if not isinstance(table, dict):
+        raise ConfigError(f"{path}: wanted a table [server], got {table!r}")
+    return table
+
+
+def _text(table: Mapping[str, Any], key: str, path: Path) -> str | None:
+    value = table.get(key)
+    if value is not None and not isinstance(value, str):
+        raise ConfigError(f"{path}: server.{key} wants a text in quotes, got {type(value).__name__}")
+    return value
+
+
+def _first(*candidates: tuple[str, str | None]) -> tuple[str | None, str]:
+    for source, value in candidates:
+        if value is not None and value.strip():
+            return value.strip(), source
+    return None, ""
+
+
+def _same_server(one: str, other: str) -> bool:
+    return ServerAddress.parse(one).origin == ServerAddress.parse(other).origin
+
+
+def _verify(option: bool | str | None, variable: str | None, stored: Any, path: Path) -> bool | str:
+    for source, value in (("verify", option), (VERIFY, variable), (f"server.verify in {path}", stored)):
+        if isinstance(value, bool):
+            return value
+        if isinstance(value, str) and value.strip():
+            return _verify_text(source, value.strip())
+    return True
+
+
+def _verify_text(source: str, text: str) -> bool | str:
+    if text.lower() in _YES + _NO:
+        return text.lower() in _YES
+    if not Path(text).expanduser().exists():
+        raise ConfigError(
+            f"{source}: wanted true, false or a file with certificate authorities; {text} is no file"
+        )
+    return str(Path(text).expanduser())
+
+
+def _warn_if_open(path: Path, mode: int) -> None:
+    if os.name == "posix" and mode & (stat.S_IRWXG | stat.S_IRWXO):
+        log.warning("%s can be read by others and may hold a token; chmod 600 keeps it private", path)
+
+
+def _write_private(path: Path, text: str) -> None:
+    try:
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        # mkstemp makes the file for its owner only, before a byte of the token is in it.
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=path.name)
+        try:
+            with os.fdopen(handle, "w", encoding="utf-8") as file:
+                file.write(text)
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(name, path)
+        finally:
+            Path(name).unlink(missing_ok=True)
+    except OSError as error:
+        raise ConfigError(
+            f"{path}: the configuration cannot be written ({error.strerror or error})"
+        ) from error
+
+
+def _toml(tables: Mapping[str, Any], prefix: str = "") -> str:
+    """TOML for what a TOML file can hold; the standard library only reads it."""
+    plain = [f"{_key(k)} = {_value(v)}" for k, v in tables.items() if not isinstance(v, dict)]
+    text = "\n".join(plain) + "\n" if plain else ""
+    for key, table in tables.items():
+        if isinstance(table, dict):
+            name = f"{prefix}{_key(key)}"
+            text += f"\n[{name}]\n" + _toml(table, f"{name}.")
+    return text.lstrip("\n") if not prefix else text
+
+
+def _key(key: str) -> str:
+    bare = key and all(c.isascii() and (c.isalnum() or c in "-_") for c in key)
+    return key if bare else _value(key)
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        # JSON's escapes are TOML's; DEL is the one character that only TOML wants escaped.
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, list):
+        return "[" + ", ".join(_value(v) for v in value) + "]"
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{_key(k)} = {_value(v)}" for k, v in value.items()) + " }"
+    return str(value)

@@ -1,0 +1,257 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""A live connection to the server's events that looks after itself.
+
+``EventListener`` keeps one stream open from a thread of its own: it begins again after every loss, with
+growing pauses and a little chance (many clients must not return in one moment), goes on where it stopped
+(``Last-Event-ID``), and says how it is doing. It only calls back; it knows no Qt and touches no document.
+"""
+
+from __future__ import annotations
+
+import logging
+import random
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Protocol, TypeVar
+
+from silo.api.protocol import EventStream
+from silo.api.sse import HEARTBEAT, MERGE, RESET, STATE, ServerEvent, SseParser, parse
+from silo.api.wire import MergeEvent, ServerState
+from silo.bom.errors import AuthError, RouteMissingError, SiloError
+
+__all__ = [
+    "HEARTBEAT",
+    "MERGE",
+    "RESET",
+    "STATE",
+    "Backoff",
+    "Connection",
+    "ConnectionState",
+    "EventListener",
+    "MergeEvent",
+    "ServerEvent",
+    "SseParser",
+    "parse",
+]
+
+log = logging.getLogger("silo.api")
+
+
+class Connection(StrEnum):
+    """How the connection is."""
+
+    CONNECTING = "connecting"  # on the way
+    ONLINE = "online"  # events come in
+    READ_ONLY = "read-only"  # events come in, the server takes no changes now
+    DEGRADED = "degraded"  # events come in, a part of the server fails
+    OFFLINE = "offline"  # no connection; it is tried again
+    REFUSED = "refused"  # the token is not accepted; not tried again
+    UNSUPPORTED = "unsupported"  # the server has no events; not tried again
+    STOPPED = "stopped"  # by stop()
+
+
+_MODES = {"read-only": Connection.READ_ONLY, "degraded": Connection.DEGRADED}
+
+
+@dataclass(frozen=True)
+class ConnectionState:
+    """A change of the connection: what, why in plain words, and in how many seconds it is tried again."""
+
+    kind: Connection
+    message: str = ""
+    retry_in: float | None = None
+
+    def __str__(self) -> str:
+        again = f"; next try in {self.retry_in:.0f} s" if self.retry_in is not None else ""
+        return f"{self.kind}: {self.message}{again}" if self.message else str(self.kind)
+
+
+@dataclass(frozen=True)
+class Backoff:
+    """Growing pauses, in seconds."""
+
+    first: float = 1.0
+    factor: float = 2.0
+    longest: float = 60.0
+
+    def pause(self, attempt: int, chance: float) -> float:
+        """The pause after failed attempt ``attempt`` (from 1); ``chance`` in [0, 1) shortens it, half at most."""
+        full = min(self.longest, self.first * self.factor ** min(attempt - 1, 60))
+        return full * (1.0 - chance / 2.0)
+
+
+@dataclass
+class _Heard:
+    anything: bool = False
+
+
+_Told = TypeVar("_Told")
+
+
+def _number(marker: str | None) -> int:
+    # Servers count; where one does not, its markers have no order and none is "before" another.
+    return int(marker) if marker and marker.isascii() and marker.isdigit() and len(marker) < 30 else -1
+
+
+class EventSource(Protocol):
+    """What a listener needs of a Silo."""
+
+    def open_events(self, last_event_id: str | None = None) -> EventStream: ...
+
+    def ready(self) -> ServerState: ...
+
+
+class EventListener:
+    """Calls ``on_event`` for each event but heartbeats, ``on_state`` for each change of the connection.
+
+    api
+        anything with ``open_events`` and ``ready``: a :class:`silo.api.client.SiloClient`, a ``FakeSilo``.
+    last_event_id
+        where to begin; None means with what is new.
+    wait
+        ``wait(event, seconds)`` sleeps until the event is set; for tests.
+
+    Both callbacks run in the listener's thread, one at a time, none after :meth:`stop` has returned. An error
+    in a callback is logged and costs only that call. Where events may have been missed (the server lost its
+    log or counts anew), an event of type ``reset`` comes first: read again what is shown.
+    """
+
+    def __init__(
+        self,
+        api: EventSource,
+        on_event: Callable[[ServerEvent], object],
+        on_state: Callable[[ConnectionState], object] = lambda state: None,
+        *,
+        last_event_id: str | None = None,
+        backoff: Backoff | None = None,
+        chance: Callable[[], float] = random.random,
+        wait: Callable[[threading.Event, float], object] = threading.Event.wait,
+    ) -> None:
+        self._api, self._on_event, self._on_state = api, on_event, on_state
+        self._backoff, self._chance, self._wait = backoff or Backoff(), chance, wait
+        self._last_id = last_event_id
+        self._stop, self._wake = threading.Event(), threading.Event()
+        self._stream: EventStream | None = None
+        self._lock = threading.Lock()  # guards _stream
+        self._calling = threading.RLock()  # held during a callback, so that stop() can wait for it
+        self._thread: threading.Thread | None = None
+        self.state = ConnectionState(Connection.STOPPED)
+
+    @property
+    def last_event_id(self) -> str | None:
+        """Where the next connection goes on."""
+        return self._last_id
+
+    def start(self) -> None:
+        """Begin; also after :meth:`stop`, or after it gave up. Does nothing while it runs."""
+        if self._thread is not None and self._thread.is_alive() and not self._stop.is_set():
+            return
+        # A thread that is still on its way out keeps the old flags, and can call nobody any more.
+        self._stop, self._wake = threading.Event(), threading.Event()
+        self._thread = threading.Thread(target=self._run, args=(self._stop,), name="silo-events", daemon=True)
+        self._thread.start()
+
+    def retry_now(self) -> None:
+        """End the current pause: the network is back, or a person pressed the button."""
+        self._wake.set()
+
+    def stop(self, timeout: float = 2.0) -> None:
+        """End. Returns within ``timeout`` seconds even where a connection hangs; no callback comes after."""
+        self._stop.set()
+        self._wake.set()
+        with self._lock:
+            stream = self._stream
+        if stream is not None:
+            stream.close()
+        thread = self._thread
+        if thread is None or thread is threading.current_thread():
+            return
+        thread.join(timeout)
+        with self._calling:
+            self.state = ConnectionState(Connection.STOPPED)
+
+    def _run(self, stop: threading.Event) -> None:
+        failures = 0
+        while not stop.is_set():
+            self._tell(stop, ConnectionState(Connection.CONNECTING))
+            heard = _Heard()
+            try:
+                self._listen(stop, heard)
+                reason = "the server ended the connection"
+            except RouteMissingError as error:
+                return self._tell(stop, ConnectionState(Connection.UNSUPPORTED, str(error)))
+            except AuthError as error:
+                return self._tell(stop, ConnectionState(Connection.REFUSED, str(error)))
+            except SiloError as error:
+                reason = str(error)
+            # Only what was really received counts as success: a server that greets and drops us is not up.
+            failures = 1 if heard.anything else failures + 1
+            pause = self._backoff.pause(failures, self._chance())
+            self._tell(stop, ConnectionState(Connection.OFFLINE, reason, pause))
+            self._wait(self._wake, pause)
+            if not stop.is_set():
+                self._wake.clear()
+        return None
+
+    def _listen(self, stop: threading.Event, heard: _Heard) -> None:
+        stream = self._api.open_events(self._last_id)
+        with self._lock:
+            self._stream = stream
+        try:
+            if stop.is_set():
+                return
+            self._tell(stop, ConnectionState(self._mode()))
+            for event in stream:
+                heard.anything = True
+                self._take(stop, event)
+                if stop.is_set():
+                    return
+        finally:
+            stream.close()
+            with self._lock:
+                self._stream = None
+            self._adopt(stop, getattr(stream, "last_event_id", None))
+
+    def _mode(self) -> Connection:
+        try:
+            return _MODES.get(self._api.ready().mode, Connection.ONLINE)
+        except SiloError:
+            # The stream stands, so the server is there; that is enough to say so.
+            return Connection.ONLINE
+
+    def _take(self, stop: threading.Event, event: ServerEvent) -> None:
+        if event.type == RESET:
+            self._last_id = event.id or self._last_id
+        elif event.id is not None:
+            if event.id == self._last_id:
+                return  # A replay that begins one too early.
+            self._adopt(stop, event.id)
+        if event.type == STATE and event.mode is not None:
+            self._tell(stop, ConnectionState(_MODES.get(event.mode, Connection.ONLINE)))
+        if event.type != HEARTBEAT:
+            self._call(stop, self._on_event, event)
+
+    def _adopt(self, stop: threading.Event, marker: str | None) -> None:
+        if marker is None:
+            return
+        before, self._last_id = self._last_id, marker
+        if _number(marker) < _number(before):
+            # The server counts anew, so what happened around its restart was never replayed.
+            anew = ServerEvent(marker, RESET, {"reason": "the server counts anew"})
+            self._call(stop, self._on_event, anew)
+
+    def _tell(self, stop: threading.Event, state: ConnectionState) -> None:
+        if not stop.is_set():
+            self.state = state
+            self._call(stop, self._on_state, state)
+
+    def _call(self, stop: threading.Event, callback: Callable[[_Told], object], value: _Told) -> None:
+        with self._calling:
+            if stop.is_set():
+                return
+            try:
+                callback(value)
+            except Exception:  # noqa: BLE001 - whatever a callback does, the connection must live on
+                log.exception("an error in the receiver of server events; the connection goes on")
