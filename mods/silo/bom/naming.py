@@ -56,6 +56,12 @@ def proposed_name(entry: BomEntry, *, shares_file: bool = False) -> str:
     return of_document or of_object or "Unnamed component"
 
 
+def display_name(entry: BomEntry) -> str:
+    """What to call a component before people: its own label, or its document's where that says nothing."""
+    label = clean_name(entry.label)
+    return label if label and not _GENERIC.match(label) else clean_name(entry.document_label) or label
+
+
 def _stems(text: str) -> set[str]:
     words = {word.casefold() for word in _WORD.findall(text)}
     return {word[:-1] if word.endswith("s") and len(word) > 3 else word for word in words}

@@ -10,6 +10,7 @@ from typing import Any, Protocol
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.identity import walk_entries
 from silo.bom.model import BomEntry
+from silo.bom.naming import display_name
 
 
 class ItemLookup(Protocol):
@@ -93,7 +94,7 @@ def merge_lines(entries: Iterable[BomEntry]) -> list[BomEntry]:
 
 def consolidation_message(entry: BomEntry) -> str:
     """The spec's console warning (§6), with the count of individual links."""
-    who = entry.part_number or entry.label or entry.object_name or entry.doc_path
+    who = entry.part_number or display_name(entry) or entry.object_name or entry.doc_path
     count = entry.individual_links
     if count > 1:
         what = f"{count} individual links"
@@ -125,7 +126,7 @@ def unregistered_findings(unresolved: Iterable[BomEntry]) -> tuple[Finding, ...]
         Finding(
             FindingCode.UNREGISTERED,
             Severity.WARNING,
-            f"{entry.label or entry.object_name} has no Silo part number and is left out of the BOM "
+            f"{display_name(entry) or entry.object_name} has no Silo part number and is left out of the BOM "
             "until it is registered.",
             (Place(entry.doc_path, entry.object_name),),
         )

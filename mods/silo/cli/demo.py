@@ -89,9 +89,8 @@ def _private_data(folder: Path) -> Iterator[None]:
 
 @contextmanager
 def _demo(folder: Path, port: int) -> Iterator[Demo]:
-    from silo_server.run import running_server
-
     from silo.api.client import SiloClient
+    from silo_server.run import running_server
 
     model = folder / "gearbox"
     shutil.copytree(EXAMPLE, model, ignore=shutil.ignore_patterns("*.py", "__pycache__", "*.md"))

@@ -15,6 +15,7 @@ from rich.tree import Tree
 from silo.api.activity import ActivityText
 from silo.bom.findings import Finding, Severity
 from silo.bom.model import BomDiff, BomEntry, Extraction
+from silo.bom.naming import display_name
 from silo.bom.report import base_of, relative, shorten
 from silo.bom_sync import Outcome, Status
 
@@ -43,7 +44,7 @@ def entry_text(entry: BomEntry, base: str) -> Text:
     if entry.part_number:
         text.append(plain(entry.part_number), "cyan").append("  ").append(plain(entry.name or ""))
     else:
-        text.append(plain(entry.document_label or entry.label or entry.object_name))
+        text.append(plain(display_name(entry) or entry.object_name))
     where = relative(entry.doc_path, base)
     text.append(f"  {plain(where)}#{plain(entry.object_name)}", "dim")
     return text
@@ -53,7 +54,7 @@ def bom_tree(extraction: Extraction) -> Tree:
     """The multi-level BOM; quantities are per one parent."""
     base = base_of(extraction)
     head = extraction.assembly
-    title = Text(plain(head.part_number or head.document_label or head.label), "bold")
+    title = Text(plain(head.part_number or display_name(head)), "bold")
     if head.name:
         title.append("  ").append(plain(head.name))
     tree = Tree(title)
@@ -159,7 +160,7 @@ def outcome_text(outcome: Outcome) -> Text:
     """One line: which assembly, and what became of it."""
     mark, style, words = _STATUS[outcome.status]
     head = outcome.assembly
-    who = " ".join(filter(None, (head.part_number, head.name))) or head.document_label or head.label
+    who = " ".join(filter(None, (head.part_number, head.name))) or display_name(head)
     text = Text(f"{mark} ", style).append(plain(who), "bold").append(f": {words}")
     if outcome.error is not None:
         text.append(f": {plain(str(outcome.error))}")
