@@ -1,1 +1,46 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
+"""Mass, centre of mass and inertia of an assembly's links, from its geometry and a BOM.
+
+Names are imported when they are first used: ``import silo.inertia`` loads neither numpy nor the CAD kernel.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from silo.inertia.bom import BOMEntry, BOMParser
+    from silo.inertia.calculator import InertiaCalculator, compute_link_inertials
+    from silo.inertia.report import InertiaReport, PartWarning
+    from silo.inertia.types import InertialProperties
+
+__all__ = [
+    "BOMEntry",
+    "BOMParser",
+    "InertiaCalculator",
+    "InertiaReport",
+    "InertialProperties",
+    "PartWarning",
+    "compute_link_inertials",
+]
+
+_HOME = {
+    "BOMEntry": "bom",
+    "BOMParser": "bom",
+    "InertiaCalculator": "calculator",
+    "InertiaReport": "report",
+    "InertialProperties": "types",
+    "PartWarning": "report",
+    "compute_link_inertials": "calculator",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Instances → links: sums in the link's frame, parts with their sources, all warnings. No I/O.
+
+The sum over one link is one vectorised expression; 10 000 instances take milliseconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+
+from silo.bom.errors import InputError
+from silo.inertia.bom.rows import BomTable
+from silo.inertia.codes import MassCode
+from silo.inertia.core import MassProps, TensorProblem, combine_arrays, is_rigid
+from silo.inertia.frames import ASSEMBLY_FRAME, FrameChoice, LinkFrame
+from silo.inertia.links import Claims
+from silo.inertia.masses import Placed
+from silo.inertia.massrule import Decision, Note
+from silo.inertia.matching import Matching
+from silo.inertia.model import Assembly
+from silo.inertia.products import companions, leaf_products, sub_assemblies
+from silo.inertia.report import InertiaReport, LinkResult, PartResult, PartWarning
+
+_TENSOR_WORDS = {
+    TensorProblem.NOT_FINITE: "has a value that is not finite",
+    TensorProblem.NOT_SYMMETRIC: "is not symmetric",
+    TensorProblem.ZERO_MASS: "has no mass",
+    TensorProblem.NEGATIVE_MASS: "has a negative mass",
+    TensorProblem.ZERO_INERTIA: "has no inertia (a point mass); MuJoCo refuses it on a moving link",
+    TensorProblem.NOT_POSITIVE_DEFINITE: "has a principal moment that is not above zero",
+    TensorProblem.TRIANGLE_INEQUALITY: "has a principal moment above the sum of the two others",
+}
+
+
+def sum_up(placed: Placed, indices: Sequence[int]) -> MassProps:
+    """Mass properties of some instances together, in the assembly's frame."""
+    index = np.asarray(indices, np.intp)
+    return combine_arrays(placed.mass[index], placed.com[index], placed.inertia(index))
+
+
+def fill_links(
+    report: InertiaReport, assembly: Assembly, placed: Placed, claims: Claims, choice: FrameChoice
+) -> None:
+    """Put every link and the unclaimed parts into the report, warnings included."""
+    for name, indices in claims.members.items():
+        frame = chosen_frame(name, claims, choice)
+        props = sum_up(placed, indices).transform(frame.inverse())
+        parts = tuple(_parts(assembly, placed, indices, name))
+        link = LinkResult(name, props, frame, parts, props.check())
+        report.links[name] = link
+        report.link_properties[name] = props.to_inertial()
+        _part_warnings(report, parts)
+        _link_warnings(report, link)
+    report.unclaimed = tuple(_parts(assembly, placed, claims.unclaimed, ""))
+    _part_warnings(report, report.unclaimed)
+    report.total = sum_up(placed, range(len(assembly.instances)))
+
+
+def chosen_frame(name: str, claims: Claims, choice: FrameChoice) -> LinkFrame:
+    """The frame a link's numbers are given in: the map's word, else the run's choice."""
+    frame = claims.frame(name)
+    if not frame.chosen and choice is FrameChoice.ASSEMBLY:
+        return ASSEMBLY_FRAME
+    turn = frame.placement[:3, :3]
+    if not is_rigid(frame.placement) or np.linalg.det(turn) < 0:
+        raise InputError(
+            f"link {name}: its frame ({frame.description}) is mirrored or scaled; choose another one"
+        )
+    return frame
+
+
+def _parts(assembly: Assembly, placed: Placed, indices: Iterable[int], link: str) -> Iterator[PartResult]:
+    groups: dict[tuple[str, Decision, float], list[int]] = {}
+    for index in indices:
+        if placed.counted[index]:
+            key = (assembly.instances[index].prototype, placed.decisions[index], float(placed.mass[index]))
+            groups.setdefault(key, []).append(index)
+    for (prototype, decision, mass), members in groups.items():
+        product = assembly.prototypes[prototype]
+        volume = float(placed.volume[members[0]])
+        notes = [*decision.notes, *(Note(problem.code, problem.message) for problem in product.problems)]
+        yield PartResult(
+            name=product.name,
+            paths=tuple(assembly.instances[index].name for index in members),
+            mass=mass,
+            volume=volume,
+            source=decision.source,
+            rule=decision.rule,
+            decided_by=decision.decided,
+            material=decision.material,
+            material_name=decision.material_name,
+            density=decision.density
+            if decision.density is not None
+            else (mass / volume if volume > 0 else None),
+            density_source=decision.density_source,
+            quantum=decision.quantum_kg,
+            part_number=product.part_number or "",
+            lines=decision.lines,
+            warnings=tuple(PartWarning(link, product.name, note.message, note.code) for note in notes),
+        )
+
+
+def _part_warnings(report: InertiaReport, parts: Iterable[PartResult]) -> None:
+    for part in parts:
+        for warning in part.warnings:
+            report.add_warning(warning.link_name, warning.part_name, warning.message, warning.code)
+
+
+def _link_warnings(report: InertiaReport, link: LinkResult) -> None:
+    if TensorProblem.ZERO_MASS in link.problems:
+        report.add_warning(
+            link.name,
+            "",
+            "the link has no mass; physics engines refuse a moving link without one",
+            MassCode.ZERO_MASS_LINK,
+        )
+        return
+    for problem in link.problems:
+        report.add_warning(
+            link.name, "", f"the link's inertia tensor {_TENSOR_WORDS[problem]}", MassCode.BAD_TENSOR
+        )
+
+
+def tensor_words(problems: Iterable[TensorProblem]) -> str:
+    """Why a tensor is no rigid body's, in words that end a sentence."""
+    return ", ".join(_TENSOR_WORDS[problem] for problem in problems)
+
+
+def tell_claims(report: InertiaReport, assembly: Assembly, claims: Claims) -> None:
+    """What the link map left open: unclaimed parts, overlaps, patterns without effect."""
+    for part in report.unclaimed:
+        many = f"{part.quantity} pieces, " if part.quantity > 1 else ""
+        report.add_warning(
+            "",
+            part.name,
+            f"no link claims it ({many}{part.total_mass:.6g} kg, {part.paths[0]}); it is in no link's mass",
+            MassCode.UNCLAIMED,
+        )
+    for owner, other, index in claims.twice:
+        path = assembly.instances[index].name
+        report.add_warning(
+            other,
+            assembly.prototypes[assembly.instances[index].prototype].name,
+            f"{path} belongs to {owner} by the link map, and {other} claims it as well; {owner} has it",
+            MassCode.CLAIMED_TWICE,
+        )
+    for link, pattern in claims.unused:
+        report.add_warning(link, "", f"the pattern “{pattern}” matches nothing", MassCode.PATTERN_UNUSED)
+
+
+def tell_bom(report: InertiaReport, table: BomTable) -> None:
+    """What was noticed while the BOM was read."""
+    for warning in table.warnings:
+        report.add_warning("", warning.name, f"BOM {warning}", warning.code)
+
+
+def tell_rows(report: InertiaReport, assembly: Assembly, matching: Matching) -> None:
+    """BOM rows that no part uses, and rows whose quantity is not the number of parts."""
+    for row in matching.unused:
+        quantity = f", quantity {row.quantity:g}" if row.quantity is not None else ""
+        report.add_warning(
+            "",
+            row.name,
+            f"BOM line {row.line}{quantity}: no part in the geometry has this name; its mass is not counted",
+            MassCode.ROW_UNUSED,
+        )
+    beside = companions(assembly)
+    counted: dict[int, int] = {}
+    products = [
+        *((p, matching.parts.get(p.key)) for p in leaf_products(assembly) if p.key not in beside),
+        *((p, matching.groups.get(p.key)) for p in sub_assemblies(assembly)),
+    ]
+    for product, match in products:
+        if match is not None:
+            counted[id(match.row)] = counted.get(id(match.row), 0) + product.count
+    told: set[int] = set()
+    for product, match in products:
+        if match is None or id(match.row) in told:
+            continue
+        told.add(id(match.row))
+        count, wanted = counted[id(match.row)], match.bundle.quantities
+        if wanted and count not in wanted:
+            said = " or ".join(f"{quantity:g}" for quantity in sorted(wanted))
+            report.add_warning(
+                "",
+                product.name,
+                f"the BOM has {said} of it (line {match.row.line}), the geometry {count}; "
+                "the geometry's pieces were counted",
+                MassCode.COUNT_DIFFERS,
+            )

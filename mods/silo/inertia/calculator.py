@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The facade: a geometry file and a BOM in, an :class:`InertiaReport` out. The spec's names stand here."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from silo.inertia.aggregate import fill_links, tell_bom, tell_claims, tell_rows
+from silo.inertia.bom import BOMEntry, BOMParser, BomTable, as_table
+from silo.inertia.core import Floats
+from silo.inertia.frames import FrameChoice, LinkFrame
+from silo.inertia.links import Claims, LinkMap, claim, read_link_map
+from silo.inertia.masses import place_all
+from silo.inertia.massrule import MassRule, Options
+from silo.inertia.matching import Matching, match
+from silo.inertia.materials import MaterialHit, MaterialTable, load_materials
+from silo.inertia.model import Assembly, Prototype
+from silo.inertia.products import leaf_products, sub_assemblies
+from silo.inertia.report import InertiaReport
+from silo.inertia.types import InertialProperties
+
+if TYPE_CHECKING:
+    from silo.inertia.geometry import ReadOptions
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """Everything a calculation depends on besides geometry and BOM.
+
+    frame
+        which frame the links' numbers are given in; a link map's own word wins.
+    urdf_frames
+        link → (4, 4) placement in the assembly's frame, where ``frame`` is URDF.
+    loose_link
+        a link that takes what no other claims; None: such parts are listed as unclaimed.
+    """
+
+    materials: MaterialTable = field(default_factory=load_materials)
+    options: Options = field(default_factory=Options)
+    links: LinkMap | None = None
+    frame: FrameChoice = FrameChoice.ASSEMBLY
+    urdf_frames: Mapping[str, Floats] | None = None
+    loose_link: str | None = None
+
+
+def calculate(assembly: Assembly, table: BomTable | None, task: Task | None = None) -> InertiaReport:
+    """Mass properties of every link of an assembly. Pure: nothing is read or written."""
+    task = task or Task()
+    claims = _framed(_gathered(claim(assembly, task.links), task.loose_link), task)
+    return _run(assembly, table, task, claims, InertiaReport())
+
+
+def _run(
+    assembly: Assembly, table: BomTable | None, task: Task, claims: Claims, report: InertiaReport
+) -> InertiaReport:
+    assembly = _with_stated_densities(assembly, task.materials)
+    rows = table if table is not None else BomTable(())
+    rule = MassRule(
+        task.materials, task.options, tuple(dict.fromkeys(r.name for r in rows.rows)), table is not None
+    )
+
+    def density(row: BOMEntry, product: object) -> float | None:
+        found = rule.density_of(row.material)
+        return found if found is not None else getattr(product, "density", None)
+
+    matching = match(leaf_products(assembly), sub_assemblies(assembly), rows, density)
+    placed = place_all(assembly, rule, matching)
+    report.assembly, report.source = assembly.name, assembly.source
+    report.bom = rows.source
+    report.default_density = task.options.default_density
+    tell_bom(report, rows)
+    for problem in assembly.problems:
+        report.add_warning("", "", problem.message, problem.code)
+    fill_links(report, assembly, placed, claims, task.frame)
+    _tell_rest(report, assembly, matching, claims)
+    return report
+
+
+def _tell_rest(report: InertiaReport, assembly: Assembly, matching: Matching, claims: Claims) -> None:
+    tell_claims(report, assembly, claims)
+    tell_rows(report, assembly, matching)
+
+
+def _gathered(claims: Claims, loose: str | None) -> Claims:
+    if loose is None or not claims.unclaimed:
+        return claims
+    members = dict(claims.members)
+    members[loose] = tuple(sorted((*members.get(loose, ()), *claims.unclaimed)))
+    return replace(claims, members=members, unclaimed=())
+
+
+def _framed(claims: Claims, task: Task) -> Claims:
+    if task.frame is not FrameChoice.URDF or task.urdf_frames is None:
+        return claims
+    frames = dict(claims.frames or {})
+    for name in claims.members:
+        if name in task.urdf_frames and not claims.frame(name).chosen:
+            placement = task.urdf_frames[name]
+            frames[name] = LinkFrame(placement, "link frame of the URDF at joint position zero")
+    return replace(claims, frames=frames)
+
+
+def _with_stated_densities(assembly: Assembly, materials: MaterialTable) -> Assembly:
+    """A material that the geometry file names without a density gets that of the table."""
+
+    def complete(prototype: Prototype) -> Prototype:
+        if prototype.step_density is not None or not prototype.step_material:
+            return prototype
+        answer = materials.find(prototype.step_material)
+        density = answer.material.density if isinstance(answer, MaterialHit) else None
+        return replace(prototype, step_density=density)
+
+    return replace(assembly, prototypes={key: complete(p) for key, p in assembly.prototypes.items()})
+
+
+class InertiaCalculator:
+    """Mass properties of STEP (and mesh, and FCStd) files; spec bom-inertia, Task 4.
+
+    default_density
+        [kg/m^3] of parts that the BOM does not have.
+    materials
+        the density table; the package's own by default.
+    step_density
+        use densities that the geometry file states before the default.
+    """
+
+    def __init__(
+        self,
+        default_density: float = 1000.0,
+        *,
+        materials: MaterialTable | None = None,
+        step_density: bool = False,
+        read_options: ReadOptions | None = None,
+    ) -> None:
+        self.default_density = default_density
+        self._materials = materials if materials is not None else load_materials()
+        self._step_density = step_density
+        self._read_options = read_options
+
+    @property
+    def task(self) -> Task:
+        """The calculator's choices as a :class:`Task`."""
+        return Task(self._materials, Options(self.default_density, self._step_density))
+
+    def compute_from_step(self, step_path: Path | str) -> InertialProperties:
+        """The whole file as one body at the default density, in the file's frame."""
+        assembly = self._read(step_path)
+        name = assembly.name or "assembly"
+        report = _run(assembly, None, self.task, _everything(assembly, name), InertiaReport())
+        return report.link_properties[name]
+
+    def compute_from_step_with_bom(
+        self,
+        step_path: Path | str,
+        bom_entries: Mapping[str, BOMEntry],
+        link_name: str,
+        report: InertiaReport,
+    ) -> InertialProperties:
+        """The whole file as one link, masses by BOM; results and warnings go into ``report`` as well.
+
+        ``bom_entries``: what :class:`BOMParser` gives (all rows are used then), or any mapping name → entry.
+        """
+        assembly = self._read(step_path)
+        claims = _everything(assembly, link_name)
+        one = _run(assembly, as_table(bom_entries), self.task, claims, InertiaReport())
+        report.links.update(one.links)
+        report.link_properties.update(one.link_properties)
+        for w in one.warnings:
+            report.add_warning(w.link_name or link_name, w.part_name, w.message, w.code)
+        return one.link_properties[link_name]
+
+    def _read(self, path: Path | str) -> Assembly:
+        return read_geometry(path, self._read_options)
+
+
+def compute_link_inertials(
+    step_path: Path | str,
+    bom_path: Path | str | None = None,
+    *,
+    links: LinkMap | Path | str | None = None,
+    density: float = 1000.0,
+    materials: MaterialTable | None = None,
+    step_density: bool = False,
+    frame: FrameChoice | str = FrameChoice.ASSEMBLY,
+    read_options: ReadOptions | None = None,
+) -> InertiaReport:
+    """Every link of an assembly file (spec bom-inertia, Task 5).
+
+    links
+        a link map or its file; None: each first-level sub-assembly is a link.
+    density
+        [kg/m^3] of parts that the BOM does not have.
+
+    Numbers are in the assembly's frame unless ``frame`` or the link map says otherwise.
+    """
+    if isinstance(links, (str, Path)):
+        links = read_link_map(links)
+    table = BOMParser().parse(bom_path) if bom_path is not None else None
+    task = Task(
+        materials if materials is not None else load_materials(),
+        Options(density, step_density),
+        links,
+        FrameChoice(frame),
+    )
+    return calculate(read_geometry(step_path, read_options), table, task)
+
+
+def read_geometry(path: Path | str, options: ReadOptions | None = None) -> Assembly:
+    """Geometry of a STEP, mesh or FCStd file; the kernel is imported only now."""
+    from silo.inertia import geometry
+
+    return geometry.read(path) if options is None else geometry.read(path, options=options)
+
+
+def _everything(assembly: Assembly, name: str) -> Claims:
+    return Claims({name: tuple(range(len(assembly.instances)))})

@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The machine names of what a mass calculation has to say; stable, part of the report's schema.
+
+A report's warnings carry these, or those of :class:`~silo.inertia.model.GeometryCode` and
+:class:`~silo.inertia.bom.BomCode`.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class MassCode(StrEnum):
+    """What was noticed while masses were found."""
+
+    # a mass by rule, with a gap in the data
+    NO_MASS_NO_MATERIAL = "no_mass_no_material"  # in the BOM with neither: zero
+    NOT_IN_BOM = "not_in_bom"  # default density
+    NO_BOM = "no_bom"  # no BOM was given: default density throughout
+    UNKNOWN_MATERIAL = "unknown_material"  # default density
+    ZERO_MASS = "bom_zero_mass"  # the BOM says 0 kg
+    NO_VOLUME = "no_volume"  # a material, but no solid to take a volume from: zero
+    POINT_MASS = "point_mass"  # a BOM mass without a solid: mass at one point, no inertia
+    # a mass that other data contradict
+    ROUNDED = "mass_rounded"  # the BOM's digits leave more than 2 % open
+    DIFFERS = "mass_differs"  # BOM mass against material times volume
+    ROW_TOTAL = "row_total"  # the BOM mass looks like that of the whole row
+    STEP_DENSITY = "step_density_differs"
+    SUB_ASSEMBLY = "sub_assembly_mass_differs"
+    SUB_ASSEMBLY_SHARED = "sub_assembly_mass_shared"  # a sub-assembly's mass spread over its parts by volume
+    # matching
+    AMBIGUOUS = "ambiguous"  # same name, and nothing to tell apart but the order
+    COUNT_DIFFERS = "count_differs"
+    ROW_UNUSED = "row_unused"
+    # links
+    UNCLAIMED = "unclaimed"
+    CLAIMED_TWICE = "claimed_twice"
+    PATTERN_UNUSED = "pattern_unused"
+    ZERO_MASS_LINK = "zero_mass_link"
+    BAD_TENSOR = "bad_tensor"
+
+
+class Source(StrEnum):
+    """Where a part's mass comes from, best first (spec bom-inertia, "Solution")."""
+
+    BOM_MASS = "bom_mass"
+    MATERIAL = "material"
+    SUB_ASSEMBLY_MASS = "sub_assembly_mass"  # the BOM has a mass for the sub-assembly around it only
+    STEP_DENSITY = "step_density"  # only where the user asks for it
+    DEFAULT_DENSITY = "default_density"
+    ZERO = "zero"
+
+
+class Rule(StrEnum):
+    """How a part found its BOM row."""
+
+    EXACT = "exact"
+    NORMALISED = "normalised"
+    WILDCARD = "wildcard"
+    PART_NUMBER = "part_number"
+    SUB_ASSEMBLY = "sub_assembly"  # by the row of the sub-assembly around it
+    NONE = "none"
+
+
+class Decided(StrEnum):
+    """What told apart several parts or rows of one name."""
+
+    ONLY = "only"  # nothing to tell apart
+    SAME_DATA = "same_data"  # several rows that say the same
+    PARENT = "parent"  # the sub-assembly around it
+    QUANTITY = "quantity"
+    MASS = "mass"  # density times volume fits one row's mass only
+    REMAINING = "remaining"  # the last part and the last row
+    ORDER = "order"  # nothing but the order; told as ambiguous

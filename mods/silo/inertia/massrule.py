@@ -1,0 +1,277 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""One product's mass by the spec's rule, and everything that speaks against it. Pure.
+
+    BOM mass → material × volume → zero and a warning; not in the BOM: default density and a warning.
+
+The density that a geometry file states never outranks the BOM. It is compared, and used in the place of the
+default (or of zero) only where the user asks for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+from silo.inertia.codes import Decided, MassCode, Rule, Source
+from silo.inertia.matching import Match
+from silo.inertia.materials import MaterialHit, MaterialTable
+from silo.inertia.model import Prototype
+from silo.inertia.names import suggestions
+
+ROUNDING_LIMIT = 0.02
+"""A quantum above this share of the mass is told."""
+
+MISMATCH_LIMIT = 0.05
+"""Mass against density times volume, and STEP density against the one used: above this share is told."""
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """Code (:class:`MassCode` or a geometry code) and one sentence."""
+
+    code: str
+    message: str
+
+
+@dataclass(frozen=True)
+class Options:
+    """How gaps in the data are filled.
+
+    default_density
+        [kg/m^3] of parts that the BOM does not have, and of unknown materials.
+    step_density
+        use the density of the geometry file before the default and before zero (a tier of its own).
+    """
+
+    default_density: float = 1000.0
+    step_density: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Decision:
+    """Where a product's mass comes from.
+
+    mass_kg
+        of one piece, where it is given as such; else None and ``density`` [kg/m^3] times volume it is.
+    material, material_name, density_source
+        the BOM's text, the table's row it was understood as, and where its density comes from.
+    """
+
+    source: Source
+    rule: Rule = Rule.NONE
+    decided: Decided = Decided.ONLY
+    mass_kg: float | None = None
+    density: float | None = None
+    quantum_kg: float = 0.0
+    material: str | None = None
+    material_name: str | None = None
+    density_source: str = ""
+    lines: tuple[int, ...] = ()
+    notes: tuple[Note, ...] = ()
+
+    @property
+    def informed(self) -> bool:
+        """True where the BOM itself has a mass or a material for the product."""
+        return self.source in (Source.BOM_MASS, Source.MATERIAL) or self.material is not None
+
+
+@dataclass(frozen=True, eq=False)
+class MassRule:
+    """Decides for one product after the other. ``names``: all BOM names, to propose one of them."""
+
+    materials: MaterialTable
+    options: Options = field(default_factory=Options)
+    names: Sequence[str] = ()
+    has_bom: bool = True
+
+    def density_of(self, material: str | None) -> float | None:
+        """[kg/m^3] of a material text, None where it is not understood."""
+        if material is None:
+            return None
+        answer = self.materials.find(material)
+        return answer.material.density if isinstance(answer, MaterialHit) else None
+
+    def decide(self, prototype: Prototype, match: Match | None) -> Decision:
+        """The mass of one piece of ``prototype``, by the first rule that applies."""
+        if match is None:
+            return self._without_row(prototype)
+        row = match.row
+        base = Decision(
+            source=Source.ZERO,
+            rule=match.rule,
+            decided=match.decided,
+            material=row.material,
+            lines=tuple(r.line for r in match.bundle.rows),
+            notes=(Note(MassCode.AMBIGUOUS, match.doubt),) if match.doubt else (),
+        )
+        if row.mass_kg is not None:
+            return self._bom_mass(base, prototype, match)
+        if row.material is not None:
+            return self._material(base, prototype, row.material)
+        return self._neither(base, prototype)
+
+    def _bom_mass(self, base: Decision, prototype: Prototype, match: Match) -> Decision:
+        row = match.row
+        mass = row.mass_kg or 0.0
+        material = self.materials.find(row.material) if row.material is not None else None
+        known = material.material if isinstance(material, MaterialHit) else None
+        notes = [
+            *base.notes,
+            *_mass_notes(mass, row.quantum_kg, prototype),
+            *self._against_material(prototype, match, known.density if known else None),
+        ]
+        return _with(
+            base,
+            source=Source.BOM_MASS,
+            mass_kg=mass,
+            quantum_kg=row.quantum_kg,
+            material_name=known.name if known else None,
+            notes=tuple(notes),
+        )
+
+    def _against_material(self, prototype: Prototype, match: Match, density: float | None) -> Iterator[Note]:
+        row = match.row
+        rho, words = (density, f"{row.material} ({density:g} kg/m³)") if density else (None, "")
+        if rho is None and prototype.step_density is not None:
+            rho, words = prototype.step_density, f"the file's {prototype.step_density:g} kg/m³"
+        if rho is None or prototype.volume_m3 <= 0 or not row.mass_kg:
+            return
+        expected = rho * prototype.volume_m3
+        allowed = max(row.quantum_kg, MISMATCH_LIMIT * row.mass_kg)
+        if abs(expected - row.mass_kg) <= allowed:
+            return
+        pieces = next((q for q in match.bundle.quantities if _is_multiple(row.mass_kg, expected, q)), None)
+        if pieces is not None:
+            yield Note(
+                MassCode.ROW_TOTAL,
+                f"the BOM's {row.mass_kg:.6g} kg is {pieces:g} times what {words} gives ({expected:.6g} kg), "
+                "and the quantity is the same: this looks like the mass of the whole row. "
+                "It was used as that of one piece",
+            )
+            return
+        yield Note(
+            MassCode.DIFFERS,
+            f"the BOM says {row.mass_kg:.6g} kg, but {words} times the volume gives {expected:.6g} kg "
+            f"({expected / row.mass_kg - 1:+.0%}); the BOM's mass was used",
+        )
+
+    def _material(self, base: Decision, prototype: Prototype, text: str) -> Decision:
+        answer = self.materials.find(text)
+        if isinstance(answer, MaterialHit):
+            found = answer.material
+            density, name, source = found.density, found.name, found.source
+            notes = [*base.notes, *_step_notes(prototype, density, name)]
+        elif self.options.step_density and prototype.step_density is not None:
+            density, name, source = prototype.step_density, None, "the geometry file"
+            why = f"the density in the file ({density:g} kg/m³) was used"
+            notes = [*base.notes, _unknown(text, answer.reason, why)]
+        else:
+            density, name, source = self.options.default_density, None, "default"
+            why = f"the default density ({density:g} kg/m³) was used"
+            notes = [*base.notes, _unknown(text, answer.reason, why)]
+        if not prototype.volume_m3:
+            notes.append(_no_volume(prototype))
+        known = isinstance(answer, MaterialHit)
+        fallback = Source.STEP_DENSITY if source == "the geometry file" else Source.DEFAULT_DENSITY
+        return _with(
+            base,
+            source=Source.MATERIAL if known else fallback,
+            density=density,
+            material_name=name,
+            density_source=source,
+            notes=tuple(notes),
+        )
+
+    def _neither(self, base: Decision, prototype: Prototype) -> Decision:
+        if self.options.step_density and prototype.step_density is not None:
+            note = Note(
+                MassCode.NO_MASS_NO_MATERIAL,
+                "No mass or material assigned in the BOM; "
+                f"the density in the file ({prototype.step_density:g} kg/m³) was used",
+            )
+            return self._from_file(base, prototype, (*base.notes, note))
+        hint = ""
+        if prototype.step_density is not None:
+            hint = f" (the file states {prototype.step_density:g} kg/m³)"
+        note = Note(MassCode.NO_MASS_NO_MATERIAL, f"No mass or material assigned: counted as 0 kg{hint}")
+        return _with(base, source=Source.ZERO, mass_kg=0.0, notes=(*base.notes, note))
+
+    def _without_row(self, prototype: Prototype) -> Decision:
+        stated = prototype.step_density
+        base = Decision(source=Source.DEFAULT_DENSITY)
+        message = "Part not found in BOM" if self.has_bom else "There is no BOM"
+        alike = suggestions(prototype.name, self.names) if self.has_bom else ()
+        if alike:
+            message += ", which has " + ", ".join(f"“{name}”" for name in alike)
+        if self.options.step_density and stated is not None:
+            # Without a BOM the file's density is what was asked for, and nothing to warn of.
+            words = f"{message}; the density in the file ({stated:g} kg/m³) was used"
+            notes = [Note(MassCode.NOT_IN_BOM, words)] if self.has_bom else []
+            return self._from_file(base, prototype, tuple(notes))
+        if stated is not None:
+            message += f", though the file states {stated:g} kg/m³"
+        density = self.options.default_density
+        code = MassCode.NOT_IN_BOM if self.has_bom else MassCode.NO_BOM
+        notes = [Note(code, f"{message}; the default density ({density:g} kg/m³) was used")]
+        if not prototype.volume_m3:
+            notes.append(_no_volume(prototype))
+        return _with(base, density=density, density_source="default", notes=tuple(notes))
+
+    def _from_file(self, base: Decision, prototype: Prototype, notes: tuple[Note, ...]) -> Decision:
+        return _with(
+            base,
+            source=Source.STEP_DENSITY,
+            density=prototype.step_density,
+            material_name=prototype.step_material,
+            density_source="the geometry file",
+            notes=notes if prototype.volume_m3 else (*notes, _no_volume(prototype)),
+        )
+
+
+def _mass_notes(mass: float, quantum: float, prototype: Prototype) -> Iterator[Note]:
+    if mass == 0:
+        yield Note(
+            MassCode.ZERO_MASS,
+            f"the BOM says 0 kg (± {quantum:.3g} kg): it is lighter than the BOM shows, or it was zeroed",
+        )
+    elif quantum > ROUNDING_LIMIT * mass:
+        yield Note(
+            MassCode.ROUNDED,
+            f"the BOM's {mass:.6g} kg is rounded to ± {quantum:.3g} kg ({quantum / mass:.0%})",
+        )
+    if mass > 0 and not prototype.volume_m3:
+        yield Note(
+            MassCode.POINT_MASS,
+            "there is no solid to spread the BOM's mass over; it was put at one point, without own inertia",
+        )
+
+
+def _step_notes(prototype: Prototype, density: float, name: str) -> Iterator[Note]:
+    stated = prototype.step_density
+    if stated is not None and abs(stated - density) > MISMATCH_LIMIT * density:
+        yield Note(
+            MassCode.STEP_DENSITY,
+            f"the file states {stated:g} kg/m³{_named(prototype.step_material)}, "
+            f"{name} has {density:g} kg/m³; the BOM's material was used",
+        )
+
+
+def _named(material: str | None) -> str:
+    return f" ({material})" if material else ""
+
+
+def _unknown(text: str, reason: str, what: str) -> Note:
+    return Note(MassCode.UNKNOWN_MATERIAL, f"Unknown material '{text}': {reason}; {what}")
+
+
+def _no_volume(prototype: Prototype) -> Note:
+    kind = "no solid" if not prototype.has_solid else "no volume"
+    return Note(MassCode.NO_VOLUME, f"the part has {kind} to multiply a density with: counted as 0 kg")
+
+
+def _is_multiple(mass: float, expected: float, quantity: float) -> bool:
+    return quantity >= 2 and abs(mass / expected - quantity) <= MISMATCH_LIMIT * quantity
+
+
+def _with(decision: Decision, **changes: object) -> Decision:
+    return Decision(**{**decision.__dict__, **changes})

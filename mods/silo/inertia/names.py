@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""When two names mean the same part. Equal, equal but for writing, equal but for lost characters. Pure.
+
+A name inside another never counts ("arm" in "forearm"), nor does likeness: M3x10 and M3x12 score 80 of 100,
+bracket_2 and bracket_3 score 89. Likeness only proposes, and only where all digits agree.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Iterable
+from functools import lru_cache
+
+SUGGEST_FROM = 90.0
+"""rapidfuzz WRatio (0 to 100) from which a name is proposed to the person."""
+
+LOST = "\ufffd"
+"""What stands for an unreadable character; a plain question mark may as well."""
+
+_SEPARATORS = re.compile(r"[\s_\-‐‑–]+")
+_OCCURRENCE = re.compile(r"(?:\s*<\d+>|\s+\(\d+\)|:\d+)$")
+_LOST_RUN = re.compile(rf"[?{LOST}]+")
+
+
+def plain(name: str) -> str:
+    """NFKC, case-folded; underscores, hyphens and runs of spaces are one space."""
+    return _separated(unicodedata.normalize("NFKC", name).casefold())
+
+
+def bare(name: str) -> str:
+    """As :func:`plain`, without one occurrence mark at the end: ``<2>``, `` (1)``, ``:3``.
+
+    ``_10`` stays: it is part of real part names ("BALL_JHA17.step_10").
+    """
+    return plain(_OCCURRENCE.sub("", name.strip()))
+
+
+def is_lossy(name: str) -> bool:
+    """True where characters were lost on the way: "?" or U+FFFD."""
+    return _LOST_RUN.search(name) is not None
+
+
+def could_be(lossy: str, intact: str) -> bool:
+    """True where ``lossy`` is ``intact`` with characters lost.
+
+    Only characters outside ASCII get lost, so that "M?" is never "M3". A run of k marks stands for one to k
+    of them (é may become one mark or two). Both compositions of accents are tried.
+    """
+    pattern = _lossy_pattern(lossy)
+    return any(pattern.fullmatch(_fold(intact, form)) is not None for form in ("NFC", "NFD"))
+
+
+@lru_cache(maxsize=4096)
+def _lossy_pattern(lossy: str) -> re.Pattern[str]:
+    text = _fold(lossy, "NFC")
+    pattern = ""
+    end = 0
+    for run in _LOST_RUN.finditer(text):
+        pattern += re.escape(text[end : run.start()]) + rf"[^\x00-\x7f]{{1,{len(run[0])}}}"
+        end = run.end()
+    return re.compile(pattern + re.escape(text[end:]))
+
+
+def _fold(name: str, form: str) -> str:
+    # NFKC would turn ™ into the letters TM, which no mark stands for.
+    normal = unicodedata.normalize("NFC" if form == "NFC" else "NFD", name)
+    return _separated(normal.lower())
+
+
+def _separated(text: str) -> str:
+    return _SEPARATORS.sub(" ", text).strip()
+
+
+def digits(name: str) -> tuple[str, ...]:
+    """All runs of digits in a name, in order."""
+    return tuple(re.findall(r"\d+", name))
+
+
+def suggestions(name: str, candidates: Iterable[str], limit: int = 3) -> tuple[str, ...]:
+    """Names a person may have meant: alike by rapidfuzz, all digits equal. For messages only."""
+    from rapidfuzz import fuzz, process
+
+    fitting = [c for c in dict.fromkeys(candidates) if digits(c) == digits(name)]
+    found = process.extract(
+        name, fitting, scorer=fuzz.WRatio, processor=plain, limit=limit, score_cutoff=SUGGEST_FROM
+    )
+    return tuple(choice for choice, _, _ in found)

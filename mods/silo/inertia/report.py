@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The report: results per link and part, and every warning with link, part and code (spec, Task 2)."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from silo.inertia.codes import Decided, Rule, Source
+from silo.inertia.types import InertialProperties
+
+if TYPE_CHECKING:
+    from silo.inertia.core import MassProps, TensorProblem
+    from silo.inertia.frames import LinkFrame
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class PartWarning:
+    """A warning about one part of one link; ``link_name`` or ``part_name`` is "" where it is about none."""
+
+    link_name: str
+    part_name: str
+    message: str
+    code: str = "note"
+
+
+@dataclass(frozen=True)
+class PartResult:
+    """Equal pieces of one product in one link.
+
+    mass, total_mass
+        of one piece and of all [kg].
+    volume
+        of one piece [m^3].
+    paths
+        instance paths of the pieces, ``/`` between levels.
+    material, material_name
+        the BOM's text, and the row of the material table it was understood as.
+    density
+        [kg/m^3] that was used, or that the given mass amounts to; None without a volume.
+    quantum
+        the BOM mass is ``mass`` ± this [kg]; 0 where the mass is no rounded figure.
+    lines
+        BOM lines it came from.
+    """
+
+    name: str
+    paths: tuple[str, ...]
+    mass: float
+    volume: float
+    source: Source
+    rule: Rule
+    decided_by: Decided
+    material: str | None = None
+    material_name: str | None = None
+    density: float | None = None
+    density_source: str = ""
+    quantum: float = 0.0
+    part_number: str = ""
+    lines: tuple[int, ...] = ()
+    warnings: tuple[PartWarning, ...] = ()
+
+    @property
+    def quantity(self) -> int:
+        """How many pieces."""
+        return len(self.paths)
+
+    @property
+    def total_mass(self) -> float:
+        """[kg] of all pieces."""
+        return self.mass * self.quantity
+
+
+@dataclass(frozen=True, eq=False)
+class LinkResult:
+    """One link: its mass properties in its frame, its parts, and what is wrong with its tensor."""
+
+    name: str
+    props: MassProps
+    frame: LinkFrame
+    parts: tuple[PartResult, ...] = ()
+    problems: tuple[TensorProblem, ...] = ()
+
+
+@dataclass
+class InertiaReport:
+    """What a calculation found. Filled once, in a stable order: links as mapped, parts as placed.
+
+    link_properties
+        link → the spec's plain values, in the link's frame.
+    links
+        link → everything about it.
+    unclaimed
+        parts that no link has; not in any link's mass.
+    total
+        the whole assembly in its own frame, unclaimed parts included; None before a calculation.
+    assembly, source, bom
+        name and file of the geometry, file of the BOM ("" without one).
+    """
+
+    link_properties: dict[str, InertialProperties] = field(default_factory=dict)
+    warnings: list[PartWarning] = field(default_factory=list)
+    links: dict[str, LinkResult] = field(default_factory=dict)
+    unclaimed: tuple[PartResult, ...] = ()
+    total: MassProps | None = None
+    assembly: str = ""
+    source: str = ""
+    bom: str = ""
+    default_density: float = 1000.0
+    _told: set[PartWarning] = field(default_factory=set, init=False, repr=False, compare=False)
+
+    def add_warning(self, link_name: str, part_name: str, message: str, code: str = "note") -> None:
+        """Add a warning; the same one twice is kept once."""
+        warning = PartWarning(link_name, part_name, message, code)
+        if warning not in self._told:
+            self._told.add(warning)
+            self.warnings.append(warning)
+
+    def get_summary(self) -> str:
+        """All warnings by link, in words."""
+        if not self.warnings:
+            return "No warnings: every part has its mass from the BOM."
+        count = len(self.warnings)
+        lines = [f"{count} {'warning' if count == 1 else 'warnings'}:"]
+        by_link: dict[str, list[PartWarning]] = {}
+        for warning in self.warnings:
+            by_link.setdefault(warning.link_name, []).append(warning)
+        for link, warnings in by_link.items():
+            lines.append(f"\n  {link or 'whole assembly'}:")
+            lines += [
+                f"    - {w.part_name}: {w.message}" if w.part_name else f"    - {w.message}" for w in warnings
+            ]
+        return "\n".join(lines)
+
+    def print_summary(self) -> None:
+        """Send the summary to the log: as a warning where there are any."""
+        if self.warnings:
+            logger.warning(self.get_summary())
+        else:
+            logger.info(self.get_summary())
+
+    def parts(self) -> tuple[tuple[str, PartResult], ...]:
+        """(link, part) of everything, links first, then the unclaimed ones under ""."""
+        rows = [(link.name, part) for link in self.links.values() for part in link.parts]
+        return (*rows, *(("", part) for part in self.unclaimed))
