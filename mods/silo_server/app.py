@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The application: its parts put together once, here."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Any
+
+from fastapi import FastAPI
+from fastapi.openapi.utils import get_openapi
+
+from silo_server import failures
+from silo_server.clock import Clock, utc_now
+from silo_server.db.engine import Database
+from silo_server.events.hub import Hub
+from silo_server.files import FileStore
+from silo_server.middleware import BodyLimit, SecurityHeaders
+from silo_server.routes import auth, bom, items, pages, revisions, system
+from silo_server.routes.context import Server
+from silo_server.settings import Settings, settings_from_environment
+
+VERSION = "0.1.0"
+# Routes are matched in this order; /items/by-uuid and /items/search stand before /items/{part_number}.
+ROUTERS = (system.router, auth.router, items.router, revisions.router, bom.router, pages.router)
+
+
+def create_app(settings: Settings, clock: Clock = utc_now) -> FastAPI:
+    """The server as an ASGI application; ``bootstrap.prepare`` has brought the database up to date."""
+    db = Database(settings, clock)
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        hub = Hub(db)
+        app.state.server = Server(settings, db, hub, FileStore(settings.storage))
+        await hub.start()
+        yield
+        await hub.stop()
+        db.close()
+
+    # The interactive pages of FastAPI load scripts from elsewhere, which our CSP forbids; the document stays.
+    app = FastAPI(
+        title="silo-mod server",
+        version=VERSION,
+        openapi_url="/api/openapi.json",
+        docs_url=None,
+        redoc_url=None,
+        lifespan=lifespan,
+    )
+    for router in ROUTERS:
+        app.include_router(router)
+    failures.install(app)
+    app.add_middleware(BodyLimit, settings=settings)
+    app.add_middleware(SecurityHeaders)
+    app.openapi = lambda: _openapi(app)  # type: ignore[method-assign]
+    return app
+
+
+def app_from_environment() -> FastAPI:
+    """For other ASGI servers: ``uvicorn --factory silo_server.app:app_from_environment``."""
+    return create_app(settings_from_environment())
+
+
+def _openapi(app: FastAPI) -> dict[str, Any]:
+    if app.openapi_schema is None:
+        document = get_openapi(title=app.title, version=app.version, routes=app.routes)
+        for operations in document["paths"].values():
+            for operation in operations.values():
+                # We answer 400 where FastAPI by itself would answer 422.
+                operation.get("responses", {}).pop("422", None)
+        for name in ("HTTPValidationError", "ValidationError"):
+            document.get("components", {}).get("schemas", {}).pop(name, None)
+        app.openapi_schema = document
+    return app.openapi_schema

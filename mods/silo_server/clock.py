@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Time as the server stores and tells it: UTC, ISO 8601."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import UTC, datetime
+
+Clock = Callable[[], datetime]
+
+
+def utc_now() -> datetime:
+    """Now, in UTC."""
+    return datetime.now(UTC)
+
+
+def stamp(when: datetime) -> str:
+    """As stored: microseconds always, so that text order is time order (``2026-02-08T22:15:00.000000Z``)."""
+    return when.astimezone(UTC).strftime("%Y-%m-%dT%H:%M:%S.%fZ")
+
+
+def wire(stored: str | None) -> str | None:
+    """As told to clients: whole seconds, the spec's form (``2026-02-08T22:15:00Z``)."""
+    return None if stored is None else stored[:19] + "Z"

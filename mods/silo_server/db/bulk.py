@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Many rows in one statement, by the quick way of each database.
+
+SQLite: ``executemany`` of a prepared statement, sets as one JSON parameter. PostgreSQL: arrays through
+``UNNEST``, one round trip however many rows there are.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
+
+from sqlalchemy import (
+    Column,
+    ColumnElement,
+    Table,
+    TableValuedAlias,
+    any_,
+    bindparam,
+    cast,
+    func,
+    insert,
+    literal,
+    select,
+    update,
+)
+from sqlalchemy.dialects.postgresql import ARRAY
+
+from silo_server.db.engine import Tx
+
+
+def one_of(tx: Tx, column: ColumnElement[Any], values: Collection[Any]) -> ColumnElement[bool]:
+    """``column`` is one of ``values``, as one parameter however many there are."""
+    listed = list(values)
+    if tx.postgres:
+        return column == any_(cast(literal(listed, ARRAY(column.type)), ARRAY(column.type)))
+    each = func.json_each(json.dumps(listed)).table_valued("value")
+    return column.in_(select(each.c.value))
+
+
+def insert_rows(tx: Tx, table: Table, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Insert all ``rows`` (same keys each) into ``table``."""
+    if not rows:
+        return
+    if not tx.postgres:
+        tx.conn.execute(insert(table), [dict(row) for row in rows])
+        return
+    names = list(rows[0])
+    source = _unnest(table, names, rows)
+    tx.conn.execute(insert(table).from_select(names, select(*[source.c[name] for name in names])))
+
+
+def update_rows(tx: Tx, table: Table, key: str, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Set the other columns of each row where ``table.key`` is the row's ``key``."""
+    if not rows:
+        return
+    names = [name for name in rows[0] if name != key]
+    if tx.postgres:
+        source = _unnest(table, [key, *names], rows)
+        changes = {name: source.c[name] for name in names}
+        tx.conn.execute(update(table).where(table.c[key] == source.c[key]).values(changes))
+        return
+    statement = (
+        update(table)
+        .where(table.c[key] == bindparam("by_key"))
+        .values({name: bindparam(f"to_{name}") for name in names})
+    )
+    tx.conn.execute(
+        statement, [{"by_key": row[key], **{f"to_{name}": row[name] for name in names}} for row in rows]
+    )
+
+
+def _unnest(table: Table, names: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> TableValuedAlias:
+    columns: list[Column[Any]] = [table.c[name] for name in names]
+    arrays = [
+        cast(bindparam(None, [row[c.name] for row in rows], ARRAY(c.type)), ARRAY(c.type)) for c in columns
+    ]
+    return func.unnest(*arrays).table_valued(*[_plain(c) for c in columns], name="given").render_derived()
+
+
+def _plain(column: Column[Any]) -> Column[Any]:
+    return Column(column.name, column.type)

@@ -1,0 +1,267 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The tables, once for SQLite and PostgreSQL.
+
+Rules of this module:
+
+* JSON is kept as text and written by us, so that both databases give back what was stored;
+* times are ISO 8601 text in UTC with microseconds (``clock.stamp``), which sorts as it reads on both;
+* `*_key` columns hold the case-folded form that is unique and looked up by;
+* history (``bom_changes``, ``bom_change_lines``) and ``audit`` are only ever inserted into.
+"""
+
+from __future__ import annotations
+
+from sqlalchemy import (
+    BigInteger,
+    Boolean,
+    Column,
+    Float,
+    ForeignKey,
+    Index,
+    Integer,
+    MetaData,
+    String,
+    Table,
+    Text,
+    UniqueConstraint,
+)
+
+metadata = MetaData(
+    naming_convention={
+        "ix": "ix_%(table_name)s_%(column_0_N_name)s",
+        "uq": "uq_%(table_name)s_%(column_0_N_name)s",
+        "fk": "fk_%(table_name)s_%(column_0_name)s_%(referred_table_name)s",
+        "pk": "pk_%(table_name)s",
+    }
+)
+
+# SQLite gives out row ids (and never reuses one) only for a column of exactly INTEGER.
+Id = BigInteger().with_variant(Integer, "sqlite")
+Stamp = String(32)
+Uuid = String(36)
+
+server_state = Table(
+    "server_state",
+    metadata,
+    Column("key", String(64), primary_key=True),
+    Column("value", Text, nullable=False),
+)
+
+items = Table(
+    "items",
+    metadata,
+    Column("id", Id, primary_key=True),
+    Column("uuid", Uuid, nullable=False, unique=True),
+    Column("part_number", String(64), nullable=False),
+    Column("part_number_key", String(64), nullable=False, unique=True),
+    Column("schema_name", String(64)),
+    Column("category", String(32)),
+    Column("item_type", String(32), nullable=False),
+    Column("name", Text, nullable=False),
+    Column("description", Text, nullable=False),
+    Column("search_key", Text, nullable=False),
+    Column("sourcing_type", String(64)),
+    Column("long_description", Text),
+    Column("thumbnail_key", String(64)),
+    Column("properties", Text, nullable=False),
+    Column("current_revision", Integer, nullable=False),
+    Column("bom_version", Integer, nullable=False),
+    Column("created_at", Stamp, nullable=False),
+    Column("created_by", String(64), nullable=False),
+    Column("updated_at", Stamp, nullable=False),
+    Column("updated_by", String(64), nullable=False),
+    Column("archived_at", Stamp),
+    sqlite_autoincrement=True,
+)
+
+number_counters = Table(
+    "number_counters",
+    metadata,
+    Column("schema_name", String(64), primary_key=True),
+    Column("category", String(32), primary_key=True),
+    Column("last_serial", Integer, nullable=False),
+)
+
+revisions = Table(
+    "revisions",
+    metadata,
+    Column("id", Id, primary_key=True),
+    Column("item_id", Id, ForeignKey("items.id"), nullable=False),
+    Column("revision_number", Integer, nullable=False),
+    Column("properties", Text, nullable=False),
+    Column("comment", Text, nullable=False),
+    Column("status", String(16), nullable=False),
+    Column("file_name", Text),
+    Column("file_checksum", String(64)),
+    Column("file_size", BigInteger),
+    Column("thumbnail_key", String(64)),
+    Column("created_at", Stamp, nullable=False),
+    Column("created_by", String(64), nullable=False),
+    UniqueConstraint("item_id", "revision_number"),
+    Index(None, "file_checksum"),
+    sqlite_autoincrement=True,
+)
+
+bom_lines = Table(
+    "bom_lines",
+    metadata,
+    Column("id", Uuid, primary_key=True),
+    Column("parent_id", Id, ForeignKey("items.id"), nullable=False),
+    Column("child_id", Id, ForeignKey("items.id"), nullable=False),
+    Column("position", Integer, nullable=False),
+    Column("rel_type", String(16), nullable=False),
+    Column("quantity", Float(53), nullable=False),
+    Column("unit", String(32)),
+    Column("reference_designators", Text, nullable=False),
+    Column("find_number", String(32)),
+    Column("notes", Text),
+    Column("child_revision", Integer),
+    Column("source", String(16), nullable=False),
+    Column("unreferenced_since", Stamp),
+    Column("override", Boolean, nullable=False),
+    Column("cad_quantity", Float(53)),
+    Column("reason", Text),
+    Column("metadata", Text, nullable=False),
+    UniqueConstraint("parent_id", "child_id", "rel_type"),
+    Index(None, "child_id"),
+)
+
+bom_changes = Table(
+    "bom_changes",
+    metadata,
+    Column("id", Id, primary_key=True),
+    Column("parent_id", Id, ForeignKey("items.id"), nullable=False),
+    Column("version", Integer, nullable=False),
+    Column("kind", String(16), nullable=False),
+    Column("at", Stamp, nullable=False),
+    Column("username", String(64), nullable=False),
+    Column("summary", Text, nullable=False),
+    Column("reason", Text),
+    Column("document_file", Text),
+    Column("document_sha256", String(64)),
+    Column("document_revision", Integer),
+    Column("sync_id", String(128)),
+    Column("refers_to", Id),
+    Column("decisions", Text),
+    Index(None, "parent_id", "id"),
+    sqlite_autoincrement=True,
+)
+
+bom_change_lines = Table(
+    "bom_change_lines",
+    metadata,
+    Column("change_id", Id, ForeignKey("bom_changes.id"), primary_key=True),
+    Column("line_id", Uuid, primary_key=True),
+    Column("child_id", Id, nullable=False),
+    Column("action", String(16), nullable=False),
+    Column("before", Text),
+    Column("after", Text),
+)
+
+bom_syncs = Table(
+    "bom_syncs",
+    metadata,
+    Column("parent_id", Id, ForeignKey("items.id"), primary_key=True),
+    Column("sync_id", String(128), primary_key=True),
+    Column("request_hash", String(64), nullable=False),
+    Column("answer", Text, nullable=False),
+    Column("version", Integer, nullable=False),
+    Column("at", Stamp, nullable=False),
+    Index(None, "at"),
+)
+
+bom_conflicts = Table(
+    "bom_conflicts",
+    metadata,
+    Column("parent_id", Id, ForeignKey("items.id"), primary_key=True),
+    Column("child_id", Id, ForeignKey("items.id"), primary_key=True),
+    Column("cad_quantity", Float(53), nullable=False),
+    Column("since", Stamp, nullable=False),
+    Column("accepted", Boolean, nullable=False),
+)
+
+events = Table(
+    "events",
+    metadata,
+    Column("id", Id, primary_key=True),
+    Column("name", String(64), nullable=False),
+    Column("item_uuid", Uuid),
+    Column("part_number_key", String(64)),
+    Column("data", Text, nullable=False),
+    Column("at", Stamp, nullable=False),
+    sqlite_autoincrement=True,
+)
+
+users = Table(
+    "users",
+    metadata,
+    Column("id", Id, primary_key=True),
+    Column("username", String(64), nullable=False),
+    Column("username_key", String(64), nullable=False, unique=True),
+    Column("display_name", Text, nullable=False),
+    Column("role", String(16), nullable=False),
+    Column("password_hash", Text),
+    Column("active", Boolean, nullable=False),
+    Column("created_at", Stamp, nullable=False),
+    sqlite_autoincrement=True,
+)
+
+api_tokens = Table(
+    "api_tokens",
+    metadata,
+    Column("id", Id, primary_key=True),
+    Column("user_id", Id, ForeignKey("users.id"), nullable=False),
+    Column("name", Text, nullable=False),
+    Column("token_hash", String(64), nullable=False, unique=True),
+    Column("prefix", String(16), nullable=False),
+    Column("created_at", Stamp, nullable=False),
+    Column("expires_at", Stamp),
+    Column("last_used_at", Stamp),
+    Column("revoked_at", Stamp),
+    Index(None, "user_id"),
+    sqlite_autoincrement=True,
+)
+
+sessions = Table(
+    "sessions",
+    metadata,
+    Column("id_hash", String(64), primary_key=True),
+    Column("user_id", Id, ForeignKey("users.id"), nullable=False),
+    Column("csrf_token", String(64), nullable=False),
+    Column("created_at", Stamp, nullable=False),
+    Column("expires_at", Stamp, nullable=False),
+    Index(None, "user_id"),
+)
+
+login_links = Table(
+    "login_links",
+    metadata,
+    Column("token_hash", String(64), primary_key=True),
+    Column("user_id", Id, ForeignKey("users.id"), nullable=False),
+    Column("expires_at", Stamp, nullable=False),
+)
+
+login_failures = Table(
+    "login_failures",
+    metadata,
+    Column("id", Id, primary_key=True),
+    Column("username_key", String(64), nullable=False),
+    Column("address", String(64), nullable=False),
+    Column("at", Stamp, nullable=False),
+    Index(None, "username_key", "at"),
+    Index(None, "address", "at"),
+    sqlite_autoincrement=True,
+)
+
+audit = Table(
+    "audit",
+    metadata,
+    Column("id", Id, primary_key=True),
+    Column("at", Stamp, nullable=False),
+    Column("username", String(64), nullable=False),
+    Column("action", String(64), nullable=False),
+    Column("target", Text, nullable=False),
+    Column("detail", Text, nullable=False),
+    Column("address", String(64), nullable=False),
+    sqlite_autoincrement=True,
+)

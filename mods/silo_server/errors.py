@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The server's additions to the error tree: the same faults, with the HTTP status that is exact for them."""
+
+from __future__ import annotations
+
+from silo.bom.errors import AuthError, ConflictError, RejectedError, RemoteError
+
+
+class ForbiddenError(AuthError):
+    """403: known, but the role is too low (or the form's secret is missing)."""
+
+    status_hint = 403
+    code = "forbidden"
+
+
+class TooLargeError(RejectedError):
+    """413: more than the server takes in one request; the message names the limit."""
+
+    status_hint = 413
+    code = "too_large"
+
+
+class TooManyAttemptsError(RemoteError):
+    """429: too many failed logins; ``retry_after`` seconds until the next try is looked at."""
+
+    status_hint = 429
+    code = "too_many_attempts"
+
+    def __init__(self, message: str, retry_after: int) -> None:
+        super().__init__(message)
+        self.retry_after = retry_after
+
+
+class BusyError(RemoteError):
+    """503: the database cannot be reached or is too busy; the same request may succeed later."""
+
+    status_hint = 503
+    code = "unavailable"
+
+
+class DuplicateError(ConflictError):
+    """409: there is one already."""
+
+    code = "duplicate"

@@ -1,0 +1,249 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""One dispatcher per process, any number of listeners, no queue and no thread per listener.
+
+The log in the database is the truth. The hub keeps the newest part of it in memory (the ring) as ready-made
+frames and wakes all listeners when it grows. A listener is only a cursor, the id of the last event it was
+given; it takes what is newer from the ring, or, when it is too slow or was away, from the log. So a slow
+client blocks nobody, costs nothing and loses nothing; only one that is behind the log's horizon is told
+``reset`` and must read everything again.
+
+News arrive by a call after a commit in this process, by PostgreSQL's NOTIFY from another, and at the latest
+by the poll (``Settings.poll_seconds``).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import threading
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from sqlalchemy.exc import SQLAlchemyError
+
+from silo_server.db.engine import Database
+from silo_server.services import events as log
+from silo_server.services.events import LoggedEvent
+
+logger = logging.getLogger("silo_server.events")
+
+RING_EVENTS = 2048
+RING_BYTES = 16 * 1024 * 1024
+PAGE = 500
+# Trimming once in so many polls keeps the log near its size without looking at it all the time.
+TRIM_EVERY_POLLS = 600
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """An event as it goes over the wire, with what filters look at."""
+
+    id: int
+    item_uuid: str | None
+    part_number_key: str | None
+    payload: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """What a listener gets next: frames, its new cursor, and whether it must re-read everything first."""
+
+    frames: Sequence[Frame]
+    cursor: int
+    reset: bool = False
+
+
+def to_frame(event: LoggedEvent) -> Frame:
+    """``id:``, ``event:``, ``data:`` and an empty line; the data is JSON and so has no line break."""
+    payload = f"id: {event.id}\nevent: {event.name}\ndata: {event.data}\n\n".encode()
+    return Frame(event.id, event.item_uuid, event.part_number_key, payload)
+
+
+class Hub:
+    """The dispatcher of one process; lives on its event loop."""
+
+    def __init__(self, db: Database) -> None:
+        self._db = db
+        self._ring: deque[Frame] = deque()
+        self._ring_bytes = 0
+        self._ring_start = 0  # the ring holds every event with an id above this
+        self.head = 0
+        self.listeners = 0
+        self.closed = False
+        self.beats = 0
+        self._news = asyncio.Event()
+        self._poke = asyncio.Event()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._tasks: list[asyncio.Task[None]] = []
+        self._listener: _PostgresListener | None = None
+
+    async def start(self) -> None:
+        """Begin at the log's present end."""
+        self._loop = asyncio.get_running_loop()
+        self.head = self._ring_start = (await asyncio.to_thread(self._read_bounds))[1]
+        self._db.on_events = self.poke
+        if not self._db.settings.is_sqlite:
+            self._listener = _PostgresListener(self._db, self.poke)
+            self._listener.start()
+        self._tasks = [asyncio.create_task(self._dispatch()), asyncio.create_task(self._beat())]
+
+    async def stop(self) -> None:
+        """End all streams and the dispatcher."""
+        self.close()
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        if self._listener is not None:
+            await asyncio.to_thread(self._listener.stop)
+
+    def close(self) -> None:
+        """Let all listeners go; the server is about to stop."""
+        self.closed = True
+        self._wake()
+
+    def poke(self) -> None:
+        """There may be news in the log; may be called from any thread."""
+        if self._loop is not None and not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._poke.set)
+
+    async def wait(self) -> None:
+        """Until there is news, a heartbeat is due, or the hub closes."""
+        await self._news.wait()
+
+    async def take(self, cursor: int) -> Batch:
+        """What comes after ``cursor``: from the ring where it reaches back far enough, else from the log."""
+        if cursor >= self.head:
+            return Batch((), cursor)
+        if cursor >= self._ring_start:
+            return Batch(self._newer(cursor), self.head)
+        return await asyncio.to_thread(self._read_log, cursor)
+
+    def _newer(self, cursor: int) -> list[Frame]:
+        # From the new end: a thousand listeners look here for one event each time.
+        newer: list[Frame] = []
+        for frame in reversed(self._ring):
+            if frame.id <= cursor:
+                break
+            newer.append(frame)
+        newer.reverse()
+        return newer
+
+    async def place(self, last_event_id: int | None) -> tuple[int, bool]:
+        """(cursor to begin at, whether a ``reset`` is due) for a client that says what it saw last."""
+        if last_event_id is None:
+            return self.head, False
+        horizon, head = await asyncio.to_thread(self._read_bounds)
+        # An id from the future is of another database (or of the real Silo before a restart).
+        if last_event_id < horizon or last_event_id > max(head, self.head):
+            return max(head, self.head), True
+        return last_event_id, False
+
+    async def _dispatch(self) -> None:
+        polls = 0
+        while True:
+            try:
+                await asyncio.wait_for(self._poke.wait(), self._db.settings.poll_seconds)
+            except TimeoutError:
+                polls += 1
+            self._poke.clear()
+            try:
+                await self._read_news()
+                if polls >= TRIM_EVERY_POLLS:
+                    polls = 0
+                    await asyncio.to_thread(self._trim)
+            except SQLAlchemyError as error:
+                # The database is away; the poll finds out when it is back, and nothing is lost meanwhile.
+                logger.warning("the event log cannot be read at the moment: %s", type(error).__name__)
+
+    async def _read_news(self) -> None:
+        while True:
+            page = await asyncio.to_thread(self._read_page, self.head)
+            if not page:
+                return
+            for frame in page:
+                self._ring.append(frame)
+                self._ring_bytes += len(frame.payload)
+            while len(self._ring) > RING_EVENTS or (self._ring_bytes > RING_BYTES and len(self._ring) > 1):
+                gone = self._ring.popleft()
+                self._ring_bytes -= len(gone.payload)
+                self._ring_start = gone.id
+            self.head = page[-1].id
+            self._wake()
+
+    async def _beat(self) -> None:
+        while True:
+            await asyncio.sleep(self._db.settings.heartbeat_seconds)
+            self.beats += 1
+            self._wake()
+
+    def _wake(self) -> None:
+        # Everybody who waits now goes on; who comes later waits for the next time.
+        news, self._news = self._news, asyncio.Event()
+        if self.closed:
+            self._news.set()
+        news.set()
+
+    def _read_page(self, after: int) -> list[Frame]:
+        with self._db.read() as tx:
+            return [to_frame(event) for event in log.read_after(tx, after, PAGE)]
+
+    def _read_bounds(self) -> tuple[int, int]:
+        with self._db.read() as tx:
+            return log.bounds(tx)
+
+    def _read_log(self, cursor: int) -> Batch:
+        with self._db.read() as tx:
+            horizon, head = log.bounds(tx)
+            if cursor < horizon:
+                return Batch((), head, reset=True)
+            frames = [to_frame(event) for event in log.read_after(tx, cursor, PAGE)]
+        return Batch(frames, frames[-1].id if frames else head)
+
+    def _trim(self) -> None:
+        with self._db.write(even_when_read_only=True) as tx:
+            log.trim(tx, tx.settings.event_log_size)
+
+
+class _PostgresListener:
+    """A thread that waits for NOTIFY on its own connection and comes back when that is lost."""
+
+    def __init__(self, db: Database, heard: Callable[[], None]) -> None:
+        self._db = db
+        self._heard = heard
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="silo-listen", daemon=True)
+
+    def start(self) -> None:
+        self._thread.start()
+
+    def stop(self) -> None:
+        self._stopping.set()
+        self._thread.join(timeout=5)
+
+    def _run(self) -> None:
+        from psycopg import Error
+
+        while not self._stopping.is_set():
+            try:
+                self._listen()
+            except Error as error:
+                logger.warning(
+                    "listening to PostgreSQL was interrupted (%s), trying again", type(error).__name__
+                )
+                self._stopping.wait(1.0)
+
+    def _listen(self) -> None:
+        import psycopg
+
+        from silo_server.db.engine import EVENT_CHANNEL
+
+        url = self._db.engine.url.set(drivername="postgresql").render_as_string(hide_password=False)
+        with psycopg.connect(url, autocommit=True) as connection:
+            connection.execute(psycopg.sql.SQL("LISTEN {}").format(psycopg.sql.Identifier(EVENT_CHANNEL)))
+            self._heard()  # what happened before the LISTEN is in the log
+            while not self._stopping.is_set():
+                for _ in connection.notifies(timeout=0.5):
+                    self._heard()
+                    if self._stopping.is_set():
+                        return

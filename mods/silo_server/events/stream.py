@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""``GET /api/events`` as an ASGI response: replay, live events, filters, heartbeat, until the client goes."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from starlette.responses import Response
+from starlette.types import Receive, Scope, Send
+
+from silo_server.events.hub import Batch, Frame, Hub
+
+HEADERS = {
+    "cache-control": "no-store",
+    "x-accel-buffering": "no",  # nginx passes every event on at once
+}
+HELLO = b": connected\nretry: 2000\n\n"
+HEARTBEAT = b"event: heartbeat\ndata: {}\n\n"
+
+
+@dataclass(frozen=True, slots=True)
+class ItemFilter:
+    """Only events of these items (UUIDs or case-folded part numbers); empty = all.
+
+    Events of no item (``server.state``, ``reset``) always pass.
+    """
+
+    keys: frozenset[str] = frozenset()
+
+    def passes(self, frame: Frame) -> bool:
+        if not self.keys or (frame.item_uuid is None and frame.part_number_key is None):
+            return True
+        return frame.item_uuid in self.keys or frame.part_number_key in self.keys
+
+
+class EventStream(Response):
+    """The stream. ``last_event_id`` None = only what is new from now on.
+
+    ``still_allowed`` is asked with every heartbeat: a stream must not outlive the token that opened it.
+    """
+
+    media_type = "text/event-stream"
+
+    def __init__(
+        self,
+        hub: Hub,
+        last_event_id: int | None,
+        items: Sequence[str] = (),
+        still_allowed: Callable[[], bool] = lambda: True,
+    ) -> None:
+        super().__init__(headers=HEADERS)
+        del self.headers["content-length"]
+        self._hub = hub
+        self._last = last_event_id
+        self._still_allowed = still_allowed
+        self._filter = ItemFilter(frozenset(item.casefold() for item in items))
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        await send({"type": "http.response.start", "status": 200, "headers": self.raw_headers})
+        gone = asyncio.ensure_future(_disconnected(receive))
+        stream = asyncio.ensure_future(self._run(send))
+        self._hub.listeners += 1
+        try:
+            await asyncio.wait((gone, stream), return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            self._hub.listeners -= 1
+            gone.cancel()
+            stream.cancel()
+            results = await asyncio.gather(gone, stream, return_exceptions=True)
+        ended = results[1]
+        if isinstance(ended, Exception) and not isinstance(ended, OSError):
+            raise ended
+
+    async def _run(self, send: Send) -> None:
+        hub = self._hub
+        cursor, reset = await hub.place(self._last)
+        # The first bytes tell proxies and clients that the stream stands.
+        await _send(send, HELLO + (_reset(cursor) if reset else b""))
+        beats = hub.beats
+        while not hub.closed:
+            batch = await hub.take(cursor)
+            cursor = batch.cursor
+            payload = self._payload(batch)
+            if hub.beats != beats:
+                beats = hub.beats
+                payload = payload or HEARTBEAT
+                if not await asyncio.to_thread(self._still_allowed):
+                    break
+            if payload:
+                await _send(send, payload)
+            if cursor >= hub.head and beats == hub.beats and not hub.closed:
+                await hub.wait()
+        await send({"type": "http.response.body", "body": b"", "more_body": False})
+
+    def _payload(self, batch: Batch) -> bytes:
+        frames = b"".join(frame.payload for frame in batch.frames if self._filter.passes(frame))
+        return _reset(batch.cursor) + frames if batch.reset else frames
+
+
+def _reset(cursor: int) -> bytes:
+    return f"id: {cursor}\nevent: reset\ndata: {{}}\n\n".encode()
+
+
+async def _send(send: Send, payload: bytes) -> None:
+    await send({"type": "http.response.body", "body": payload, "more_body": True})
+
+
+async def _disconnected(receive: Receive) -> None:
+    while (await receive())["type"] != "http.disconnect":
+        pass

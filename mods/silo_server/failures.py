@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Every error of every route in one JSON shape (:class:`silo.api.wire.ErrorBody`); never a stack trace."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping, Sequence
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from sqlalchemy.exc import DataError, DBAPIError, IntegrityError, OperationalError, TimeoutError
+from starlette.exceptions import HTTPException
+from starlette.responses import JSONResponse, Response
+
+from silo.bom.errors import CycleError, ReadOnlyError, RejectedError, SiloError
+from silo_server.errors import BusyError, TooManyAttemptsError
+
+logger = logging.getLogger("silo_server")
+RETRY_SECONDS = "5"
+
+
+def install(app: FastAPI) -> None:
+    """Teach ``app`` the one shape."""
+    app.add_exception_handler(SiloError, _silo_error)
+    app.add_exception_handler(RequestValidationError, _validation_error)
+    app.add_exception_handler(HTTPException, _http_exception)
+    app.add_exception_handler(DBAPIError, _database_error)
+    app.add_exception_handler(TimeoutError, _database_error)
+    app.add_exception_handler(UnicodeEncodeError, _unicode_error)
+    app.add_exception_handler(Exception, _fault)
+
+
+def error_answer(
+    status: int,
+    code: str,
+    message: str,
+    *,
+    problems: Sequence[str] = (),
+    path: Sequence[str] = (),
+    headers: Mapping[str, str] | None = None,
+) -> Response:
+    """An error in the one shape; ``problems`` and ``path`` only where there are any."""
+    body: dict[str, Any] = {"error": code, "message": message}
+    if problems:
+        body["problems"] = list(problems)
+    if path:
+        body["path"] = list(path)
+    return JSONResponse(body, status, dict(headers) if headers else None)
+
+
+async def _silo_error(request: Request, error: Exception) -> Response:
+    assert isinstance(error, SiloError)
+    headers: dict[str, str] = {}
+    if error.status_hint == 401:
+        headers["WWW-Authenticate"] = "Bearer"
+    if isinstance(error, ReadOnlyError | BusyError):
+        headers["Retry-After"] = RETRY_SECONDS
+    if isinstance(error, TooManyAttemptsError):
+        headers["Retry-After"] = str(error.retry_after)
+    return error_answer(
+        error.status_hint,
+        error.code,
+        str(error),
+        problems=error.problems if isinstance(error, RejectedError) else (),
+        path=error.path if isinstance(error, CycleError) else (),
+        headers=headers,
+    )
+
+
+async def _validation_error(request: Request, error: Exception) -> Response:
+    assert isinstance(error, RequestValidationError)
+    problems = [_problem(entry) for entry in error.errors()]
+    return error_answer(400, "rejected", f"the request is unusable: {problems[0]}", problems=problems)
+
+
+def _problem(entry: Mapping[str, Any]) -> str:
+    where = [str(part) for part in entry["loc"] if part not in ("body", "query", "path", "header")]
+    return f"{'.'.join(where) or 'body'}: {entry['msg']}"
+
+
+async def _http_exception(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)
+    codes = {404: "not_found", 405: "method_not_allowed", 413: "too_large"}
+    message = str(error.detail)
+    if message == HTTPStatus(error.status_code).phrase:
+        message = f"{message}: {request.method} {request.url.path}"
+    code = codes.get(error.status_code, "rejected" if error.status_code < 500 else "server_fault")
+    return error_answer(error.status_code, code, message, headers=error.headers)
+
+
+async def _database_error(request: Request, error: Exception) -> Response:
+    if isinstance(error, DataError):
+        return error_answer(400, "rejected", "a value cannot be stored: it is too long, too large or no text")
+    if isinstance(error, IntegrityError):
+        return error_answer(409, "conflict", "somebody else changed the same thing just now; read it again")
+    if isinstance(error, OperationalError | TimeoutError):
+        logger.error("database: %s", type(error).__name__)
+        busy = BusyError("the database cannot be reached at the moment; nothing was changed, try again later")
+        return await _silo_error(request, busy)
+    return await _fault(request, error)
+
+
+async def _unicode_error(request: Request, error: Exception) -> Response:
+    return error_answer(400, "rejected", "a text in the request is no valid Unicode (a lone surrogate)")
+
+
+async def _fault(request: Request, error: Exception) -> Response:
+    logger.error("%s %s failed", request.method, request.url.path, exc_info=error)
+    return error_answer(500, "server_fault", "the server made a mistake; its log says more")

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Uploaded files, kept by their SHA-256: written once, never changed, never run, never named by a client."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import IO
+
+from silo.bom.errors import NotFoundError
+from silo_server.services.revisions import StoredFile
+
+CHUNK = 1024 * 1024
+THUMBNAIL = "thumbnails/Thumbnail.png"
+MAX_THUMBNAIL = 1024 * 1024
+PNG = b"\x89PNG\r\n\x1a\n"
+
+
+class FileStore:
+    """The store below ``root``; a file lies at ``ab/cd/<sha256>``."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+
+    def path_of(self, checksum: str) -> Path:
+        """Where the file with this hash lies; NotFoundError where it does not."""
+        path = self._place(checksum)
+        if not path.is_file():
+            raise NotFoundError(f"the file with SHA-256 {checksum} is not in this server's store")
+        return path
+
+    def keep(self, name: str, source: IO[bytes]) -> StoredFile:
+        """Store an upload; the same content is stored once. Extracts the thumbnail of an FCStd file."""
+        checksum, size = self._write(iter(lambda: source.read(CHUNK), b""))
+        thumbnail = read_thumbnail(self._place(checksum))
+        key = self._write([thumbnail])[0] if thumbnail else None
+        return StoredFile(clean_name(name), checksum, size, key)
+
+    def healthy(self) -> bool:
+        """True where the store can be written to."""
+        try:
+            self.root.mkdir(parents=True, exist_ok=True)
+        except OSError:
+            return False
+        return os.access(self.root, os.W_OK)
+
+    def _place(self, checksum: str) -> Path:
+        return self.root / checksum[:2] / checksum[2:4] / checksum
+
+    def _write(self, chunks: Iterable[bytes]) -> tuple[str, int]:
+        self.root.mkdir(parents=True, exist_ok=True)
+        digest, size = hashlib.sha256(), 0
+        handle, name = tempfile.mkstemp(dir=self.root, prefix="upload-")
+        temporary = Path(name)
+        try:
+            with os.fdopen(handle, "wb") as out:
+                for chunk in chunks:
+                    digest.update(chunk)
+                    size += len(chunk)
+                    out.write(chunk)
+                out.flush()
+                os.fsync(out.fileno())
+            target = self._place(digest.hexdigest())
+            target.parent.mkdir(parents=True, exist_ok=True)
+            os.replace(temporary, target)
+        finally:
+            temporary.unlink(missing_ok=True)
+        return digest.hexdigest(), size
+
+
+def clean_name(name: str) -> str:
+    """The last part of a file name without control characters; what a download is called."""
+    last = name.replace("\\", "/").rpartition("/")[2]
+    cleaned = "".join(c for c in last if c.isprintable()).strip(" .")
+    return cleaned[:200] or "file"
+
+
+def read_thumbnail(path: Path) -> bytes | None:
+    """The picture inside an FCStd file, None where there is none. The file is not to be trusted."""
+    try:
+        with zipfile.ZipFile(path) as archive, archive.open(THUMBNAIL) as entry:
+            data = entry.read(MAX_THUMBNAIL + 1)
+    except (
+        zipfile.BadZipFile,
+        KeyError,
+        OSError,
+        RuntimeError,
+        NotImplementedError,
+        EOFError,
+        zlib.error,
+        ValueError,
+    ):
+        return None
+    return data if data.startswith(PNG) and len(data) <= MAX_THUMBNAIL else None

@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Login, tokens, users, audit."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Path, Query, Request
+from pydantic import Field
+from starlette.responses import Response
+
+from silo.api.wire import ErrorBody
+from silo_server.clock import wire
+from silo_server.routes.context import (
+    READ_ERRORS,
+    SESSION_COOKIE,
+    WRITE_ERRORS,
+    Admin,
+    Server,
+    ServerDep,
+    Viewer,
+    client_address,
+    json_answer,
+)
+from silo_server.routes.models import Body, Short, Text
+from silo_server.services import accounts, audit, credentials, logins
+from silo_server.values import Actor, Role
+
+router = APIRouter(prefix="/api", tags=["auth"])
+
+LOGIN_ERRORS: dict[int | str, dict[str, Any]] = {
+    400: {"model": ErrorBody},
+    401: {"model": ErrorBody},
+    429: {"model": ErrorBody, "description": "Too many failed logins; Retry-After says for how long"},
+    503: {"model": ErrorBody},
+}
+
+
+class LoginBody(Body):
+    """``POST /api/auth/login``."""
+
+    username: Short
+    password: Short
+
+
+class TokenBody(Body):
+    """``POST /api/auth/tokens``; ``expires_in_days`` null = until revoked."""
+
+    name: Annotated[str, Field(min_length=1, max_length=200)]
+    expires_in_days: Annotated[float, Field(gt=0, le=3650)] | None = None
+
+
+class NewUserBody(Body):
+    """``POST /api/users``; without a password only tokens and login links let the user in."""
+
+    username: Short
+    role: Role = Role.VIEWER
+    display_name: Short = ""
+    password: Text | None = None
+
+
+class UserChangeBody(Body):
+    """``PUT /api/users/{username}``: what is absent or null stays."""
+
+    role: Role | None = None
+    display_name: Short | None = None
+    active: bool | None = None
+    password: Text | None = None
+
+
+class PasswordBody(Body):
+    """``PUT /api/auth/password``."""
+
+    password: Text
+
+
+@router.post("/auth/login", responses=LOGIN_ERRORS)
+def log_in(server: ServerDep, request: Request, body: LoginBody) -> Response:
+    """Begin a browser session: sets the cookie, answers with the CSRF secret for later requests."""
+    session = logins.log_in(server.db, body.username, body.password, client_address(request))
+    response = json_answer({"username": session.username, "csrf_token": session.csrf_token})
+    set_session_cookie(response, server, session, request)
+    return response
+
+
+@router.post("/auth/logout", status_code=204, responses=READ_ERRORS)
+def log_out(server: ServerDep, caller: Viewer) -> Response:
+    """End this browser session."""
+    logins.log_out(server.db, caller)
+    response = Response(status_code=204)
+    response.delete_cookie(SESSION_COOKIE)
+    return response
+
+
+@router.get("/auth/me", responses=READ_ERRORS)
+def who_am_i(caller: Viewer) -> dict[str, Any]:
+    """Who this token or session is."""
+    return {
+        "username": caller.username,
+        "display_name": caller.display_name,
+        "role": caller.role.value,
+        "auth_source": caller.auth_source,
+    }
+
+
+@router.put("/auth/password", status_code=204, responses=WRITE_ERRORS)
+def set_password(server: ServerDep, caller: Viewer, body: PasswordBody) -> Response:
+    """Set the own password; ends all own sessions."""
+    with server.db.write(caller, even_when_read_only=True) as tx:
+        accounts.change_user(tx, caller.username, password=body.password)
+    return Response(status_code=204)
+
+
+@router.get("/auth/tokens", responses=READ_ERRORS)
+def list_tokens(server: ServerDep, caller: Viewer) -> list[dict[str, Any]]:
+    """The own tokens; never their secrets."""
+    with server.db.read(caller) as tx:
+        return [_token(token) for token in credentials.list_tokens(tx, _user_id(caller))]
+
+
+@router.post("/auth/tokens", status_code=201, responses=WRITE_ERRORS)
+def create_token(server: ServerDep, caller: Viewer, body: TokenBody) -> dict[str, Any]:
+    """Make a token of one's own role. The secret is in this answer and never again."""
+    with server.db.write(caller, even_when_read_only=True) as tx:
+        token, secret = credentials.create_token(tx, _user_id(caller), body.name, days=body.expires_in_days)
+    return {**_token(token), "token": secret}
+
+
+@router.delete("/auth/tokens/{token_id}", status_code=204, responses=WRITE_ERRORS)
+def revoke_token(
+    server: ServerDep, caller: Viewer, token_id: Annotated[int, Path(ge=1, le=2**62)]
+) -> Response:
+    """Revoke a token: one's own, or anybody's for an admin."""
+    owner = None if caller.role is Role.ADMIN else _user_id(caller)
+    with server.db.write(caller, even_when_read_only=True) as tx:
+        credentials.revoke_token(tx, token_id, owner)
+    return Response(status_code=204)
+
+
+@router.get("/users", responses=READ_ERRORS)
+def list_users(server: ServerDep, caller: Admin) -> list[dict[str, Any]]:
+    """All users."""
+    with server.db.read(caller) as tx:
+        return [_user(user) for user in accounts.list_users(tx)]
+
+
+@router.post("/users", status_code=201, responses=WRITE_ERRORS)
+def create_user(server: ServerDep, caller: Admin, body: NewUserBody) -> dict[str, Any]:
+    """Make a user."""
+    with server.db.write(caller, even_when_read_only=True) as tx:
+        user = accounts.create_user(
+            tx, body.username, body.role, display_name=body.display_name, password=body.password
+        )
+    return _user(user)
+
+
+@router.put("/users/{username}", responses=WRITE_ERRORS)
+def change_user(server: ServerDep, caller: Admin, username: str, body: UserChangeBody) -> dict[str, Any]:
+    """Change a user's role, name, password, or let nobody in under this name any more."""
+    with server.db.write(caller, even_when_read_only=True) as tx:
+        user = accounts.change_user(tx, username, **body.model_dump())
+    return _user(user)
+
+
+@router.post("/users/{username}/login-link", status_code=201, responses=WRITE_ERRORS)
+def create_login_link(server: ServerDep, caller: Admin, username: str) -> dict[str, Any]:
+    """A link that lets this user in once; for a new colleague or a forgotten password."""
+    with server.db.write(caller, even_when_read_only=True) as tx:
+        secret = logins.create_login_link(tx, username)
+        audit.note(tx, "login_link.created", username)
+    return {"path": f"/login/link/{secret}"}
+
+
+@router.get("/admin/audit", responses=READ_ERRORS)
+def list_audit(
+    server: ServerDep,
+    caller: Admin,
+    limit: Annotated[int, Query(ge=1, le=1000)] = 100,
+    before: Annotated[int | None, Query(ge=0, le=2**62)] = None,
+) -> list[dict[str, Any]]:
+    """Who did what, newest first."""
+    with server.db.read(caller) as tx:
+        entries = audit.list_entries(tx, limit, before)
+    return [
+        {
+            "id": e.id,
+            "at": wire(e.at),
+            "username": e.username,
+            "action": e.action,
+            "target": e.target,
+            "detail": e.detail,
+            "address": e.address,
+        }
+        for e in entries
+    ]
+
+
+def set_session_cookie(
+    response: Response, server: Server, session: logins.NewSession, request: Request
+) -> None:
+    """The session's cookie: not for scripts, not for other sites, and only over TLS where there is TLS."""
+    response.set_cookie(
+        SESSION_COOKIE,
+        session.secret,
+        max_age=int(server.settings.session_seconds),
+        httponly=True,
+        samesite="lax",
+        secure=server.settings.secure_cookies or request.url.scheme == "https",
+    )
+
+
+def _user_id(caller: Actor) -> int:
+    assert caller.user_id is not None  # every caller that a guard let in is a user
+    return caller.user_id
+
+
+def _token(token: credentials.Token) -> dict[str, Any]:
+    return {
+        "id": token.id,
+        "name": token.name,
+        "prefix": token.prefix,
+        "created_at": wire(token.created_at),
+        "expires_at": wire(token.expires_at),
+        "last_used_at": wire(token.last_used_at),
+        "revoked_at": wire(token.revoked_at),
+    }
+
+
+def _user(user: accounts.User) -> dict[str, Any]:
+    return {
+        "username": user.username,
+        "display_name": user.display_name,
+        "role": user.role.value,
+        "active": user.active,
+        "has_password": user.has_password,
+        "created_at": wire(user.created_at),
+    }

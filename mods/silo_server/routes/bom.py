@@ -1,0 +1,263 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""BOM lines, the merge, and the tree."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import anyio.to_thread
+import pydantic_core
+from fastapi import APIRouter, Query, Request
+from starlette.responses import Response
+
+from silo.api.wire import MergeRequest, MergeResult
+from silo.bom.errors import RejectedError
+from silo_server.routes.context import (
+    READ_ERRORS,
+    WRITE_ERRORS,
+    Editor,
+    ExpectedVersion,
+    ServerDep,
+    Viewer,
+    etag_of,
+    json_answer,
+    json_body,
+    raw_json,
+)
+from silo_server.routes.models import ExpandedLineOut, LineChangeBody, LineOut, NewLineBody
+from silo_server.services import edits, rollup, tree
+from silo_server.services.items import get_item
+from silo_server.services.lines import line_to_wire, lines_of
+from silo_server.services.merge import MergeOutcome, merge_bom, preview_merge
+from silo_server.services.merge_request import MergeOrder, read_merge_order
+from silo_server.services.tree import Occurrence
+from silo_server.values import Actor, number
+
+router = APIRouter(prefix="/api/items/{part_number}/bom", tags=["bom"])
+
+Depth = Annotated[int, Query(ge=1, le=tree.MAX_DEPTH)]
+MERGE_BODY = {
+    "requestBody": {
+        "required": True,
+        "content": {"application/json": {"schema": MergeRequest.model_json_schema()}},
+    }
+}
+
+
+@router.get("", response_model=list[LineOut], responses=READ_ERRORS)
+def get_bom(server: ServerDep, caller: Viewer, part_number: str) -> Response:
+    """The lines of one level. ``ETag`` is the BOM's version, for ``If-Match``."""
+    with server.db.read(caller) as tx:
+        item = get_item(tx, part_number)
+        lines = lines_of(tx, item)
+    return json_answer(
+        [line_to_wire(line, item.part_number) for line in lines], headers={"ETag": etag_of(item.bom_version)}
+    )
+
+
+@router.post("", status_code=201, response_model=LineOut, responses=WRITE_ERRORS)
+def add_line(
+    server: ServerDep, caller: Editor, part_number: str, body: NewLineBody, expected: ExpectedVersion
+) -> Response:
+    """Add a line by hand."""
+    values = {**body.model_dump(), "reference_designators": tuple(body.reference_designators)}
+    with server.db.write(caller) as tx:
+        edited = edits.add_line(tx, part_number, edits.NewLine(**values), expected)
+    return _edited(edited, 201)
+
+
+@router.put("/{child}", response_model=LineOut, responses=WRITE_ERRORS)
+def change_line(
+    server: ServerDep,
+    caller: Editor,
+    part_number: str,
+    child: str,
+    body: LineChangeBody,
+    expected: ExpectedVersion,
+) -> Response:
+    """Change a line. Another quantity on an assembly line makes it a manual override."""
+    with server.db.write(caller) as tx:
+        edited = edits.change_line(tx, part_number, child, line_changes(body), expected)
+    return _edited(edited, 200)
+
+
+@router.delete("/{child}", status_code=204, responses=WRITE_ERRORS)
+def remove_line(
+    server: ServerDep, caller: Editor, part_number: str, child: str, expected: ExpectedVersion
+) -> Response:
+    """Remove a line."""
+    with server.db.write(caller) as tx:
+        edited = edits.remove_line(tx, part_number, child, expected)
+    return Response(status_code=204, headers={"ETag": etag_of(edited.version)})
+
+
+@router.post("/merge", response_model=MergeResult, responses=WRITE_ERRORS, openapi_extra=MERGE_BODY)
+async def merge(
+    server: ServerDep, caller: Editor, part_number: str, request: Request, expected: ExpectedVersion
+) -> Response:
+    """Merge an assembly's direct children (spec bom-sync §5).
+
+    ``sync_id`` makes a repeat give the same answer, ``dry_run`` gives the answer without the change,
+    ``If-Match`` refuses (412) where somebody was quicker.
+    """
+    body = await json_body(request)
+
+    def work() -> MergeOutcome:
+        order = read_merge_order(body, server.settings.max_merge_entries)
+        return _merge(server, caller, part_number, order, expected)
+
+    outcome = await anyio.to_thread.run_sync(work)
+    return raw_json(outcome.answer, headers={"ETag": etag_of(outcome.version)})
+
+
+@router.get("/expanded", response_model=list[ExpandedLineOut], responses=READ_ERRORS)
+def get_expanded(
+    server: ServerDep, caller: Viewer, part_number: str, depth: Depth = tree.MAX_DEPTH
+) -> Response:
+    """The tree as rows, parents before children; quantities per one parent, and in total."""
+    with server.db.read(caller) as tx:
+        graph = tree.load_graph(tx, get_item(tx, part_number))
+    rows = tree.expand(graph, depth, server.settings.max_expanded_rows)
+    return raw_json(render_expanded(rows))
+
+
+@router.get("/flat", responses=READ_ERRORS)
+def get_flat(server: ServerDep, caller: Viewer, part_number: str) -> dict[str, Any]:
+    """The leaf parts, quantities multiplied down the tree and summed; 409 where it never ends."""
+    with server.db.read(caller) as tx:
+        graph = tree.load_graph(tx, get_item(tx, part_number))
+    return {
+        "part_number": graph.root.part_number,
+        "flat_bom": [
+            {
+                "part_number": row.line.child_part_number,
+                "id": row.line.child_uuid,
+                "name": row.line.child_name,
+                "description": row.line.child_description,
+                "item_type": row.line.child_item_type,
+                "total_quantity": number(row.total),
+                "unit": row.unit,
+            }
+            for row in tree.flatten(graph)
+        ],
+    }
+
+
+@router.get("/cost", responses=READ_ERRORS)
+def get_cost(server: ServerDep, caller: Viewer, part_number: str) -> dict[str, Any]:
+    """Flat BOM × ``standard_cost``, per currency; ``missing`` names what has no cost."""
+    with server.db.read(caller) as tx:
+        graph = tree.load_graph(tx, get_item(tx, part_number))
+        cost = rollup.roll_up_cost(tx, graph)
+    only = next(iter(cost.totals.values())) if len(cost.totals) == 1 else None
+    return {
+        "part_number": graph.root.part_number,
+        "total_cost": only if cost.totals else 0.0,
+        "totals": [{"currency": c, "total_cost": t} for c, t in cost.totals.items()],
+        "complete": not cost.missing,
+        "missing": list(cost.missing),
+        "lines": [
+            {
+                "part_number": row.part_number,
+                "name": row.name,
+                "total_quantity": number(row.quantity),
+                "unit": row.unit,
+                "standard_cost": row.unit_cost,
+                "currency": row.currency,
+                "total_cost": row.total,
+            }
+            for row in cost.rows
+        ],
+    }
+
+
+@router.get("/mass", responses=READ_ERRORS)
+def get_mass(server: ServerDep, caller: Viewer, part_number: str) -> dict[str, Any]:
+    """The mass of one piece [kg] from its parts' ``mass_kg``; ``missing`` names what has none."""
+    with server.db.read(caller) as tx:
+        graph = tree.load_graph(tx, get_item(tx, part_number))
+        mass = rollup.roll_up_mass(tx, graph)
+    return {
+        "part_number": graph.root.part_number,
+        "total_mass_kg": mass.total,
+        "stated_mass_kg": mass.stated,
+        "complete": not mass.missing,
+        "missing": list(mass.missing),
+        "lines": [
+            {
+                "part_number": row.part_number,
+                "name": row.name,
+                "total_quantity": number(row.quantity),
+                "mass_kg": row.unit_mass,
+                "total_mass_kg": row.total,
+                "is_assembly": row.is_assembly,
+            }
+            for row in mass.rows
+        ],
+    }
+
+
+@router.get("/where-used", responses=READ_ERRORS)
+def get_where_used(
+    server: ServerDep, caller: Viewer, part_number: str, indirect: bool = False
+) -> list[dict[str, Any]]:
+    """The parents; with ``indirect`` theirs as well."""
+    with server.db.read(caller) as tx:
+        found = tree.where_used(tx, get_item(tx, part_number), indirect=indirect)
+    return [
+        {
+            "parent_part_number": usage.parent.part_number,
+            "parent_id": usage.parent.uuid,
+            "parent_name": usage.parent.name,
+            "parent_description": usage.parent.description,
+            "parent_archived": usage.parent.archived_at is not None,
+            "quantity": number(usage.quantity),
+            "unit": usage.unit,
+            "rel_type": usage.rel_type,
+            "source": usage.source,
+            "depth": usage.depth,
+        }
+        for usage in found
+    ]
+
+
+def line_changes(body: LineChangeBody) -> dict[str, Any]:
+    """The changes that a body asks for: only what it names; null clears what may be empty."""
+    changes = body.model_dump(exclude_unset=True)
+    for name in ("quantity", "rel_type", "source"):
+        if name in changes and changes[name] is None:
+            raise RejectedError(f"{name}: wanted a value, got null; leave the key out to keep it as it is")
+    if "reference_designators" in changes:
+        changes["reference_designators"] = tuple(changes["reference_designators"] or ())
+    if "metadata" in changes:
+        changes["metadata"] = changes["metadata"] or {}
+    return changes
+
+
+def render_expanded(rows: list[Occurrence]) -> bytes:
+    """The rows as JSON text. A line is written once however often its assembly is used."""
+    written: dict[str, bytes] = {}
+    parts: list[bytes] = []
+    for line, parent, depth, total in rows:
+        text = written.get(line.id)
+        if text is None:
+            text = written[line.id] = pydantic_core.to_json(line_to_wire(line, parent))[:-1]
+        parts.append(b'%b,"depth":%d,"total_quantity":%b}' % (text, depth, repr(number(total)).encode()))
+    return b"[" + b",".join(parts) + b"]"
+
+
+def _merge(
+    server: ServerDep, caller: Actor, part_number: str, order: MergeOrder, expected: int | None
+) -> MergeOutcome:
+    if order.dry_run:
+        with server.db.read(caller) as tx:
+            return preview_merge(tx, part_number, order, expected)
+    with server.db.write(caller) as tx:
+        return merge_bom(tx, part_number, order, expected)
+
+
+def _edited(edited: edits.Edited, status: int) -> Response:
+    assert edited.line is not None  # add and change leave a line behind
+    return json_answer(
+        line_to_wire(edited.line, edited.parent.part_number), status, {"ETag": etag_of(edited.version)}
+    )

@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What every route gets: the server's parts, who is calling, and how an answer is written."""
+
+from __future__ import annotations
+
+import json
+import secrets
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import anyio.to_thread
+import pydantic_core
+from fastapi import Depends, Request
+from starlette.responses import Response
+
+from silo.api.wire import ErrorBody
+from silo.bom.errors import AuthError, RejectedError
+from silo_server.db.engine import Database
+from silo_server.errors import ForbiddenError
+from silo_server.events.hub import Hub
+from silo_server.files import FileStore
+from silo_server.services.credentials import actor_by_token
+from silo_server.services.logins import actor_by_session
+from silo_server.settings import Settings
+from silo_server.values import Actor, Role
+
+SESSION_COOKIE = "silo_session"
+SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
+FORM_TYPES = ("application/x-www-form-urlencoded", "multipart/form-data")
+
+_SHAPE = {"model": ErrorBody}
+READ_ERRORS: dict[int | str, dict[str, Any]] = {
+    400: {**_SHAPE, "description": "The request is unusable; all problems are listed"},
+    401: {**_SHAPE, "description": "No token, or one that is not known"},
+    403: {**_SHAPE, "description": "The role is too low"},
+    404: {**_SHAPE, "description": "There is no such item, line, revision or route"},
+    409: {**_SHAPE, "description": "Two truths met: a cycle, a duplicate, a change in between"},
+    503: {**_SHAPE, "description": "Read-only, or the database is not there; try again later"},
+}
+WRITE_ERRORS: dict[int | str, dict[str, Any]] = {
+    **READ_ERRORS,
+    412: {**_SHAPE, "description": "The BOM has another version than If-Match says"},
+    413: {**_SHAPE, "description": "More than the server takes in one request"},
+}
+
+
+@dataclass(frozen=True)
+class Server:
+    """The parts of a running server; one per process, in ``app.state.server``."""
+
+    settings: Settings
+    db: Database
+    hub: Hub
+    files: FileStore
+
+
+def server_of(request: Request) -> Server:
+    """The server that this request came to."""
+    server: Server = request.app.state.server
+    return server
+
+
+ServerDep = Annotated[Server, Depends(server_of)]
+
+
+class Guard:
+    """A dependency that lets a caller of at least ``role`` in: Bearer token first, then session cookie."""
+
+    def __init__(self, role: Role) -> None:
+        self.role = role
+
+    async def __call__(self, request: Request) -> Actor:
+        actor = await anyio.to_thread.run_sync(find_actor, request)
+        if actor is None:
+            raise AuthError("a valid token is needed: send it as 'Authorization: Bearer silo_…'")
+        if not actor.role.covers(self.role):
+            raise ForbiddenError(
+                f"{actor.username} is {actor.role}, this needs {self.role}; an admin can change that"
+            )
+        if actor.auth_source == "session" and request.method not in SAFE_METHODS:
+            await _check_csrf(request, actor)
+        return actor
+
+
+Viewer = Annotated[Actor, Depends(Guard(Role.VIEWER))]
+Editor = Annotated[Actor, Depends(Guard(Role.EDITOR))]
+Admin = Annotated[Actor, Depends(Guard(Role.ADMIN))]
+
+
+def find_actor(request: Request) -> Actor | None:
+    """Who calls, None where nobody known does. A wrong token is not saved by a good cookie."""
+    server, address = server_of(request), client_address(request)
+    header = request.headers.get("authorization")
+    if header is not None:
+        scheme, _, secret = header.partition(" ")
+        if scheme.lower() != "bearer" or not secret.strip():
+            return None
+        return actor_by_token(server.db, secret.strip(), address)
+    cookie = request.cookies.get(SESSION_COOKIE)
+    return actor_by_session(server.db, cookie, address) if cookie else None
+
+
+def client_address(request: Request) -> str:
+    """The caller's address, as told by the connection (or by a proxy that uvicorn trusts)."""
+    return request.client.host if request.client else ""
+
+
+async def _check_csrf(request: Request, actor: Actor) -> None:
+    sent: object = request.headers.get("x-csrf-token")
+    if sent is None and request.headers.get("content-type", "").startswith(FORM_TYPES):
+        sent = (await request.form()).get("csrf_token")
+    wanted = actor.csrf_token or ""
+    if not isinstance(sent, str) or not secrets.compare_digest(sent.encode(), wanted.encode()):
+        raise ForbiddenError("the form's secret is missing or old; load the page again and repeat")
+
+
+def json_answer(value: Any, status: int = 200, headers: Mapping[str, str] | None = None) -> Response:
+    """``value`` as JSON, by the quick writer that pydantic brings along."""
+    return raw_json(pydantic_core.to_json(value), status, headers)
+
+
+def raw_json(text: str | bytes, status: int = 200, headers: Mapping[str, str] | None = None) -> Response:
+    """JSON that is written already."""
+    return Response(text, status, headers, media_type="application/json")
+
+
+async def json_body(request: Request) -> Any:
+    """The request's JSON body; RejectedError where it is none. NaN and Infinity are no JSON."""
+    body = await request.body()
+
+    def parse() -> Any:
+        try:
+            return json.loads(body, parse_constant=_no_constant)
+        except (ValueError, RecursionError) as error:
+            raise RejectedError(f"body: wanted JSON, got something else ({error})") from None
+
+    return await anyio.to_thread.run_sync(parse)
+
+
+def _no_constant(name: str) -> Any:
+    raise ValueError(f"{name} is no JSON number")
+
+
+def etag_of(version: int) -> str:
+    """The ETag of a BOM's version."""
+    return f'"v{version}"'
+
+
+def expected_version(request: Request) -> int | None:
+    """The version in ``If-Match``, None where there is none (or ``*``); -1 for one that cannot be ours."""
+    header = request.headers.get("if-match", "").strip()
+    if header in ("", "*"):
+        return None
+    text = header.removeprefix("W/").strip('"').removeprefix("v")
+    return int(text) if text.isascii() and text.isdigit() and len(text) < 10 else -1
+
+
+ExpectedVersion = Annotated[int | None, Depends(expected_version)]

@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Items, part numbers and schemas."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query
+from starlette.responses import Response
+
+from silo_server.routes.context import READ_ERRORS, WRITE_ERRORS, Editor, ServerDep, Viewer, json_answer
+from silo_server.routes.models import (
+    ItemChangeBody,
+    ItemOut,
+    ItemsOut,
+    NewItemBody,
+    NumberBody,
+    NumberOut,
+    UuidsBody,
+)
+from silo_server.routes.render import item_to_wire
+from silo_server.schema.catalog import describe, describe_form, find_schema, schemas
+from silo_server.services import items as service
+
+router = APIRouter(prefix="/api", tags=["items"])
+
+Limit = Annotated[int, Query(ge=1, le=1000)]
+Offset = Annotated[int, Query(ge=0, le=10_000_000)]
+Word = Annotated[str, Query(max_length=200)]
+
+
+@router.get("/items", response_model=list[ItemOut], responses=READ_ERRORS)
+def list_items(
+    server: ServerDep,
+    caller: Viewer,
+    search: Word = "",
+    q: Word = "",
+    item_type: Word | None = None,
+    category: Word | None = None,
+    include_archived: bool = False,
+    limit: Limit = 100,
+    offset: Offset = 0,
+) -> Response:
+    """Items by part number; ``X-Total-Count`` says how many match in all."""
+    query = service.ItemQuery(
+        search=search or q,
+        item_type=item_type,
+        category=category,
+        include_archived=include_archived,
+        limit=limit,
+        offset=offset,
+    )
+    with server.db.read(caller) as tx:
+        found, total = service.list_items(tx, query)
+    return json_answer([item_to_wire(item) for item in found], headers={"X-Total-Count": str(total)})
+
+
+@router.get("/items/search", response_model=list[ItemOut], responses=READ_ERRORS)
+def search_items(server: ServerDep, caller: Viewer, q: Word = "", limit: Limit = 20) -> Response:
+    """Search as you type: every word must be somewhere in number, name or description."""
+    with server.db.read(caller) as tx:
+        found, total = service.list_items(tx, service.ItemQuery(search=q, limit=limit))
+    return json_answer([item_to_wire(item) for item in found], headers={"X-Total-Count": str(total)})
+
+
+@router.post(
+    "/items", status_code=201, response_model=ItemOut, responses={**WRITE_ERRORS, 200: {"model": ItemOut}}
+)
+def create_item(server: ServerDep, caller: Editor, body: NewItemBody) -> Response:
+    """Make an item; 200 with the item where its ``id`` is known already."""
+    new = service.NewItem(
+        schema=body.schema_name,
+        category=body.category,
+        part_number=body.part_number,
+        uuid=body.id,
+        name=body.name or "",
+        description=body.description or "",
+        item_type=body.item_type,
+        sourcing_type=body.sourcing_type,
+        long_description=body.long_description,
+        properties=body.properties or {},
+    )
+    with server.db.write(caller) as tx:
+        item, made = service.create_item(tx, new)
+    return json_answer(item_to_wire(item), 201 if made else 200)
+
+
+@router.get("/items/by-uuid/{uuid}", response_model=ItemOut, responses=READ_ERRORS)
+def get_item_by_uuid(server: ServerDep, caller: Viewer, uuid: str) -> Response:
+    """The item with this UUID; 404 when there is none or it is archived, 400 for no UUID."""
+    with server.db.read(caller) as tx:
+        item = service.get_by_uuid(tx, uuid)
+    return json_answer(item_to_wire(item))
+
+
+@router.post("/items/by-uuid", response_model=ItemsOut, responses=READ_ERRORS)
+def get_items_by_uuid(server: ServerDep, caller: Viewer, body: UuidsBody) -> Response:
+    """Many UUIDs in one request; those that are not known are absent. Reads only, so a viewer may."""
+    with server.db.read(caller) as tx:
+        found = service.get_by_uuids(tx, body.uuids)
+    return json_answer({"items": [item_to_wire(item) for item in found]})
+
+
+@router.get("/items/{part_number}", response_model=ItemOut, responses=READ_ERRORS)
+def get_item(server: ServerDep, caller: Viewer, part_number: str) -> Response:
+    """One item."""
+    with server.db.read(caller) as tx:
+        item = service.get_item(tx, part_number)
+    return json_answer(item_to_wire(item))
+
+
+@router.put("/items/{part_number}", response_model=ItemOut, responses=WRITE_ERRORS)
+def change_item(server: ServerDep, caller: Editor, part_number: str, body: ItemChangeBody) -> Response:
+    """Change an item in place; ``properties`` make a new revision. The UUID stays whatever the number."""
+    change = service.ItemChange(**body.model_dump())
+    with server.db.write(caller) as tx:
+        item = service.change_item(tx, part_number, change)
+    return json_answer(item_to_wire(item))
+
+
+@router.delete("/items/{part_number}", status_code=204, responses=WRITE_ERRORS)
+def archive_item(server: ServerDep, caller: Editor, part_number: str) -> Response:
+    """Archive an item; its number stays taken and its lines stay in their BOMs."""
+    with server.db.write(caller) as tx:
+        service.archive_item(tx, part_number)
+    return Response(status_code=204)
+
+
+@router.post("/items/{part_number}/unarchive", response_model=ItemOut, responses=WRITE_ERRORS)
+def unarchive_item(server: ServerDep, caller: Editor, part_number: str) -> Response:
+    """Bring an archived item back."""
+    with server.db.write(caller) as tx:
+        item = service.unarchive_item(tx, part_number)
+    return json_answer(item_to_wire(item))
+
+
+@router.post("/generate-part-number", response_model=NumberOut, responses=READ_ERRORS)
+def generate_part_number(server: ServerDep, caller: Editor, body: NumberBody) -> Response:
+    """The number the next item of the category would get; a preview that consumes nothing."""
+    with server.db.read(caller) as tx:
+        number = service.preview_number(tx, body.schema_name, body.category)
+    return json_answer({"part_number": number})
+
+
+@router.get("/schemas", responses=READ_ERRORS)
+def list_schemas(caller: Viewer) -> list[dict[str, Any]]:
+    """All part-number schemas."""
+    return [describe(schema) for schema in schemas().values()]
+
+
+@router.get("/schemas/{name}", responses=READ_ERRORS)
+def get_schema(caller: Viewer, name: str) -> dict[str, Any]:
+    """A schema: its segments with their values."""
+    return describe(find_schema(name))
+
+
+@router.get("/schemas/{name}/form", responses=READ_ERRORS)
+def get_schema_form(caller: Viewer, name: str) -> dict[str, Any]:
+    """The form descriptor for new items."""
+    return describe_form(find_schema(name))

@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What the routes take and give, beside the wire models that client and server share."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+
+Text = Annotated[str, StringConstraints(max_length=10_000)]
+Short = Annotated[str, StringConstraints(max_length=200)]
+Properties = dict[Short, Any]
+
+
+class Body(BaseModel):
+    """Base of request bodies: unknown keys are ignored."""
+
+    model_config = ConfigDict(extra="ignore")
+
+
+class NewItemBody(Body):
+    """``POST /api/items``. With ``id`` (a UUID chosen by the client) a repeat makes no second item."""
+
+    model_config = ConfigDict(extra="ignore", protected_namespaces=(), populate_by_name=True)
+
+    schema_name: Short | None = Field(None, alias="schema")
+    category: Short | None = None
+    part_number: Short | None = None
+    id: Short | None = None
+    name: Short | None = None
+    description: Text | None = None
+    item_type: Short | None = None
+    sourcing_type: Short | None = None
+    long_description: Text | None = None
+    properties: Properties | None = None
+
+
+class ItemChangeBody(Body):
+    """``PUT /api/items/{pn}``: what is absent or null stays. ``properties`` make a new revision."""
+
+    part_number: Short | None = None
+    name: Short | None = None
+    description: Text | None = None
+    item_type: Short | None = None
+    sourcing_type: Short | None = None
+    long_description: Text | None = None
+    properties: Properties | None = None
+    comment: Text = ""
+
+
+class UuidsBody(Body):
+    """``POST /api/items/by-uuid``."""
+
+    uuids: list[Short] = Field(max_length=10_000)
+
+
+class NumberBody(Body):
+    """``POST /api/generate-part-number``."""
+
+    model_config = ConfigDict(extra="ignore", protected_namespaces=(), populate_by_name=True)
+
+    schema_name: Short | None = Field(None, alias="schema")
+    category: Short
+
+
+class NumberOut(BaseModel):
+    """The number the next item of the category would get."""
+
+    part_number: str
+
+
+class ItemOut(BaseModel):
+    """An item."""
+
+    model_config = ConfigDict(protected_namespaces=(), populate_by_name=True)
+
+    id: str
+    part_number: str
+    name: str
+    description: str
+    item_type: str
+    schema_name: str | None = Field(alias="schema")
+    category: str | None
+    sourcing_type: str | None
+    long_description: str | None
+    thumbnail_key: str | None
+    properties: dict[str, Any]
+    current_revision: int
+    bom_version: int
+    created_at: str
+    created_by: str
+    updated_at: str
+    updated_by: str
+    archived_at: str | None
+
+
+class ItemsOut(BaseModel):
+    """The items that were found; what is missing is absent."""
+
+    items: list[ItemOut]
+
+
+class RevisionOut(BaseModel):
+    """A revision: a property snapshot and, where one was uploaded, a file."""
+
+    part_number: str
+    revision_number: int
+    comment: str
+    status: str
+    properties: dict[str, Any]
+    file_name: str | None
+    file_checksum: str | None
+    file_size: int | None
+    thumbnail_key: str | None
+    created_at: str
+    created_by: str
+
+
+class RevisionBody(Body):
+    """``POST /api/items/{pn}/revisions``: a revision without a file."""
+
+    properties: Properties | None = None
+    comment: Text = ""
+
+
+class LineOut(BaseModel):
+    """A BOM line. ``unreferenced_since`` is set while no component of the assembly uses it."""
+
+    id: str
+    parent_part_number: str
+    child_part_number: str
+    child_id: str
+    child_name: str
+    child_description: str
+    child_item_type: str
+    rel_type: str
+    quantity: float
+    unit: str | None
+    reference_designators: list[str]
+    find_number: str | None
+    notes: str | None
+    child_revision: int | None
+    effective_revision: int
+    newer_revision_exists: bool
+    child_archived: bool
+    source: str
+    unreferenced_since: str | None
+    override: bool
+    cad_quantity: float | None
+    reason: str | None
+    metadata: dict[str, Any]
+
+
+class ExpandedLineOut(LineOut):
+    """A line somewhere down the tree; ``total_quantity`` is per one of the top item."""
+
+    depth: int
+    total_quantity: float
+
+
+class NewLineBody(Body):
+    """``POST /api/items/{pn}/bom``."""
+
+    child_part_number: Short
+    quantity: float = 1
+    rel_type: Short = "component"
+    unit: Short | None = None
+    reference_designators: list[Short] = Field(default_factory=list, max_length=10_000)
+    find_number: Short | None = None
+    notes: Text | None = None
+    child_revision: Annotated[int, Field(ge=0, le=1_000_000)] | None = None
+    source: Short = "manual"
+    metadata: Properties = Field(default_factory=dict)
+
+
+class LineChangeBody(Body):
+    """``PUT /api/items/{pn}/bom/{child}``: only the keys that are there are changed; null clears."""
+
+    quantity: float | None = None
+    rel_type: Short | None = None
+    unit: Short | None = None
+    reference_designators: list[Short] | None = Field(None, max_length=10_000)
+    find_number: Short | None = None
+    notes: Text | None = None
+    child_revision: Annotated[int, Field(ge=0, le=1_000_000)] | None = None
+    source: Short | None = None
+    metadata: Properties | None = None

@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Revisions and their files."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated, Any
+
+import anyio.to_thread
+from fastapi import APIRouter, Path, Request
+from starlette.datastructures import UploadFile
+from starlette.responses import FileResponse, Response
+
+from silo.bom.errors import NotFoundError, RejectedError
+from silo_server.routes.context import (
+    READ_ERRORS,
+    WRITE_ERRORS,
+    Editor,
+    Server,
+    ServerDep,
+    Viewer,
+    json_answer,
+)
+from silo_server.routes.models import RevisionBody, RevisionOut
+from silo_server.routes.render import revision_to_wire
+from silo_server.services import items, revisions
+from silo_server.values import Actor, Revision
+
+router = APIRouter(prefix="/api/items/{part_number}", tags=["revisions"])
+
+# A file is handed out as a thing to keep, never as something a browser would run or show.
+DOWNLOAD_HEADERS = {
+    "Content-Security-Policy": "default-src 'none'; sandbox",
+    "Cache-Control": "private, no-cache",
+}
+RevisionNumber = Annotated[int, Path(ge=1, le=1_000_000)]
+BINARY: dict[int | str, dict[str, Any]] = {
+    200: {"content": {"application/octet-stream": {}}, "description": "The file"},
+    206: {"content": {"application/octet-stream": {}}, "description": "The part of the file asked for"},
+    304: {"description": "The file is still the one that If-None-Match names"},
+    416: {"description": "The file has no such range"},
+}
+UPLOAD = {
+    "requestBody": {
+        "required": True,
+        "content": {
+            "multipart/form-data": {
+                "schema": {
+                    "type": "object",
+                    "required": ["file"],
+                    "properties": {
+                        "file": {"type": "string", "format": "binary"},
+                        "comment": {"type": "string"},
+                        "properties": {"type": "string", "description": "a JSON object"},
+                    },
+                }
+            }
+        },
+    }
+}
+
+
+@router.get("/revisions", response_model=list[RevisionOut], responses=READ_ERRORS)
+def list_revisions(server: ServerDep, caller: Viewer, part_number: str) -> Response:
+    """All revisions, newest first."""
+    with server.db.read(caller) as tx:
+        item = items.get_item(tx, part_number)
+        found = revisions.list_revisions(tx, item)
+    return json_answer([revision_to_wire(item.part_number, revision) for revision in found])
+
+
+@router.get("/revisions/{number}", response_model=RevisionOut, responses=READ_ERRORS)
+def get_revision(server: ServerDep, caller: Viewer, part_number: str, number: RevisionNumber) -> Response:
+    """One revision."""
+    with server.db.read(caller) as tx:
+        item = items.get_item(tx, part_number)
+        revision = revisions.get_revision(tx, item, number)
+    return json_answer(revision_to_wire(item.part_number, revision))
+
+
+@router.post("/revisions", status_code=201, response_model=RevisionOut, responses=WRITE_ERRORS)
+def add_revision(server: ServerDep, caller: Editor, part_number: str, body: RevisionBody) -> Response:
+    """A revision without a file: a new property snapshot."""
+    with server.db.write(caller) as tx:
+        item = items.get_item(tx, part_number, lock=True)
+        revision = revisions.add_revision(tx, item, comment=body.comment, properties=body.properties)
+    return json_answer(revision_to_wire(item.part_number, revision), 201)
+
+
+@router.post(
+    "/file", status_code=201, response_model=RevisionOut, responses=WRITE_ERRORS, openapi_extra=UPLOAD
+)
+async def upload_file(server: ServerDep, caller: Editor, part_number: str, request: Request) -> Response:
+    """Upload a file (form part ``file``, texts ``comment`` and ``properties``) as a new revision.
+
+    The form is read here and not by a parameter, so that nobody without a role fills the disk.
+    """
+    async with request.form(max_files=1, max_fields=20) as form:
+        file, comment, raw = form.get("file"), form.get("comment"), form.get("properties")
+        if not isinstance(file, UploadFile):
+            raise RejectedError("file: wanted a multipart form with the file in a part named 'file'")
+        if isinstance(comment, UploadFile) or isinstance(raw, UploadFile):
+            raise RejectedError("comment, properties: wanted texts, got files")
+        properties = _properties(raw)
+        revision = await anyio.to_thread.run_sync(
+            _store, server, caller, part_number, file, comment or "", properties
+        )
+    return json_answer(revision_to_wire(part_number, revision), 201)
+
+
+@router.get("/file", response_class=Response, responses={**READ_ERRORS, **BINARY})
+def download_newest(server: ServerDep, caller: Viewer, part_number: str, request: Request) -> Response:
+    """The newest file."""
+    with server.db.read(caller) as tx:
+        revision = revisions.newest_file(tx, items.get_item(tx, part_number))
+    return _download(server, revision, request)
+
+
+@router.get("/file/{number}", response_class=Response, responses={**READ_ERRORS, **BINARY})
+def download_revision(
+    server: ServerDep, caller: Viewer, part_number: str, number: RevisionNumber, request: Request
+) -> Response:
+    """The file of one revision."""
+    with server.db.read(caller) as tx:
+        revision = revisions.get_revision(tx, items.get_item(tx, part_number), number)
+    return _download(server, revision, request)
+
+
+@router.get(
+    "/thumbnail",
+    response_class=Response,
+    responses={**READ_ERRORS, 200: {"content": {"image/png": {}}, "description": "The picture"}},
+)
+def thumbnail(server: ServerDep, caller: Viewer, part_number: str) -> Response:
+    """The picture that came with the newest file that has one."""
+    with server.db.read(caller) as tx:
+        item = items.get_item(tx, part_number)
+    if not item.thumbnail_key:
+        raise NotFoundError(f"item {item.part_number} has no thumbnail")
+    path = server.files.path_of(item.thumbnail_key)
+    return FileResponse(path, media_type="image/png", headers={"Cache-Control": "private, max-age=300"})
+
+
+def _store(
+    server: Server,
+    caller: Actor,
+    part_number: str,
+    file: UploadFile,
+    comment: str,
+    properties: dict[str, Any] | None,
+) -> Revision:
+    with server.db.read(caller) as tx:
+        items.get_item(tx, part_number)  # before anything is written to the disk
+    stored = server.files.keep(file.filename or "file", file.file)
+    with server.db.write(caller) as tx:
+        item = items.get_item(tx, part_number, lock=True)
+        merged = None if properties is None else {**item.properties, **properties}
+        return revisions.add_revision(tx, item, comment=comment, properties=merged, file=stored)
+
+
+def _properties(raw: str | None) -> dict[str, Any] | None:
+    if raw is None or not raw.strip():
+        return None
+    try:
+        value = json.loads(raw)
+    except (ValueError, RecursionError):
+        value = None
+    if not isinstance(value, dict):
+        raise RejectedError("properties: wanted a JSON object as text")
+    return value
+
+
+def _download(server: Server, revision: Revision, request: Request) -> Response:
+    if revision.file_checksum is None or revision.file_name is None:
+        raise NotFoundError(f"revision {revision.revision_number} has no file")
+    etag = f'"{revision.file_checksum}"'
+    headers = {**DOWNLOAD_HEADERS, "ETag": etag}
+    if request.headers.get("if-none-match") == etag:
+        return Response(status_code=304, headers=headers)
+    return FileResponse(
+        server.files.path_of(revision.file_checksum),
+        media_type="application/octet-stream",
+        filename=revision.file_name,
+        content_disposition_type="attachment",
+        headers=headers,
+    )

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Health, events, modules, mode."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+import anyio.to_thread
+from fastapi import APIRouter, Query, Request
+from pydantic import BaseModel
+from sqlalchemy.exc import SQLAlchemyError
+from starlette.responses import Response
+
+from silo.bom.errors import RejectedError
+from silo_server.db.engine import mode_of
+from silo_server.db.state import put_state
+from silo_server.events.stream import EventStream
+from silo_server.routes.context import (
+    READ_ERRORS,
+    Admin,
+    Server,
+    ServerDep,
+    Viewer,
+    find_actor,
+    json_answer,
+)
+from silo_server.services import audit, events
+
+router = APIRouter(tags=["system"])
+MODULES = (
+    "core",
+    "schemas",
+    "bom",
+    "bom_merge",
+    "bom_history",
+    "events",
+    "files",
+    "auth",
+    "export",
+    "import",
+)
+
+
+class ModeBody(BaseModel):
+    """``PUT /api/admin/mode``."""
+
+    mode: Literal["normal", "read-only"]
+
+
+@router.get("/health")
+async def health(server: ServerDep) -> dict[str, Any]:
+    """The process lives; says also in which mode."""
+    mode, _ = await anyio.to_thread.run_sync(_look, server)
+    return {"status": "ok", "mode": mode}
+
+
+@router.get("/ready", responses={503: {"description": "The database or the file store is not there"}})
+async def ready(server: ServerDep) -> Response:
+    """The server can do its work: 200, or 503 while the database is away."""
+    mode, database = await anyio.to_thread.run_sync(_look, server)
+    body = {
+        "status": "ready" if database else "not ready",
+        "mode": mode,
+        "database": "ok" if database else "unreachable",
+        "sse_clients": server.hub.listeners,
+    }
+    return json_answer(body, 200 if database else 503)
+
+
+@router.get(
+    "/api/events",
+    response_class=Response,
+    responses={**READ_ERRORS, 200: {"content": {"text/event-stream": {}}, "description": "The events"}},
+)
+async def stream_events(
+    request: Request,
+    server: ServerDep,
+    caller: Viewer,
+    item: Annotated[list[str] | None, Query(max_length=100)] = None,
+    last_event_id: Annotated[str | None, Query(max_length=20)] = None,
+) -> Response:
+    """Events as they happen. ``Last-Event-ID`` (or ``last_event_id``) replays what came after it.
+
+    ``item`` (part numbers or UUIDs, repeatable) lets only their events through. ``reset`` says: you were away
+    for longer than the log goes back, read everything again.
+    """
+    last = _event_id(request.headers.get("last-event-id") or last_event_id)
+
+    def still_allowed() -> bool:
+        try:
+            return find_actor(request) is not None
+        except SQLAlchemyError:
+            return True  # the database being away is no reason to send everybody away
+
+    return EventStream(server.hub, last, item or (), still_allowed)
+
+
+@router.get("/api/modules", responses=READ_ERRORS)
+async def modules(caller: Viewer) -> dict[str, Any]:
+    """What this server can do."""
+    return {"modules": {name: {"enabled": True} for name in MODULES}}
+
+
+@router.get("/api/admin/mode", responses=READ_ERRORS)
+def get_mode(server: ServerDep, caller: Admin) -> dict[str, Any]:
+    """The mode: ``normal`` or ``read-only``."""
+    with server.db.read(caller) as tx:
+        return {"mode": mode_of(tx)}
+
+
+@router.put("/api/admin/mode", responses=READ_ERRORS)
+def set_mode(server: ServerDep, caller: Admin, body: ModeBody) -> dict[str, Any]:
+    """Take changes, or take none (503) until told otherwise; all processes follow at once."""
+    with server.db.write(caller, even_when_read_only=True) as tx:
+        put_state(tx, "mode", body.mode)
+        audit.note(tx, "mode.set", body.mode)
+        mode = mode_of(tx)
+        events.server_state(tx, mode)
+    return {"mode": mode}
+
+
+def _event_id(text: str | None) -> int | None:
+    if text is None or text == "":
+        return None
+    if not (text.isascii() and text.isdigit() and len(text) <= 18):
+        raise RejectedError(f"Last-Event-ID: wanted a number, got {text[:40]!r}")
+    return int(text)
+
+
+def _look(server: Server) -> tuple[str, bool]:
+    try:
+        with server.db.read() as tx:
+            mode = mode_of(tx)
+    except SQLAlchemyError:
+        return "degraded", False
+    return (mode if server.files.healthy() else "degraded"), True

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Users and their passwords (argon2id through argon2-cffi)."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import cache
+
+from argon2 import PasswordHasher
+from argon2.exceptions import InvalidHashError, VerificationError
+from sqlalchemy import Row, func, insert, select, update
+
+from silo.bom.errors import ConflictError, NotFoundError, RejectedError
+from silo_server.db.engine import Tx
+from silo_server.db.tables import sessions, users
+from silo_server.errors import DuplicateError
+from silo_server.services import audit
+from silo_server.values import Role
+
+MIN_PASSWORD = 10
+MAX_PASSWORD = 200
+USERNAME_FORM = re.compile(r"[A-Za-z0-9][A-Za-z0-9._@-]{0,63}")
+
+
+@dataclass(frozen=True, slots=True)
+class User:
+    """A user. ``has_password`` False means: only tokens and login links let this user in."""
+
+    id: int
+    username: str
+    display_name: str
+    role: Role
+    active: bool
+    has_password: bool
+    created_at: str
+
+
+@cache
+def _hasher() -> PasswordHasher:
+    return PasswordHasher()
+
+
+@cache
+def _decoy() -> str:
+    # Verified against when there is no such user, so that the answer's time does not tell.
+    return _hasher().hash("a password that nobody has")
+
+
+def to_user(row: Row[tuple[object, ...]]) -> User:
+    """A frozen user from its row."""
+    return User(
+        row.id,
+        row.username,
+        row.display_name,
+        Role(row.role),
+        bool(row.active),
+        row.password_hash is not None,
+        row.created_at,
+    )
+
+
+def list_users(tx: Tx) -> list[User]:
+    """All users by name."""
+    return [to_user(row) for row in tx.conn.execute(select(users).order_by(users.c.username_key))]
+
+
+def get_user(tx: Tx, username: str) -> User:
+    """The user, in whatever case; NotFoundError where there is none."""
+    row = tx.conn.execute(select(users).where(users.c.username_key == username.casefold())).one_or_none()
+    if row is None:
+        raise NotFoundError(f"there is no user {username!r}")
+    return to_user(row)
+
+
+def create_user(
+    tx: Tx, username: str, role: Role, *, display_name: str = "", password: str | None = None
+) -> User:
+    """Make a user; RejectedError for an unusable name or password, DuplicateError for a taken name."""
+    if not USERNAME_FORM.fullmatch(username):
+        raise RejectedError(
+            "username: wanted 1 to 64 letters, digits or . _ @ - beginning with a letter or digit, "
+            f"got {username!r}"
+        )
+    taken = tx.conn.scalar(select(users.c.id).where(users.c.username_key == username.casefold()))
+    if taken is not None:
+        raise DuplicateError(f"username {username} is taken")
+    tx.conn.execute(
+        insert(users).values(
+            username=username,
+            username_key=username.casefold(),
+            display_name=display_name or username,
+            role=role.value,
+            password_hash=hash_password(password) if password is not None else None,
+            active=True,
+            created_at=tx.stamp,
+        )
+    )
+    audit.note(tx, "user.created", username, f"role {role.value}")
+    return get_user(tx, username)
+
+
+def change_user(
+    tx: Tx,
+    username: str,
+    *,
+    role: Role | None = None,
+    display_name: str | None = None,
+    active: bool | None = None,
+    password: str | None = None,
+) -> User:
+    """Change a user; the last active admin cannot be taken away. A new password ends the user's sessions."""
+    user = get_user(tx, username)
+    loses = (role is not None and role is not Role.ADMIN) or active is False
+    if loses and user.role is Role.ADMIN and user.active and _active_admins(tx) <= 1:
+        raise ConflictError(f"{user.username} is the last admin; make another user an admin first")
+    values: dict[str, object] = {}
+    if role is not None:
+        values["role"] = role.value
+    if display_name is not None:
+        values["display_name"] = display_name
+    if active is not None:
+        values["active"] = active
+    if password is not None:
+        values["password_hash"] = hash_password(password)
+    if values:
+        tx.conn.execute(update(users).where(users.c.id == user.id).values(**values))
+        audit.note(tx, "user.changed", user.username, ", ".join(sorted(values)).replace("_hash", ""))
+    if password is not None or active is False:
+        tx.conn.execute(sessions.delete().where(sessions.c.user_id == user.id))
+    return get_user(tx, username)
+
+
+def check_password(tx: Tx, username: str, password: str) -> User | None:
+    """The user where name and password fit, else None; takes as long for an unknown name."""
+    row = tx.conn.execute(select(users).where(users.c.username_key == username.casefold())).one_or_none()
+    stored = row.password_hash if row is not None and row.password_hash else _decoy()
+    try:
+        _hasher().verify(stored, password[:MAX_PASSWORD])
+    except (VerificationError, InvalidHashError):
+        return None
+    if row is None or row.password_hash is None or not row.active:
+        return None
+    return to_user(row)
+
+
+def hash_password(password: str) -> str:
+    """An argon2id hash; RejectedError for a password that is too short or absurdly long."""
+    if not MIN_PASSWORD <= len(password) <= MAX_PASSWORD:
+        raise RejectedError(
+            f"password: wanted {MIN_PASSWORD} to {MAX_PASSWORD} characters, got {len(password)}"
+        )
+    return _hasher().hash(password)
+
+
+def _active_admins(tx: Tx) -> int:
+    query = select(func.count()).select_from(users)
+    return tx.conn.scalar(query.where(users.c.role == Role.ADMIN.value, users.c.active)) or 0

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The audit list: who did what to whom, append-only. Never a secret in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sqlalchemy import insert, select
+
+from silo_server.db.engine import Tx
+from silo_server.db.tables import audit
+
+
+@dataclass(frozen=True, slots=True)
+class AuditEntry:
+    """One line of the audit list."""
+
+    id: int
+    at: str
+    username: str
+    action: str
+    target: str
+    detail: str
+    address: str
+
+
+def note(tx: Tx, action: str, target: str = "", detail: str = "") -> None:
+    """Write one line, together with what it tells of."""
+    tx.conn.execute(
+        insert(audit).values(
+            at=tx.stamp,
+            username=tx.actor.username,
+            action=action,
+            target=target,
+            detail=detail,
+            address=tx.actor.address[:64],
+        )
+    )
+
+
+def list_entries(tx: Tx, limit: int = 100, before: int | None = None) -> list[AuditEntry]:
+    """The newest entries first; ``before`` is an id to page on."""
+    query = select(audit).order_by(audit.c.id.desc()).limit(limit)
+    if before is not None:
+        query = query.where(audit.c.id < before)
+    rows = tx.conn.execute(query).all()
+    return [AuditEntry(r.id, r.at, r.username, r.action, r.target, r.detail, r.address) for r in rows]

@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The one way a BOM changes: the lines, their history and the BOM's version in one stroke.
+
+Every caller (merge, edit, resolve, restore, undo, import) says which lines become what; what is written here
+is set-based, and the history is exact by construction: folding all changes gives the state.
+"""
+
+from __future__ import annotations
+
+import uuid as uuids
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+from sqlalchemy import delete, func, insert, select, update
+
+from silo.bom.errors import CycleError, VersionConflictError
+from silo_server.db.bulk import insert_rows, one_of, update_rows
+from silo_server.db.engine import Tx
+from silo_server.db.tables import bom_change_lines, bom_changes, bom_lines, items
+from silo_server.services.lines import state_columns, state_to_json
+from silo_server.values import Item, LineState, dumps
+
+
+class ChangeKind(StrEnum):
+    """Why a BOM changed."""
+
+    MERGE = "merge"  # an assembly was synced
+    EDIT = "edit"  # a person added, changed or removed lines
+    RESOLVE = "resolve"  # a person decided on unreferenced lines or conflicts
+    IMPORT = "import"  # a CSV was imported
+    RESTORE = "restore"  # an earlier state was brought back
+    UNDO = "undo"  # one change was taken back
+
+
+@dataclass(frozen=True, slots=True)
+class LineChange:
+    """One line that becomes something else: ``before`` None = new, ``after`` None = removed."""
+
+    line_id: str
+    child_id: int
+    before: LineState | None
+    after: LineState | None
+
+    @property
+    def action(self) -> str:
+        if self.before is None:
+            return "added"
+        if self.after is None:
+            return "removed"
+        return "changed"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChangeNote:
+    """What goes with a change into the history. ``document`` is the file the BOM was taken from."""
+
+    kind: ChangeKind
+    summary: str
+    reason: str | None = None
+    document_file: str | None = None
+    document_sha256: str | None = None
+    document_revision: int | None = None
+    sync_id: str | None = None
+    refers_to: int | None = None
+    decisions: Sequence[Mapping[str, Any]] = ()
+
+
+def new_line_id() -> str:
+    """A line's stable id."""
+    return str(uuids.uuid4())
+
+
+def check_version(parent: Item, expected: int | None) -> None:
+    """Raise VersionConflictError unless the BOM still has the version that the request was made from."""
+    if expected is not None and expected != parent.bom_version:
+        raise VersionConflictError(
+            f"the BOM of {parent.part_number} has version {parent.bom_version}, the request was made from "
+            f"version {expected}; read it again and repeat"
+        )
+
+
+def apply_changes(tx: Tx, parent: Item, changes: Sequence[LineChange], note: ChangeNote) -> tuple[int, int]:
+    """Write ``changes`` to the parent's BOM (whose lock the caller holds) and to its history.
+
+    Returns (change id, version after). The version moves only when a line does.
+    """
+    version = parent.bom_version + (1 if changes else 0)
+    _write_lines(tx, parent, changes)
+    change_id = tx.conn.execute(
+        insert(bom_changes)
+        .values(
+            parent_id=parent.id,
+            version=version,
+            kind=note.kind.value,
+            at=tx.stamp,
+            username=tx.actor.username,
+            summary=note.summary,
+            reason=note.reason,
+            document_file=note.document_file,
+            document_sha256=note.document_sha256,
+            document_revision=note.document_revision,
+            sync_id=note.sync_id,
+            refers_to=note.refers_to,
+            decisions=dumps([dict(d) for d in note.decisions]) if note.decisions else None,
+        )
+        .returning(bom_changes.c.id)
+    ).scalar_one()
+    if changes:
+        insert_rows(tx, bom_change_lines, [_history_row(change_id, change) for change in changes])
+        tx.conn.execute(update(items).where(items.c.id == parent.id).values(bom_version=version))
+    return change_id, version
+
+
+def check_no_cycle(tx: Tx, parent: Item, child_ids: Collection[int]) -> None:
+    """Raise CycleError where one of the children to be added contains the parent, or is it.
+
+    Looks upwards from the parent: its ancestors are few where its children may be thousands. The caller's
+    edges are added under the structure lock, so that two requests cannot close a ring together.
+    """
+    if not child_ids:
+        return
+    tx.lock_structure()
+    edges = _edges_above(tx, parent.id)
+    wanted = set(child_ids)
+    above: dict[int, int] = {parent.id: parent.id}
+    queue = [parent.id]
+    while queue:
+        node = queue.pop(0)
+        if node in wanted:
+            raise CycleError(_ring(tx, parent.id, node, above))
+        for ancestor in edges.get(node, ()):
+            if ancestor not in above:
+                above[ancestor] = node
+                queue.append(ancestor)
+
+
+def _edges_above(tx: Tx, item_id: int) -> dict[int, list[int]]:
+    reach = select(bom_lines.c.parent_id, bom_lines.c.child_id).where(bom_lines.c.child_id == item_id)
+    cte = reach.cte("above", recursive=True)
+    cte = cte.union(
+        select(bom_lines.c.parent_id, bom_lines.c.child_id).join(cte, bom_lines.c.child_id == cte.c.parent_id)
+    )
+    edges: dict[int, list[int]] = {}
+    for parent_id, child_id in tx.conn.execute(select(cte.c.parent_id, cte.c.child_id)):
+        edges.setdefault(child_id, []).append(parent_id)
+    return edges
+
+
+def _ring(tx: Tx, parent_id: int, child_id: int, above: Mapping[int, int]) -> list[str]:
+    # `above` leads from an ancestor down to the parent: parent -> child (the new edge) -> ... -> parent.
+    ids = [parent_id, child_id]
+    while ids[-1] != parent_id:
+        ids.append(above[ids[-1]])
+    names = dict(
+        tx.conn.execute(select(items.c.id, items.c.part_number).where(one_of(tx, items.c.id, ids))).all()
+    )
+    return [names[i] for i in ids]
+
+
+def _write_lines(tx: Tx, parent: Item, changes: Sequence[LineChange]) -> None:
+    added = [(c, c.after) for c in changes if c.before is None and c.after is not None]
+    changed = [(c, c.after) for c in changes if c.before is not None and c.after is not None]
+    removed = [c.line_id for c in changes if c.after is None]
+    if removed:
+        tx.conn.execute(delete(bom_lines).where(one_of(tx, bom_lines.c.id, removed)))
+    if changed:
+        update_rows(tx, bom_lines, "id", [{"id": c.line_id, **state_columns(s)} for c, s in changed])
+    if added:
+        last = tx.conn.scalar(
+            select(func.max(bom_lines.c.position)).where(bom_lines.c.parent_id == parent.id)
+        )
+        first = (last or 0) + 1
+        insert_rows(
+            tx,
+            bom_lines,
+            [
+                {
+                    "id": c.line_id,
+                    "parent_id": parent.id,
+                    "child_id": c.child_id,
+                    "position": first + n,
+                    **state_columns(state),
+                }
+                for n, (c, state) in enumerate(added)
+            ],
+        )
+
+
+def _history_row(change_id: int, change: LineChange) -> dict[str, Any]:
+    return {
+        "change_id": change_id,
+        "line_id": change.line_id,
+        "child_id": change.child_id,
+        "action": change.action,
+        "before": dumps(state_to_json(change.before)) if change.before else None,
+        "after": dumps(state_to_json(change.after)) if change.after else None,
+    }

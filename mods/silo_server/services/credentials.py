@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""API tokens: ``silo_…``, shown once, stored as SHA-256, named, expiring, revocable, with a last use."""
+
+from __future__ import annotations
+
+import hashlib
+import secrets
+from dataclasses import dataclass
+from datetime import timedelta
+
+from sqlalchemy import insert, select, update
+
+from silo.bom.errors import NotFoundError
+from silo_server.clock import stamp
+from silo_server.db.engine import Database, Tx
+from silo_server.db.tables import api_tokens, users
+from silo_server.services import audit
+from silo_server.values import Actor, Role
+
+PREFIX = "silo_"
+# Writing down the last use of a token on every request would make every read a write.
+LAST_USE_SECONDS = 60
+
+
+@dataclass(frozen=True, slots=True)
+class Token:
+    """An API token as it may be shown: never its secret."""
+
+    id: int
+    username: str
+    name: str
+    prefix: str
+    created_at: str
+    expires_at: str | None
+    last_used_at: str | None
+    revoked_at: str | None
+
+
+def secret_hash(secret: str) -> str:
+    """What is stored of a secret. The secrets are 160 random bits, so that a plain SHA-256 is enough."""
+    return hashlib.sha256(secret.encode("utf-8", "surrogatepass")).hexdigest()
+
+
+def create_token(
+    tx: Tx, user_id: int, name: str, *, days: float | None = None, secret: str | None = None
+) -> tuple[Token, str]:
+    """Make a token of the user; returns it with its secret, which is never shown again."""
+    secret = secret or PREFIX + secrets.token_hex(20)
+    expires = stamp(tx.at + timedelta(days=days)) if days is not None else None
+    token_id = tx.conn.execute(
+        insert(api_tokens)
+        .values(
+            user_id=user_id,
+            name=name,
+            token_hash=secret_hash(secret),
+            prefix=secret[:9],
+            created_at=tx.stamp,
+            expires_at=expires,
+        )
+        .returning(api_tokens.c.id)
+    ).scalar_one()
+    audit.note(tx, "token.created", name)
+    return next(t for t in list_tokens(tx, user_id) if t.id == token_id), secret
+
+
+def has_secret(tx: Tx, secret: str) -> bool:
+    """True where a token with this secret is known already, used up or not."""
+    query = select(api_tokens.c.id).where(api_tokens.c.token_hash == secret_hash(secret))
+    return tx.conn.scalar(query) is not None
+
+
+def list_tokens(tx: Tx, user_id: int | None = None) -> list[Token]:
+    """The tokens of a user, or of everybody, newest first."""
+    query = (
+        select(api_tokens, users.c.username)
+        .join(users, users.c.id == api_tokens.c.user_id)
+        .order_by(api_tokens.c.id.desc())
+    )
+    if user_id is not None:
+        query = query.where(api_tokens.c.user_id == user_id)
+    return [
+        Token(r.id, r.username, r.name, r.prefix, r.created_at, r.expires_at, r.last_used_at, r.revoked_at)
+        for r in tx.conn.execute(query)
+    ]
+
+
+def revoke_token(tx: Tx, token_id: int, user_id: int | None) -> None:
+    """Revoke a token at once; of the user, or anybody's where ``user_id`` is None."""
+    query = select(api_tokens.c.name).where(api_tokens.c.id == token_id)
+    if user_id is not None:
+        query = query.where(api_tokens.c.user_id == user_id)
+    name = tx.conn.scalar(query)
+    if name is None:
+        raise NotFoundError(f"there is no token {token_id} of yours")
+    tx.conn.execute(
+        update(api_tokens)
+        .where(api_tokens.c.id == token_id, api_tokens.c.revoked_at.is_(None))
+        .values(revoked_at=tx.stamp)
+    )
+    audit.note(tx, "token.revoked", name)
+
+
+def actor_by_token(db: Database, secret: str, address: str) -> Actor | None:
+    """Who holds this token; None where it is unknown, expired, revoked, or its user is not active."""
+    with db.read() as tx:
+        row = tx.conn.execute(
+            select(
+                api_tokens.c.id,
+                api_tokens.c.last_used_at,
+                users.c.id.label("user_id"),
+                users.c.username,
+                users.c.display_name,
+                users.c.role,
+            )
+            .join(users, users.c.id == api_tokens.c.user_id)
+            .where(
+                api_tokens.c.token_hash == secret_hash(secret),
+                api_tokens.c.revoked_at.is_(None),
+                (api_tokens.c.expires_at.is_(None)) | (api_tokens.c.expires_at > tx.stamp),
+                users.c.active,
+            )
+        ).one_or_none()
+        stale = stamp(tx.at - timedelta(seconds=LAST_USE_SECONDS))
+    if row is None:
+        return None
+    if row.last_used_at is None or row.last_used_at < stale:
+        _touch(db, row.id)
+    return Actor(row.username, Role(row.role), row.user_id, row.display_name, "token", address)
+
+
+def _touch(db: Database, token_id: int) -> None:
+    with db.write(even_when_read_only=True) as tx:
+        tx.conn.execute(update(api_tokens).where(api_tokens.c.id == token_id).values(last_used_at=tx.stamp))

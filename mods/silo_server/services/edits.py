@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What people do to single BOM lines: add, change, remove. Each is one change in the history."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from silo.bom.diff import same_quantity
+from silo.bom.errors import RejectedError
+from silo_server.db.engine import Tx
+from silo_server.errors import DuplicateError
+from silo_server.services import events
+from silo_server.services.changes import (
+    ChangeKind,
+    ChangeNote,
+    LineChange,
+    apply_changes,
+    check_no_cycle,
+    check_version,
+    new_line_id,
+)
+from silo_server.services.items import get_item
+from silo_server.services.lines import line_of, lines_of
+from silo_server.services.merge_request import quantity_problem
+from silo_server.values import Item, Line, LineState, number
+
+REL_TYPES = ("component", "alternate", "reference")
+SOURCES = ("manual", "assembly")
+
+
+@dataclass(frozen=True, kw_only=True)
+class NewLine:
+    """A line to be added by hand."""
+
+    child_part_number: str
+    quantity: float = 1.0
+    rel_type: str = "component"
+    unit: str | None = None
+    reference_designators: tuple[str, ...] = ()
+    find_number: str | None = None
+    notes: str | None = None
+    child_revision: int | None = None
+    source: str = "manual"
+    metadata: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Edited:
+    """The line after an edit (None once removed), its parent, and the BOM's version and change."""
+
+    parent: Item
+    line: Line | None
+    version: int
+    change_id: int
+
+
+def add_line(tx: Tx, part_number: str, new: NewLine, expected: int | None = None) -> Edited:
+    """Add a line. Raises DuplicateError where the child is there already, CycleError, RejectedError."""
+    parent = get_item(tx, part_number, lock=True)
+    check_version(parent, expected)
+    child = get_item(tx, new.child_part_number)
+    state = LineState(
+        new.quantity,
+        new.source,
+        new.rel_type,
+        new.unit,
+        tuple(new.reference_designators),
+        new.find_number,
+        new.notes,
+        new.child_revision,
+        metadata=dict(new.metadata),
+    )
+    check_state(state)
+    for line in lines_of(tx, parent):
+        if line.child_id == child.id and line.state.rel_type == state.rel_type:
+            raise DuplicateError(
+                f"{child.part_number} is in the BOM of {parent.part_number} already; change its line instead"
+            )
+    check_no_cycle(tx, parent, [child.id])
+    change = LineChange(new_line_id(), child.id, None, state)
+    text = f"{child.part_number} added, quantity {number(state.quantity)}"
+    return _apply(tx, parent, change, child.part_number, text)
+
+
+def change_line(
+    tx: Tx, part_number: str, child: str, changes: Mapping[str, Any], expected: int | None = None
+) -> Edited:
+    """Change a line's fields (those of LineState that people own).
+
+    Another quantity on an assembly line makes it a manual override, which remembers what the assembly said;
+    giving that quantity back ends the override. A ``source`` that is given wins over this.
+    """
+    parent = get_item(tx, part_number, lock=True)
+    check_version(parent, expected)
+    line = line_of(lines_of(tx, parent), child, parent)
+    after = edited_state(line.state, changes)
+    check_state(after)
+    if after == line.state:
+        return Edited(parent, line, parent.bom_version, 0)
+    if after.rel_type != line.state.rel_type:
+        _check_free(tx, parent, line, after.rel_type)
+    what = ", ".join(sorted(k for k in changes if getattr(after, k) != getattr(line.state, k))) or "source"
+    if not same_quantity(after.quantity, line.state.quantity):
+        what = f"quantity {number(line.state.quantity)} → {number(after.quantity)}"
+    change = LineChange(line.id, line.child_id, line.state, after)
+    return _apply(tx, parent, change, line.child_part_number, f"{line.child_part_number} changed: {what}")
+
+
+def remove_line(tx: Tx, part_number: str, child: str, expected: int | None = None) -> Edited:
+    """Remove a line; only people do this."""
+    parent = get_item(tx, part_number, lock=True)
+    check_version(parent, expected)
+    line = line_of(lines_of(tx, parent), child, parent)
+    change = LineChange(line.id, line.child_id, line.state, None)
+    return _apply(tx, parent, change, None, f"{line.child_part_number} removed")
+
+
+def edited_state(before: LineState, changes: Mapping[str, Any]) -> LineState:
+    """The state after a person's edit; pure, so that the import's preview says the same."""
+    after = replace(before, **changes)
+    if "source" in changes:
+        if after.source == "assembly":
+            return replace(after, override=False, cad_quantity=None, reason=None)
+        return replace(after, unreferenced_since=None)
+    if same_quantity(after.quantity, before.quantity):
+        return after
+    if before.override and same_quantity(after.quantity, before.cad_quantity):
+        return replace(after, source="assembly", override=False, cad_quantity=None)
+    if before.source == "assembly":
+        return replace(
+            after, source="manual", override=True, cad_quantity=before.quantity, unreferenced_since=None
+        )
+    return after
+
+
+def check_state(state: LineState) -> None:
+    """Raise RejectedError, with everything that is wrong, unless the line's state is usable."""
+    problems = []
+    problem = quantity_problem(state.quantity)
+    if problem:
+        problems.append(f"quantity: {problem}")
+    if state.rel_type not in REL_TYPES:
+        problems.append(f"rel_type: wanted one of {', '.join(REL_TYPES)}, got {state.rel_type!r}")
+    if state.source not in SOURCES:
+        problems.append(f"source: wanted one of {', '.join(SOURCES)}, got {state.source!r}")
+    for name, limit in (("unit", 32), ("find_number", 32)):
+        value = getattr(state, name)
+        if value is not None and len(value) > limit:
+            problems.append(f"{name}: wanted at most {limit} characters, got {len(value)}")
+    if problems:
+        raise RejectedError("; ".join(problems), problems)
+
+
+def _check_free(tx: Tx, parent: Item, line: Line, rel_type: str) -> None:
+    for other in lines_of(tx, parent):
+        if other.child_id == line.child_id and other.state.rel_type == rel_type:
+            raise DuplicateError(f"{line.child_part_number} is in this BOM as {rel_type} already")
+
+
+def _apply(tx: Tx, parent: Item, change: LineChange, child: str | None, text: str) -> Edited:
+    note = ChangeNote(kind=ChangeKind.EDIT, summary=text)
+    change_id, version = apply_changes(tx, parent, [change], note)
+    events.bom_updated(tx, parent, ChangeKind.EDIT, text)
+    after = None
+    if child is not None:
+        after = next(line for line in lines_of(tx, parent) if line.id == change.line_id)
+    return Edited(parent, after, version, change_id)

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The durable event log: what is announced, how it is read back, how it is trimmed.
+
+Names: the spec's ``bom_merge``; the real Silo's ``item.created``, ``item.updated``, ``item.deleted``,
+``revision.created``, ``server.state``; ours ``bom.updated`` for changes of a BOM that are no merge.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import delete, func, select
+
+from silo_server.clock import wire
+from silo_server.db.engine import Tx
+from silo_server.db.state import get_state, put_state
+from silo_server.db.tables import events
+from silo_server.values import Item, NewEvent, Revision, dumps
+
+HORIZON = "event_horizon"
+
+
+@dataclass(frozen=True, slots=True)
+class LoggedEvent:
+    """An event of the log. ``item_uuid`` and ``part_number_key`` are what filters look at."""
+
+    id: int
+    name: str
+    data: str
+    item_uuid: str | None
+    part_number_key: str | None
+
+
+def item_created(tx: Tx, item: Item) -> None:
+    _about(tx, "item.created", item, {**_named(item), "item_type": item.item_type})
+
+
+def item_updated(tx: Tx, item: Item) -> None:
+    _about(tx, "item.updated", item, {**_named(item), "revision": item.current_revision})
+
+
+def item_deleted(tx: Tx, item: Item) -> None:
+    _about(tx, "item.deleted", item, {"part_number": item.part_number, "id": item.uuid})
+
+
+def revision_created(tx: Tx, item: Item, revision: Revision) -> None:
+    data = {
+        "part_number": item.part_number,
+        "id": item.uuid,
+        "revision_number": revision.revision_number,
+        "comment": revision.comment,
+        "user": revision.created_by,
+    }
+    _about(tx, "revision.created", item, data)
+
+
+def bom_updated(tx: Tx, item: Item, kind: str, summary: str) -> None:
+    data = {
+        "item": item.part_number,
+        "kind": kind,
+        "user": tx.actor.username,
+        "timestamp": wire(tx.stamp),
+        "summary": summary,
+    }
+    _about(tx, "bom.updated", item, data)
+
+
+def bom_merged(tx: Tx, item: Item, data: Mapping[str, Any]) -> None:
+    _about(tx, "bom_merge", item, data)
+
+
+def server_state(tx: Tx, mode: str) -> None:
+    tx.emit(NewEvent("server.state", dumps({"mode": mode})))
+
+
+def read_after(tx: Tx, after: int, limit: int = 500) -> list[LoggedEvent]:
+    """The next events after id ``after``, oldest first."""
+    rows = tx.conn.execute(
+        select(events.c.id, events.c.name, events.c.data, events.c.item_uuid, events.c.part_number_key)
+        .where(events.c.id > after)
+        .order_by(events.c.id)
+        .limit(limit)
+    ).all()
+    return [LoggedEvent(*row) for row in rows]
+
+
+def bounds(tx: Tx) -> tuple[int, int]:
+    """(horizon, head): the newest id that was trimmed away, and the newest id there is."""
+    horizon = int(get_state(tx, HORIZON) or 0)
+    head = tx.conn.scalar(select(func.max(events.c.id))) or 0
+    return horizon, max(head, horizon)
+
+
+def trim(tx: Tx, keep: int) -> int:
+    """Forget all but the newest ``keep`` events; returns how many went. The horizon says up to where."""
+    horizon, head = bounds(tx)
+    cut = head - keep
+    if cut <= horizon:
+        return 0
+    gone = tx.conn.execute(delete(events).where(events.c.id <= cut)).rowcount
+    put_state(tx, HORIZON, str(cut))
+    return gone
+
+
+def _named(item: Item) -> dict[str, Any]:
+    return {
+        "part_number": item.part_number,
+        "id": item.uuid,
+        "name": item.name,
+        "description": item.description,
+    }
+
+
+def _about(tx: Tx, name: str, item: Item, data: Mapping[str, Any]) -> None:
+    tx.emit(NewEvent(name, dumps(data), item.uuid, item.part_number))

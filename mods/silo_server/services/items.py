@@ -1,0 +1,353 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Items: their stable UUIDs, their part numbers (which may be renamed), finding and changing them."""
+
+from __future__ import annotations
+
+import json
+import re
+import uuid as uuids
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from sqlalchemy import ColumnElement, func, insert, select, update
+from sqlalchemy.exc import IntegrityError
+
+from silo.bom.errors import NotFoundError, RejectedError
+from silo_server.db.bulk import one_of
+from silo_server.db.engine import Tx
+from silo_server.db.tables import items, number_counters
+from silo_server.errors import DuplicateError
+from silo_server.schema.catalog import ITEM_TYPES, Category, Schema, find_schema
+from silo_server.services import events, revisions
+from silo_server.values import Item
+
+# Words that stand where a part number stands in a path.
+RESERVED = frozenset({"by-uuid", "search", "export.csv", "import", "new"})
+NUMBER_FORM = re.compile(r"[^\s/\\?#%\x00-\x1f\x7f](?:[^/\\?#%\x00-\x1f\x7f]{0,62}[^\s/\\?#%\x00-\x1f\x7f])?")
+MAX_TEXT = 10_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class NewItem:
+    """What a client says of an item to be made. With ``uuid`` a repeat makes no second item."""
+
+    schema: str | None = None
+    category: str | None = None
+    part_number: str | None = None
+    uuid: str | None = None
+    name: str = ""
+    description: str = ""
+    item_type: str | None = None
+    sourcing_type: str | None = None
+    long_description: str | None = None
+    properties: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ItemQuery:
+    """Filters of the list; ``search`` looks into number, name and description, word by word."""
+
+    search: str = ""
+    item_type: str | None = None
+    category: str | None = None
+    include_archived: bool = False
+    limit: int = 100
+    offset: int = 0
+
+
+def to_item(row: Row[Any]) -> Item:
+    """A frozen item from its row."""
+    return Item(
+        id=row.id,
+        uuid=row.uuid,
+        part_number=row.part_number,
+        name=row.name,
+        description=row.description,
+        item_type=row.item_type,
+        schema=row.schema_name,
+        category=row.category,
+        sourcing_type=row.sourcing_type,
+        long_description=row.long_description,
+        thumbnail_key=row.thumbnail_key,
+        properties=json.loads(row.properties),
+        current_revision=row.current_revision,
+        bom_version=row.bom_version,
+        created_at=row.created_at,
+        created_by=row.created_by,
+        updated_at=row.updated_at,
+        updated_by=row.updated_by,
+        archived_at=row.archived_at,
+    )
+
+
+def get_item(tx: Tx, part_number: str, *, include_archived: bool = False, lock: bool = False) -> Item:
+    """The item with this number, in whatever case; NotFoundError where there is none (or it is archived).
+
+    ``lock`` makes other writers of this item, and of its BOM, wait until this transaction ends.
+    """
+    query = select(items).where(items.c.part_number_key == part_number.casefold())
+    row = tx.conn.execute(query.with_for_update(key_share=True) if lock else query).one_or_none()
+    if row is None or (row.archived_at and not include_archived):
+        state = "is archived" if row is not None else "does not exist on this server"
+        raise NotFoundError(f"item {part_number!r} {state}")
+    return to_item(row)
+
+
+def get_by_uuid(tx: Tx, uuid: str) -> Item:
+    """The item with this UUID; NotFoundError when there is none or it is archived."""
+    row = tx.conn.execute(select(items).where(items.c.uuid == normal_uuid(uuid))).one_or_none()
+    if row is None or row.archived_at:
+        raise NotFoundError(f"no item has the UUID {uuid}")
+    return to_item(row)
+
+
+def get_by_uuids(tx: Tx, wanted: Sequence[str]) -> list[Item]:
+    """The items with these UUIDs, each once, in the order asked; those that are missing are absent."""
+    known = [normal for uuid in wanted if (normal := uuid_or_none(uuid)) is not None]
+    rows = tx.conn.execute(
+        select(items).where(one_of(tx, items.c.uuid, known), items.c.archived_at.is_(None))
+    ).all()
+    found = {row.uuid: to_item(row) for row in rows}
+    return [found[uuid] for uuid in dict.fromkeys(known) if uuid in found]
+
+
+def by_ids(tx: Tx, ids: Collection[int]) -> dict[int, Item]:
+    """Items by their internal id, archived ones too."""
+    rows = tx.conn.execute(select(items).where(one_of(tx, items.c.id, ids))).all()
+    return {row.id: to_item(row) for row in rows}
+
+
+def list_items(tx: Tx, query: ItemQuery) -> tuple[list[Item], int]:
+    """A page of the items that match, by part number, and how many match in all."""
+    conditions: list[ColumnElement[bool]] = [] if query.include_archived else [items.c.archived_at.is_(None)]
+    for word in query.search.casefold().split():
+        conditions.append(items.c.search_key.contains(word, autoescape=True))
+    if query.item_type:
+        conditions.append(items.c.item_type == query.item_type)
+    if query.category:
+        conditions.append(items.c.category == query.category.upper())
+    total = tx.conn.scalar(select(func.count()).select_from(items).where(*conditions)) or 0
+    rows = tx.conn.execute(
+        select(items)
+        .where(*conditions)
+        .order_by(items.c.part_number_key)
+        .limit(query.limit)
+        .offset(query.offset)
+    ).all()
+    return [to_item(row) for row in rows], total
+
+
+def preview_number(tx: Tx, schema_name: str | None, category: str) -> str:
+    """The number the next item of the category would get; consumes nothing."""
+    schema = find_schema(schema_name)
+    found = schema.category(category)
+    last = tx.conn.scalar(
+        select(number_counters.c.last_serial).where(
+            number_counters.c.schema_name == schema.name, number_counters.c.category == found.code
+        )
+    )
+    return _next_free(tx, schema, found, last or 0)[0]
+
+
+def create_item(tx: Tx, new: NewItem) -> tuple[Item, bool]:
+    """Make an item. Returns it, and False where its UUID was known already (the repeat of a request).
+
+    Raises RejectedError for unusable values, DuplicateError for a taken part number.
+    """
+    if new.uuid is not None:
+        known = tx.conn.execute(select(items).where(items.c.uuid == normal_uuid(new.uuid))).one_or_none()
+        if known is not None:
+            return to_item(known), False
+    schema = find_schema(new.schema)
+    category = schema.category(new.category) if new.category else None
+    number = check_number(new.part_number) if new.part_number else _take_number(tx, schema, category)
+    name, description = new.name.strip(), new.description.strip()
+    values = {
+        "uuid": normal_uuid(new.uuid) if new.uuid else str(uuids.uuid4()),
+        "schema_name": schema.name,
+        "category": category.code if category else None,
+        "item_type": _item_type(new.item_type, category),
+        "name": name or description or number,
+        "description": description or name,
+        "sourcing_type": new.sourcing_type,
+        "long_description": new.long_description,
+        "properties": "{}",
+        "current_revision": 0,
+        "bom_version": 0,
+        "created_at": tx.stamp,
+        "created_by": tx.actor.username,
+    }
+    _insert(tx, number, values)
+    item = get_item(tx, number)
+    if new.properties:
+        revisions.add_revision(tx, item, comment="created", properties=new.properties)
+        item = get_item(tx, number)
+    events.item_created(tx, item)
+    return item, True
+
+
+@dataclass(frozen=True, kw_only=True)
+class ItemChange:
+    """Fields to change; None leaves a field as it is. ``properties`` make a new revision."""
+
+    part_number: str | None = None
+    name: str | None = None
+    description: str | None = None
+    item_type: str | None = None
+    sourcing_type: str | None = None
+    long_description: str | None = None
+    properties: Mapping[str, Any] | None = None
+    comment: str = ""
+
+
+def change_item(tx: Tx, part_number: str, change: ItemChange) -> Item:
+    """Change an item in place; a revision is made only where ``properties`` are given (and differ)."""
+    item = get_item(tx, part_number, lock=True)
+    values = _changed_values(item, change)
+    if change.properties is not None and dict(change.properties) != dict(item.properties):
+        revisions.add_revision(tx, item, comment=change.comment, properties=change.properties)
+    elif not values:
+        return item
+    number = values.pop("part_number", item.part_number)
+    merged = {"name": item.name, "description": item.description, **values}
+    try:
+        tx.conn.execute(
+            update(items)
+            .where(items.c.id == item.id)
+            .values(
+                **values,
+                part_number=number,
+                part_number_key=number.casefold(),
+                search_key=_search_key(number, merged["name"], merged["description"]),
+                updated_at=tx.stamp,
+                updated_by=tx.actor.username,
+            )
+        )
+    except IntegrityError as error:
+        raise DuplicateError(f"part number {number} is taken by another item") from error
+    after = get_item(tx, number)
+    events.item_updated(tx, after)
+    return after
+
+
+def archive_item(tx: Tx, part_number: str) -> None:
+    """Archive an item: it keeps its number, its history and its place in BOMs, and is found no more."""
+    item = get_item(tx, part_number, lock=True)
+    tx.conn.execute(update(items).where(items.c.id == item.id).values(archived_at=tx.stamp))
+    events.item_deleted(tx, item)
+
+
+def unarchive_item(tx: Tx, part_number: str) -> Item:
+    """Bring an archived item back."""
+    item = get_item(tx, part_number, include_archived=True, lock=True)
+    if item.archived_at:
+        tx.conn.execute(update(items).where(items.c.id == item.id).values(archived_at=None))
+        events.item_updated(tx, item)
+    return get_item(tx, part_number)
+
+
+def check_number(number: str) -> str:
+    """A part number as given, trimmed; RejectedError where it cannot stand in a path or a cell."""
+    trimmed = number.strip()
+    if not NUMBER_FORM.fullmatch(trimmed) or trimmed.casefold() in RESERVED or trimmed in (".", ".."):
+        raise RejectedError(
+            "part_number: wanted 1 to 64 characters without / \\ ? # % and control characters, "
+            f"got {number!r}"
+        )
+    return trimmed
+
+
+def normal_uuid(uuid: str) -> str:
+    """The UUID in its one written form; RejectedError where it is none."""
+    normal = uuid_or_none(uuid)
+    if normal is None:
+        raise RejectedError(f"uuid: wanted a UUID such as 6f9619ff-8b86-4011-b42d-00cf4fc964ff, got {uuid!r}")
+    return normal
+
+
+def uuid_or_none(uuid: str) -> str | None:
+    """The UUID in its one written form, None where it is none."""
+    try:
+        return str(uuids.UUID(uuid))
+    except ValueError:
+        return None
+
+
+def _insert(tx: Tx, number: str, values: Mapping[str, Any]) -> None:
+    try:
+        tx.conn.execute(
+            insert(items).values(
+                **values,
+                part_number=number,
+                part_number_key=number.casefold(),
+                search_key=_search_key(number, values["name"], values["description"]),
+                updated_at=values["created_at"],
+                updated_by=values["created_by"],
+            )
+        )
+    except IntegrityError as error:
+        raise DuplicateError(
+            f"part number {number} is taken; numbers are unique whatever their case"
+        ) from error
+
+
+def _item_type(given: str | None, category: Category | None) -> str:
+    if given is None:
+        return category.item_type if category else "part"
+    if given not in ITEM_TYPES:
+        raise RejectedError(f"item_type: wanted one of {', '.join(ITEM_TYPES)}, got {given!r}")
+    return given
+
+
+def _changed_values(item: Item, change: ItemChange) -> dict[str, Any]:
+    given = {
+        "part_number": check_number(change.part_number) if change.part_number is not None else None,
+        "name": change.name,
+        "description": change.description,
+        "item_type": _item_type(change.item_type, None) if change.item_type is not None else None,
+        "sourcing_type": change.sourcing_type,
+        "long_description": change.long_description,
+    }
+    return {key: value for key, value in given.items() if value is not None and value != getattr(item, key)}
+
+
+def _search_key(number: str, name: str, description: str) -> str:
+    return "\n".join((number, name, description)).casefold()
+
+
+def _take_number(tx: Tx, schema: Schema, category: Category | None) -> str:
+    if category is None:
+        raise RejectedError("category: wanted one (such as F01) or an explicit part_number, got neither")
+    where = (number_counters.c.schema_name == schema.name, number_counters.c.category == category.code)
+    _ensure_counter(tx, schema.name, category.code)
+    last = tx.conn.scalar(select(number_counters.c.last_serial).where(*where).with_for_update()) or 0
+    number, serial = _next_free(tx, schema, category, last)
+    tx.conn.execute(update(number_counters).where(*where).values(last_serial=serial))
+    return number
+
+
+def _ensure_counter(tx: Tx, schema: str, category: str) -> None:
+    from sqlalchemy.dialects import postgresql, sqlite
+
+    make = postgresql.insert if tx.postgres else sqlite.insert
+    tx.conn.execute(
+        make(number_counters)
+        .values(schema_name=schema, category=category, last_serial=0)
+        .on_conflict_do_nothing()
+    )
+
+
+def _next_free(tx: Tx, schema: Schema, category: Category, last: int) -> tuple[str, int]:
+    # Explicit numbers may stand in the way; they are few, so that a page of candidates is looked at a time.
+    serial = last
+    while True:
+        page = {schema.number(category.code, n): n for n in range(serial + 1, serial + 65)}
+        keys = {number.casefold(): number for number in page}
+        taken = set(
+            tx.conn.scalars(select(items.c.part_number_key).where(one_of(tx, items.c.part_number_key, keys)))
+        )
+        for key, number in keys.items():
+            if key not in taken:
+                return number, page[number]
+        serial += 64

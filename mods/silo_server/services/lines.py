@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Reading BOM lines: of one parent, of many, and as JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import replace
+from typing import Any
+
+from sqlalchemy import Select, select
+
+from silo.bom.errors import NotFoundError
+from silo_server.clock import wire
+from silo_server.db.bulk import one_of
+from silo_server.db.engine import Tx
+from silo_server.db.tables import bom_lines, items
+from silo_server.values import Item, Line, LineState, dumps, number
+
+STATE_COLUMNS = (
+    bom_lines.c.quantity,
+    bom_lines.c.source,
+    bom_lines.c.rel_type,
+    bom_lines.c.unit,
+    bom_lines.c.reference_designators,
+    bom_lines.c.find_number,
+    bom_lines.c.notes,
+    bom_lines.c.child_revision,
+    bom_lines.c.unreferenced_since,
+    bom_lines.c.override,
+    bom_lines.c.cad_quantity,
+    bom_lines.c.reason,
+    bom_lines.c.metadata.label("line_metadata"),
+)
+
+
+def select_lines() -> Select[*tuple[Any, ...]]:
+    """The query that :func:`to_line` understands."""
+    return select(
+        bom_lines.c.id,
+        bom_lines.c.parent_id,
+        bom_lines.c.child_id,
+        bom_lines.c.position,
+        items.c.part_number,
+        items.c.uuid,
+        items.c.name,
+        items.c.description,
+        items.c.item_type,
+        items.c.current_revision,
+        items.c.archived_at,
+        *STATE_COLUMNS,
+    ).join(items, items.c.id == bom_lines.c.child_id)
+
+
+def to_line(row: Any) -> Line:
+    """A frozen line from a row of :func:`select_lines`; by position, which is what makes it quick."""
+    refs, metadata = row[15], row[23]
+    return Line(
+        row[0],
+        row[1],
+        row[2],
+        row[3],
+        row[4],
+        row[5],
+        row[6],
+        row[7],
+        row[8],
+        row[9],
+        row[10] is not None,
+        LineState(
+            row[11],
+            row[12],
+            row[13],
+            row[14],
+            () if refs == "[]" else tuple(json.loads(refs)),
+            row[16],
+            row[17],
+            row[18],
+            row[19],
+            bool(row[20]),
+            row[21],
+            row[22],
+            {} if metadata == "{}" else json.loads(metadata),
+        ),
+    )
+
+
+def lines_of(tx: Tx, parent: Item) -> list[Line]:
+    """The parent's lines in their order."""
+    query = select_lines().where(bom_lines.c.parent_id == parent.id).order_by(bom_lines.c.position)
+    return [to_line(row) for row in tx.conn.execute(query)]
+
+
+def lines_of_many(tx: Tx, parent_ids: Collection[int]) -> dict[int, list[Line]]:
+    """The lines of all these parents, by parent, each in their order."""
+    query = (
+        select_lines()
+        .where(one_of(tx, bom_lines.c.parent_id, parent_ids))
+        .order_by(bom_lines.c.parent_id, bom_lines.c.position)
+    )
+    found: dict[int, list[Line]] = {}
+    for row in tx.conn.execute(query):
+        found.setdefault(row[1], []).append(to_line(row))
+    return found
+
+
+def line_of(lines: Iterable[Line], child_part_number: str, parent: Item) -> Line:
+    """The line of this child, its component line where it has several; NotFoundError where it has none."""
+    key = child_part_number.casefold()
+    found = [line for line in lines if line.child_part_number.casefold() == key]
+    if found:
+        return min(found, key=lambda line: line.state.rel_type != "component")
+    raise NotFoundError(f"the BOM of {parent.part_number} has no line for {child_part_number!r}")
+
+
+def state_to_json(state: LineState) -> dict[str, Any]:
+    """A line's state as history stores it; only what is set."""
+    stored: dict[str, Any] = {"quantity": state.quantity, "source": state.source, "rel_type": state.rel_type}
+    for name in ("unit", "find_number", "notes", "child_revision", "unreferenced_since", "reason"):
+        value = getattr(state, name)
+        if value is not None:
+            stored[name] = value
+    if state.reference_designators:
+        stored["reference_designators"] = list(state.reference_designators)
+    if state.override:
+        stored["override"] = True
+    if state.cad_quantity is not None:
+        stored["cad_quantity"] = state.cad_quantity
+    if state.metadata:
+        stored["metadata"] = dict(state.metadata)
+    return stored
+
+
+def state_from_json(stored: Mapping[str, Any]) -> LineState:
+    """The state that :func:`state_to_json` stored."""
+    values = dict(stored)
+    if "reference_designators" in values:
+        values["reference_designators"] = tuple(values["reference_designators"])
+    return replace(LineState(values.pop("quantity"), values.pop("source")), **values)
+
+
+def state_columns(state: LineState) -> dict[str, Any]:
+    """A line's state as columns of the table."""
+    return {
+        "quantity": float(state.quantity),
+        "source": state.source,
+        "rel_type": state.rel_type,
+        "unit": state.unit,
+        "reference_designators": dumps(list(state.reference_designators)),
+        "find_number": state.find_number,
+        "notes": state.notes,
+        "child_revision": state.child_revision,
+        "unreferenced_since": state.unreferenced_since,
+        "override": state.override,
+        "cad_quantity": state.cad_quantity,
+        "reason": state.reason,
+        "metadata": dumps(dict(state.metadata)),
+    }
+
+
+def line_to_wire(line: Line, parent_part_number: str) -> dict[str, Any]:
+    """A line as ``GET …/bom`` tells it: the contract's keys, and ours for overrides and newer revisions."""
+    state = line.state
+    pinned = state.child_revision
+    return {
+        "id": line.id,
+        "parent_part_number": parent_part_number,
+        "child_part_number": line.child_part_number,
+        "child_id": line.child_uuid,
+        "child_name": line.child_name,
+        "child_description": line.child_description,
+        "child_item_type": line.child_item_type,
+        "rel_type": state.rel_type,
+        "quantity": number(state.quantity),
+        "unit": state.unit,
+        "reference_designators": list(state.reference_designators),
+        "find_number": state.find_number,
+        "notes": state.notes,
+        "child_revision": pinned,
+        "effective_revision": pinned if pinned is not None else line.child_current_revision,
+        "newer_revision_exists": pinned is not None and pinned < line.child_current_revision,
+        "child_archived": line.child_archived,
+        "source": state.source,
+        "unreferenced_since": wire(state.unreferenced_since),
+        "override": state.override,
+        "cad_quantity": number(state.cad_quantity),
+        "reason": state.reason,
+        "metadata": dict(state.metadata),
+    }

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Browser sessions: login with a password or a one-time link, rate-limited; each has a CSRF secret."""
+
+from __future__ import annotations
+
+import math
+import secrets
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+
+from sqlalchemy import delete, func, insert, select
+
+from silo.bom.errors import AuthError
+from silo_server.clock import stamp
+from silo_server.db.engine import Database, Tx
+from silo_server.db.tables import login_failures, login_links, sessions, users
+from silo_server.errors import TooManyAttemptsError
+from silo_server.services import accounts, audit
+from silo_server.services.credentials import secret_hash
+from silo_server.values import Actor, Role
+
+WRONG = "user name or password is wrong"
+
+
+@dataclass(frozen=True, slots=True)
+class NewSession:
+    """A session just begun: the cookie's secret, the CSRF secret and whose it is."""
+
+    secret: str
+    csrf_token: str
+    username: str
+    expires_at: str
+
+
+def log_in(db: Database, username: str, password: str, address: str) -> NewSession:
+    """Begin a session; AuthError where name or password is wrong, TooManyAttemptsError after too many."""
+    actor = Actor(username[:64], Role.VIEWER, address=address)
+    with db.read(actor) as tx:
+        _check_rate(tx, username, address)
+        user = accounts.check_password(tx, username, password)
+    with db.write(actor, even_when_read_only=True) as tx:
+        if user is None:
+            _note_failure(tx, username, address)
+        else:
+            audit.note(tx, "login")
+            return _begin(tx, user.id, user.username)
+    raise AuthError(WRONG)
+
+
+def create_login_link(tx: Tx, username: str) -> str:
+    """A secret that lets this user in once, for a while; for the first start, where nobody has a password."""
+    user = accounts.get_user(tx, username)
+    secret = secrets.token_urlsafe(32)
+    expires = stamp(tx.at + timedelta(seconds=tx.settings.login_link_seconds))
+    tx.conn.execute(delete(login_links).where(login_links.c.expires_at <= tx.stamp))
+    tx.conn.execute(
+        insert(login_links).values(token_hash=secret_hash(secret), user_id=user.id, expires_at=expires)
+    )
+    return secret
+
+
+def use_login_link(db: Database, secret: str, address: str) -> NewSession:
+    """Begin a session by a link; AuthError where it is unknown, used or too old."""
+    with db.write(Actor("link", Role.VIEWER, address=address), even_when_read_only=True) as tx:
+        row = tx.conn.execute(
+            delete(login_links)
+            .where(login_links.c.token_hash == secret_hash(secret))
+            .returning(login_links.c.user_id, login_links.c.expires_at)
+        ).one_or_none()
+        if row is not None and row.expires_at > tx.stamp:
+            user = tx.conn.execute(
+                select(users).where(users.c.id == row.user_id, users.c.active)
+            ).one_or_none()
+            if user is not None:
+                audit.note(tx, "login.link", user.username)
+                return _begin(tx, user.id, user.username)
+    raise AuthError("this login link was used already or is too old; start the server again for a new one")
+
+
+def actor_by_session(db: Database, secret: str, address: str) -> Actor | None:
+    """Who this session cookie is; None where it is unknown or over."""
+    with db.read() as tx:
+        row = tx.conn.execute(
+            select(
+                sessions.c.id_hash,
+                sessions.c.csrf_token,
+                users.c.id,
+                users.c.username,
+                users.c.display_name,
+                users.c.role,
+            )
+            .join(users, users.c.id == sessions.c.user_id)
+            .where(
+                sessions.c.id_hash == secret_hash(secret), sessions.c.expires_at > tx.stamp, users.c.active
+            )
+        ).one_or_none()
+    if row is None:
+        return None
+    return Actor(
+        row.username,
+        Role(row.role),
+        row.id,
+        row.display_name,
+        "session",
+        address,
+        row.csrf_token,
+        row.id_hash,
+    )
+
+
+def log_out(db: Database, actor: Actor) -> None:
+    """End the session; nothing to do for a token."""
+    if actor.session_hash is None:
+        return
+    with db.write(actor, even_when_read_only=True) as tx:
+        tx.conn.execute(delete(sessions).where(sessions.c.id_hash == actor.session_hash))
+        audit.note(tx, "logout")
+
+
+def _begin(tx: Tx, user_id: int, username: str) -> NewSession:
+    secret, csrf = secrets.token_urlsafe(32), secrets.token_urlsafe(32)
+    expires = stamp(tx.at + timedelta(seconds=tx.settings.session_seconds))
+    tx.conn.execute(delete(sessions).where(sessions.c.expires_at <= tx.stamp))
+    tx.conn.execute(
+        insert(sessions).values(
+            id_hash=secret_hash(secret),
+            user_id=user_id,
+            csrf_token=csrf,
+            created_at=tx.stamp,
+            expires_at=expires,
+        )
+    )
+    return NewSession(secret, csrf, username, expires)
+
+
+def _check_rate(tx: Tx, username: str, address: str) -> None:
+    window = tx.settings.login_window_seconds
+    since = stamp(tx.at - timedelta(seconds=window))
+    # One name from anywhere, and one address with whatever names: both are held back, the latter later.
+    limits = (
+        (login_failures.c.username_key == username.casefold()[:64], tx.settings.login_failures),
+        (login_failures.c.address == address[:64], tx.settings.login_failures * 4),
+    )
+    for condition, limit in limits:
+        count, oldest = tx.conn.execute(
+            select(func.count(), func.min(login_failures.c.at)).where(condition, login_failures.c.at > since)
+        ).one()
+        if count >= limit:
+            passed = (tx.at - datetime.fromisoformat(oldest)).total_seconds()
+            wait = max(1, math.ceil(window - passed))
+            raise TooManyAttemptsError(f"too many failed logins; try again in {wait} seconds", wait)
+
+
+def _note_failure(tx: Tx, username: str, address: str) -> None:
+    old = stamp(tx.at - timedelta(seconds=tx.settings.login_window_seconds))
+    tx.conn.execute(delete(login_failures).where(login_failures.c.at <= old))
+    tx.conn.execute(
+        insert(login_failures).values(
+            username_key=username.casefold()[:64], address=address[:64], at=tx.stamp
+        )
+    )
+    audit.note(tx, "login.failed", username[:64])

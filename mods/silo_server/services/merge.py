@@ -1,0 +1,324 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The merge of an assembly into its BOM (spec bom-sync §5): check, plan, apply, announce; one transaction.
+
+The rules are those of :mod:`silo.bom.merge`; here is what a server adds: who may change which row is enforced
+on the stored rows, a ``sync_id`` gives the same answer again, a version mismatch is refused, a person's
+decision on a conflict is remembered until the assembly says something else.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+from urllib.parse import quote
+
+from sqlalchemy import delete, insert, select
+
+from silo.bom.errors import ConflictError, RejectedError
+from silo.bom.merge import MergePlan, plan_merge, summary
+from silo.bom.model import QuantityChange
+from silo_server.clock import wire
+from silo_server.db.bulk import insert_rows, one_of
+from silo_server.db.engine import Tx
+from silo_server.db.tables import bom_conflicts, bom_syncs, items
+from silo_server.services import events
+from silo_server.services.changes import (
+    ChangeKind,
+    ChangeNote,
+    LineChange,
+    apply_changes,
+    check_no_cycle,
+    check_version,
+    new_line_id,
+)
+from silo_server.services.items import get_item
+from silo_server.services.lines import lines_of
+from silo_server.services.merge_request import MergeOrder
+from silo_server.values import Item, Line, LineState, dumps, number
+
+UNREFERENCED = "Present in server BOM but not in assembly"
+# An event goes to every listener: beyond this many unchanged lines it only says how many there are.
+EVENT_UNCHANGED_LINES = 500
+
+
+@dataclass(frozen=True, slots=True)
+class MergeOutcome:
+    """The answer's JSON text, the BOM's version, and whether this is an earlier answer given again."""
+
+    answer: str
+    version: int
+    replayed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class _Prepared:
+    parent: Item
+    lines: Sequence[Line]
+    child_ids: Mapping[str, int]
+    plan: MergePlan
+    accepted: Mapping[int, float]
+    conflicts: Sequence[QuantityChange]  # all of them, accepted ones too
+
+
+def preview_merge(tx: Tx, part_number: str, order: MergeOrder, expected: int | None) -> MergeOutcome:
+    """The answer that :func:`merge_bom` would give, without changing anything."""
+    parent = get_item(tx, part_number)
+    check_version(parent, expected)
+    prepared = _prepare(tx, parent, order)
+    return MergeOutcome(dumps(_answer(prepared, order)), parent.bom_version)
+
+
+def merge_bom(tx: Tx, part_number: str, order: MergeOrder, expected: int | None) -> MergeOutcome:
+    """Merge the assembly's direct children into the BOM.
+
+    Raises NotFoundError (parent), RejectedError (all bad entries at once), CycleError, VersionConflictError,
+    ConflictError (the ``sync_id`` was used for something else).
+    """
+    parent = get_item(tx, part_number, lock=True)
+    earlier = _replay(tx, parent, order)
+    if earlier is not None:
+        return earlier
+    check_version(parent, expected)
+    prepared = _prepare(tx, parent, order)
+    _, version = apply_changes(tx, parent, _line_changes(tx, prepared), _note(prepared, order))
+    _remember_conflicts(tx, prepared)
+    answer = _answer(prepared, order)
+    text = dumps(answer)
+    if order.sync_id:
+        _remember_sync(tx, parent, order, text, version)
+    events.bom_merged(tx, parent, _event(tx, prepared, answer))
+    return MergeOutcome(text, version)
+
+
+def resolve_url(part_number: str) -> str:
+    """Where a person decides on what a merge left open."""
+    return f"/items/{quote(part_number, safe='')}/bom"
+
+
+def _prepare(tx: Tx, parent: Item, order: MergeOrder) -> _Prepared:
+    lines = lines_of(tx, parent)
+    child_ids, names = _children(tx, order, lines)
+    entries: list[dict[str, Any]] = [
+        {"child_part_number": names[entry.key], "quantity": entry.quantity} for entry in order.entries
+    ]
+    plan = plan_merge(entries, [_as_mapping(line) for line in lines])
+    check_no_cycle(tx, parent, [child_ids[change.part_number] for change in plan.diff.added])
+    accepted = {
+        row.child_id: row.cad_quantity
+        for row in tx.conn.execute(
+            select(bom_conflicts.c.child_id, bom_conflicts.c.cad_quantity).where(
+                bom_conflicts.c.parent_id == parent.id, bom_conflicts.c.accepted
+            )
+        )
+    }
+    conflicts = [*plan.diff.conflicts, *_overrides_gone(lines, {e["child_part_number"] for e in entries})]
+    open_ones = tuple(c for c in conflicts if accepted.get(child_ids[c.part_number]) != c.local_quantity)
+    plan = replace(plan, diff=replace(plan.diff, conflicts=open_ones))
+    return _Prepared(parent, lines, child_ids, plan, accepted, conflicts)
+
+
+def _children(tx: Tx, order: MergeOrder, lines: Sequence[Line]) -> tuple[dict[str, int], dict[str, str]]:
+    """(part number → item id, key → part number) of every child; RejectedError lists all bad entries."""
+    child_ids = {line.child_part_number: line.child_id for line in lines}
+    names = {line.child_part_number.casefold(): line.child_part_number for line in lines}
+    asked = {entry.key for entry in order.entries if entry.key not in names}
+    archived: set[str] = set()
+    query = select(items.c.id, items.c.part_number, items.c.part_number_key, items.c.archived_at)
+    for row in tx.conn.execute(query.where(one_of(tx, items.c.part_number_key, asked))):
+        if row.archived_at:
+            archived.add(row.part_number_key)
+            continue
+        child_ids[row.part_number] = row.id
+        names[row.part_number_key] = row.part_number
+    problems = list(order.problems)
+    for entry in order.entries:
+        if entry.key not in names:
+            state = "is archived" if entry.key in archived else "does not exist on this server"
+            problems.append(
+                (entry.index, f"entries[{entry.index}].child_part_number: {entry.part_number!r} {state}")
+            )
+    if problems:
+        texts = [text for _, text in sorted(problems, key=lambda problem: problem[0])]
+        raise RejectedError(
+            f"{len(texts)} of the entries cannot be merged, so nothing was changed: {texts[0]}"
+            + (f" (and {len(texts) - 1} more)" if len(texts) > 1 else ""),
+            texts,
+        )
+    return child_ids, names
+
+
+def _as_mapping(line: Line) -> dict[str, Any]:
+    state = line.state
+    return {
+        "child_part_number": line.child_part_number,
+        "quantity": state.quantity,
+        "source": state.source,
+        "rel_type": state.rel_type,
+        "unreferenced_since": state.unreferenced_since,
+    }
+
+
+def _overrides_gone(lines: Sequence[Line], numbers: set[str]) -> list[QuantityChange]:
+    # A person changed a quantity of a CAD line; now the assembly has it no more. The line is theirs, so it
+    # stays, but silence would leave a part in the BOM that nobody needs.
+    return [
+        QuantityChange(line.child_part_number, 0.0, line.state.quantity)
+        for line in lines
+        if line.state.override and line.child_part_number not in numbers
+    ]
+
+
+def _line_changes(tx: Tx, prepared: _Prepared) -> list[LineChange]:
+    plan = prepared.plan
+    changes = [
+        LineChange(
+            new_line_id(),
+            prepared.child_ids[added.part_number],
+            None,
+            LineState(float(added.quantity or 0.0), "assembly"),
+        )
+        for added in plan.diff.added
+    ]
+    quantities = {c.part_number: c.local_quantity for c in plan.diff.quantity_changed}
+    flag, unflag = set(plan.flag), set(plan.unflag)
+    touched = flag | unflag | quantities.keys()
+    for line in prepared.lines:
+        name, before = line.child_part_number, line.state
+        # Ownership is enforced here, on the stored row, whatever the plan says.
+        if name not in touched or before.source != "assembly" or before.rel_type != "component":
+            continue
+        since = tx.stamp if name in flag else None if name in unflag else before.unreferenced_since
+        after = replace(before, quantity=quantities.get(name, before.quantity), unreferenced_since=since)
+        changes.append(LineChange(line.id, line.child_id, before, after))
+    return changes
+
+
+def _note(prepared: _Prepared, order: MergeOrder) -> ChangeNote:
+    return ChangeNote(
+        kind=ChangeKind.MERGE,
+        summary=summary(prepared.plan.diff),
+        document_file=order.document_file,
+        document_sha256=order.document_sha256,
+        document_revision=order.document_revision,
+        sync_id=order.sync_id,
+    )
+
+
+def _answer(prepared: _Prepared, order: MergeOrder) -> dict[str, Any]:
+    diff = prepared.plan.diff
+    answer: dict[str, Any] = {
+        "status": "merged",
+        "diff": {
+            "added": [_pair(c.part_number, c.quantity) for c in diff.added],
+            "removed": [_pair(c.part_number, c.quantity) for c in diff.removed],
+            "quantity_changed": [
+                {
+                    "part_number": c.part_number,
+                    "old_quantity": number(c.remote_quantity),
+                    "new_quantity": number(c.local_quantity),
+                }
+                for c in diff.quantity_changed
+            ],
+            "unchanged": [_pair(c.part_number, c.quantity) for c in diff.unchanged],
+        },
+        "warnings": [
+            {"type": "unreferenced", "part_number": c.part_number, "message": UNREFERENCED}
+            for c in diff.removed
+        ]
+        + [_conflict_warning(c) for c in diff.conflicts],
+        "resolve_url": resolve_url(prepared.parent.part_number),
+    }
+    if order.sync_id:
+        answer["sync_id"] = order.sync_id
+    return answer
+
+
+def _pair(part_number: str, quantity: float | None) -> dict[str, Any]:
+    return {"part_number": part_number, "quantity": number(quantity)}
+
+
+def _conflict_warning(conflict: QuantityChange) -> dict[str, Any]:
+    cad, ours = number(conflict.local_quantity), number(conflict.remote_quantity)
+    return {
+        "type": "conflict",
+        "part_number": conflict.part_number,
+        "message": f"The assembly has {cad}, Silo has {ours} (set by a person); a person decides",
+        "assembly_quantity": cad,
+        "server_quantity": ours,
+    }
+
+
+def _event(tx: Tx, prepared: _Prepared, answer: Mapping[str, Any]) -> dict[str, Any]:
+    diff = dict(answer["diff"])
+    if len(diff["unchanged"]) > EVENT_UNCHANGED_LINES:
+        diff["unchanged_count"] = len(diff["unchanged"])
+        diff["unchanged"] = []
+    event: dict[str, Any] = {
+        "type": "bom_merge",
+        "item": prepared.parent.part_number,
+        "user": tx.actor.username,
+        "timestamp": wire(tx.stamp),
+        "summary": summary(prepared.plan.diff),
+        "diff": diff,
+        "resolve_url": answer["resolve_url"],
+    }
+    if "sync_id" in answer:
+        event["sync_id"] = answer["sync_id"]
+    if prepared.plan.diff.conflicts:
+        event["warnings"] = answer["warnings"]
+    return event
+
+
+def _remember_conflicts(tx: Tx, prepared: _Prepared) -> None:
+    tx.conn.execute(delete(bom_conflicts).where(bom_conflicts.c.parent_id == prepared.parent.id))
+    rows = []
+    for conflict in prepared.conflicts:
+        child_id = prepared.child_ids[conflict.part_number]
+        rows.append(
+            {
+                "parent_id": prepared.parent.id,
+                "child_id": child_id,
+                "cad_quantity": float(conflict.local_quantity),
+                "since": tx.stamp,
+                "accepted": prepared.accepted.get(child_id) == conflict.local_quantity,
+            }
+        )
+    insert_rows(tx, bom_conflicts, rows)
+
+
+def _replay(tx: Tx, parent: Item, order: MergeOrder) -> MergeOutcome | None:
+    if not order.sync_id:
+        return None
+    row = tx.conn.execute(
+        select(bom_syncs.c.answer, bom_syncs.c.version, bom_syncs.c.request_hash).where(
+            bom_syncs.c.parent_id == parent.id, bom_syncs.c.sync_id == order.sync_id
+        )
+    ).one_or_none()
+    if row is None:
+        return None
+    if row.request_hash != _request_hash(order):
+        raise ConflictError(
+            f"sync_id {order.sync_id!r} was used before for another BOM of {parent.part_number}; "
+            "send a new one with new content"
+        )
+    return MergeOutcome(row.answer, row.version, replayed=True)
+
+
+def _remember_sync(tx: Tx, parent: Item, order: MergeOrder, answer: str, version: int) -> None:
+    tx.conn.execute(
+        insert(bom_syncs).values(
+            parent_id=parent.id,
+            sync_id=order.sync_id,
+            request_hash=_request_hash(order),
+            answer=answer,
+            version=version,
+            at=tx.stamp,
+        )
+    )
+
+
+def _request_hash(order: MergeOrder) -> str:
+    content = sorted((entry.key, float(entry.quantity)) for entry in order.entries)
+    return hashlib.sha256(dumps(content).encode()).hexdigest()

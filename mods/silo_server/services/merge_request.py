@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Reading a merge request: everything that is wrong with it is found before anything is refused.
+
+Read by hand and not by a model, because a bad quantity and an unknown part number are to be told together,
+each with the index of its entry, in the one 400.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from silo.bom.errors import RejectedError
+from silo_server.errors import TooLargeError
+
+# Keeps every product down a tree of 20 levels finite.
+MAX_QUANTITY = 1e9
+
+
+@dataclass(frozen=True, slots=True)
+class OrderEntry:
+    """One direct child as asked for; ``key`` is its case-folded number."""
+
+    index: int
+    part_number: str
+    quantity: float
+
+    @property
+    def key(self) -> str:
+        return self.part_number.casefold()
+
+
+@dataclass(frozen=True, slots=True)
+class MergeOrder:
+    """A merge request. ``problems`` are (index, text) of the entries that are unusable in themselves."""
+
+    entries: Sequence[OrderEntry]
+    problems: Sequence[tuple[int, str]] = ()
+    sync_id: str | None = None
+    dry_run: bool = False
+    document_file: str | None = None
+    document_sha256: str | None = None
+    document_revision: int | None = None
+
+
+def read_merge_order(body: Any, max_entries: int) -> MergeOrder:
+    """The order in a decoded JSON body; RejectedError where the body as a whole is unusable.
+
+    Unknown keys are ignored. Whatever ``source`` says, the entries are an assembly's.
+    """
+    if not isinstance(body, Mapping) or not isinstance(body.get("entries"), list):
+        raise RejectedError('body: wanted {"entries": [{"child_part_number": …, "quantity": …}, …]}')
+    if len(body["entries"]) > max_entries:
+        raise TooLargeError(f"entries: this server takes at most {max_entries}, got {len(body['entries'])}")
+    sync_id, dry_run = body.get("sync_id"), body.get("dry_run")
+    if sync_id is not None and not (isinstance(sync_id, str) and 0 < len(sync_id) <= 128):
+        raise RejectedError("sync_id: wanted a text of 1 to 128 characters")
+    if dry_run is not None and not isinstance(dry_run, bool):
+        raise RejectedError("dry_run: wanted true or false")
+    document = _document(body.get("document"))
+    entries: list[OrderEntry] = []
+    problems: list[tuple[int, str]] = []
+    for index, raw in enumerate(body["entries"]):
+        entry, problem = _entry(index, raw)
+        if entry is not None:
+            entries.append(entry)
+        if problem is not None:
+            problems.append((index, problem))
+    return MergeOrder(entries, problems, sync_id, bool(dry_run), *document)
+
+
+def quantity_problem(value: Any) -> str | None:
+    """What is wrong with a quantity, None where nothing is."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return f"wanted a number, got {_shown(value)}"
+    # A huge integer has no float; comparing it does no harm where converting it would.
+    if not 0 < value <= MAX_QUANTITY or not math.isfinite(value):
+        return f"wanted a number above 0 and at most 1e9, got {_shown(value)}"
+    return None
+
+
+def _entry(index: int, raw: Any) -> tuple[OrderEntry | None, str | None]:
+    if not isinstance(raw, Mapping):
+        return None, f"entries[{index}]: wanted an object, got {_shown(raw)}"
+    name, quantity = raw.get("child_part_number"), raw.get("quantity")
+    problem = quantity_problem(quantity)
+    text = None if problem is None else f"entries[{index}].quantity: {problem}"
+    if not isinstance(name, str) or not name.strip() or len(name) > 200:
+        wrong = f"entries[{index}].child_part_number: wanted a part number, got {_shown(name)}"
+        return None, wrong if text is None else f"{wrong}; {text}"
+    # An entry with a bad quantity is still looked up, so that an unknown number is told as well.
+    return OrderEntry(index, name.strip(), 1.0 if text else float(quantity or 0)), text
+
+
+def _document(raw: Any) -> tuple[str | None, str | None, int | None]:
+    if raw is None:
+        return None, None, None
+    if not isinstance(raw, Mapping):
+        raise RejectedError('document: wanted {"file": …, "sha256": …, "revision": …}')
+    file, sha256, revision = raw.get("file"), raw.get("sha256"), raw.get("revision")
+    if file is not None and not isinstance(file, str):
+        raise RejectedError("document.file: wanted a file name")
+    if sha256 is not None and not (isinstance(sha256, str) and len(sha256) == 64):
+        raise RejectedError("document.sha256: wanted 64 hexadecimal digits")
+    if revision is not None and (isinstance(revision, bool) or not isinstance(revision, int)):
+        raise RejectedError("document.revision: wanted a whole number")
+    return file, sha256, revision
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "…"

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Revisions: append-only snapshots of an item's properties, each with the file that was uploaded, if any."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import Row, func, insert, select, update
+
+from silo.bom.errors import NotFoundError
+from silo_server.db.engine import Tx
+from silo_server.db.tables import items, revisions
+from silo_server.services import events
+from silo_server.values import Item, Revision, dumps
+
+
+@dataclass(frozen=True, slots=True)
+class StoredFile:
+    """A file in the store: what it was called, its SHA-256 and size, and its thumbnail's SHA-256."""
+
+    name: str
+    checksum: str
+    size: int
+    thumbnail_key: str | None = None
+
+
+def add_revision(
+    tx: Tx,
+    item: Item,
+    *,
+    comment: str = "",
+    properties: Mapping[str, Any] | None = None,
+    file: StoredFile | None = None,
+) -> Revision:
+    """Append a revision. Without ``properties`` it carries those of the one before on.
+
+    The caller holds the item's lock; the unique key on (item, number) guards the rest.
+    """
+    last = tx.conn.scalar(select(func.max(revisions.c.revision_number)).where(revisions.c.item_id == item.id))
+    number = (last or 0) + 1
+    snapshot = dict(item.properties) if properties is None else dict(properties)
+    tx.conn.execute(
+        insert(revisions).values(
+            item_id=item.id,
+            revision_number=number,
+            properties=dumps(snapshot),
+            comment=comment,
+            status="draft",
+            file_name=file.name if file else None,
+            file_checksum=file.checksum if file else None,
+            file_size=file.size if file else None,
+            thumbnail_key=file.thumbnail_key if file else None,
+            created_at=tx.stamp,
+            created_by=tx.actor.username,
+        )
+    )
+    changed: dict[str, Any] = {"current_revision": number, "properties": dumps(snapshot)}
+    if file and file.thumbnail_key:
+        changed["thumbnail_key"] = file.thumbnail_key
+    tx.conn.execute(
+        update(items)
+        .where(items.c.id == item.id)
+        .values(**changed, updated_at=tx.stamp, updated_by=tx.actor.username)
+    )
+    revision = get_revision(tx, item, number)
+    events.revision_created(tx, item, revision)
+    return revision
+
+
+def list_revisions(tx: Tx, item: Item) -> list[Revision]:
+    """All revisions of the item, newest first."""
+    rows = tx.conn.execute(
+        select(revisions).where(revisions.c.item_id == item.id).order_by(revisions.c.revision_number.desc())
+    ).all()
+    return [_to_revision(row) for row in rows]
+
+
+def get_revision(tx: Tx, item: Item, number: int) -> Revision:
+    """One revision; NotFoundError where there is none."""
+    row = tx.conn.execute(
+        select(revisions).where(revisions.c.item_id == item.id, revisions.c.revision_number == number)
+    ).one_or_none()
+    if row is None:
+        raise NotFoundError(f"item {item.part_number} has no revision {number}")
+    return _to_revision(row)
+
+
+def newest_file(tx: Tx, item: Item) -> Revision:
+    """The newest revision that has a file; NotFoundError where none has."""
+    row = tx.conn.execute(
+        select(revisions)
+        .where(revisions.c.item_id == item.id, revisions.c.file_checksum.is_not(None))
+        .order_by(revisions.c.revision_number.desc())
+        .limit(1)
+    ).one_or_none()
+    if row is None:
+        raise NotFoundError(f"item {item.part_number} has no file yet")
+    return _to_revision(row)
+
+
+def items_with_file(tx: Tx, checksum: str) -> list[tuple[str, int]]:
+    """(part number, revision number) of every revision with exactly this file."""
+    rows = tx.conn.execute(
+        select(items.c.part_number, revisions.c.revision_number)
+        .join(revisions, revisions.c.item_id == items.c.id)
+        .where(revisions.c.file_checksum == checksum.lower())
+        .order_by(items.c.part_number, revisions.c.revision_number)
+    ).all()
+    return [(row.part_number, row.revision_number) for row in rows]
+
+
+def _to_revision(row: Row[Any]) -> Revision:
+    return Revision(
+        revision_number=row.revision_number,
+        comment=row.comment,
+        status=row.status,
+        properties=json.loads(row.properties),
+        file_name=row.file_name,
+        file_checksum=row.file_checksum,
+        file_size=row.file_size,
+        thumbnail_key=row.thumbnail_key,
+        created_at=row.created_at,
+        created_by=row.created_by,
+    )

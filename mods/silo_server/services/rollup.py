@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Cost and mass of an assembly from its items' properties, with everything that is missing named.
+
+Cost: each leaf's ``standard_cost`` times its total quantity, per ``currency``.
+Mass: each leaf's ``mass_kg`` [kg] times its total quantity. Where something below a sub-assembly has no mass
+but the sub-assembly itself states ``mass_kg``, that is taken for the whole of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from silo_server.db.engine import Tx
+from silo_server.services.items import by_ids
+from silo_server.services.tree import Graph, flatten, order_of
+from silo_server.values import Item, Line
+
+DEFAULT_CURRENCY = "EUR"
+
+
+@dataclass(frozen=True, slots=True)
+class CostRow:
+    """A leaf part's share. ``unit_cost`` None = not stated."""
+
+    part_number: str
+    name: str
+    quantity: float
+    unit: str | None
+    unit_cost: float | None
+    currency: str | None
+    total: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class CostRollup:
+    """What an assembly costs; ``totals`` per currency, ``missing`` the part numbers without a cost."""
+
+    rows: Sequence[CostRow]
+    totals: Mapping[str, float]
+    missing: Sequence[str]
+
+
+@dataclass(frozen=True, slots=True)
+class MassRow:
+    """A part whose stated mass was taken [kg]; ``is_assembly`` where it stands for all below it."""
+
+    part_number: str
+    name: str
+    quantity: float
+    unit_mass: float | None
+    total: float | None
+    is_assembly: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class MassRollup:
+    """The mass of one assembly [kg]; ``stated`` is what its own ``mass_kg`` says."""
+
+    rows: Sequence[MassRow]
+    total: float
+    missing: Sequence[str]
+    stated: float | None
+
+
+def roll_up_cost(tx: Tx, graph: Graph) -> CostRollup:
+    """Flat BOM times standard cost."""
+    flat = flatten(graph)
+    items = by_ids(tx, {row.line.child_id for row in flat})
+    rows, totals, missing = [], dict[str, float](), []
+    for row in flat:
+        item = items[row.line.child_id]
+        cost = positive_number(item.properties, "standard_cost")
+        currency = str(item.properties.get("currency") or DEFAULT_CURRENCY) if cost is not None else None
+        total = cost * row.total if cost is not None else None
+        if total is None or currency is None:
+            missing.append(item.part_number)
+        else:
+            totals[currency] = totals.get(currency, 0.0) + total
+        rows.append(CostRow(item.part_number, item.name, row.total, row.unit, cost, currency, total))
+    return CostRollup(rows, totals, missing)
+
+
+def roll_up_mass(tx: Tx, graph: Graph) -> MassRollup:
+    """Masses from the leaves up; a sub-assembly's own mass where its parts do not have all of theirs."""
+    order = order_of(graph)
+    children = {line.child_id for below in graph.lines.values() for line in below}
+    items = {**by_ids(tx, children), graph.root.id: graph.root}
+    stands_for_itself = _stated_assemblies(graph, order, items)
+    factors = {graph.root.id: 1.0}
+    amounts: dict[int, float] = {}
+    lines: dict[int, Line] = {}
+    for item_id in order:
+        if item_id not in factors or item_id in stands_for_itself:
+            continue
+        for line in graph.components(item_id):
+            amount = factors[item_id] * line.state.quantity
+            if graph.components(line.child_id) and line.child_id not in stands_for_itself:
+                factors[line.child_id] = factors.get(line.child_id, 0.0) + amount
+            else:
+                amounts[line.child_id] = amounts.get(line.child_id, 0.0) + amount
+                lines.setdefault(line.child_id, line)
+    rows = [_mass_row(items[i], amounts[i], i in stands_for_itself) for i in lines]
+    return MassRollup(
+        rows,
+        math.fsum(row.total for row in rows if row.total is not None),
+        [row.part_number for row in rows if row.total is None],
+        positive_number(graph.root.properties, "mass_kg"),
+    )
+
+
+def positive_number(properties: Mapping[str, Any], name: str) -> float | None:
+    """A property as a number of at least 0, None where it is absent or no such number."""
+    value = properties.get(name)
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        return None
+    try:
+        found = float(value)
+    except (ValueError, OverflowError):
+        return None
+    return found if math.isfinite(found) and 0 <= found < 1e15 else None
+
+
+def _stated_assemblies(graph: Graph, order: Sequence[int], items: Mapping[int, Item]) -> set[int]:
+    def has_mass(item: Item) -> bool:
+        return positive_number(item.properties, "mass_kg") is not None
+
+    # Children before parents: an assembly is complete when everything it contains is.
+    complete: dict[int, bool] = {}
+    stated: set[int] = set()
+    for item_id in reversed(order):
+        below = graph.components(item_id)
+        whole = all(complete.get(line.child_id, has_mass(items[line.child_id])) for line in below)
+        if below and not whole and item_id != graph.root.id and has_mass(items[item_id]):
+            stated.add(item_id)
+            whole = True
+        if below:
+            complete[item_id] = whole
+    return stated
+
+
+def _mass_row(item: Item, amount: float, is_assembly: bool) -> MassRow:
+    mass = positive_number(item.properties, "mass_kg")
+    total = mass * amount if mass is not None else None
+    return MassRow(item.part_number, item.name, amount, mass, total, is_assembly)

@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What a server needs to know before it starts; one frozen value, passed in, never read from a global."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from silo.bom.errors import ConfigError
+
+MIB = 1024 * 1024
+
+
+def default_data_dir() -> Path:
+    """The user's data folder for the embedded server (XDG, macOS and Windows customs)."""
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local"))
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Application Support"
+    else:
+        base = Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share")
+    return base / "silo-mod"
+
+
+def default_database_url() -> str:
+    """SQLite in the user's data folder."""
+    return f"sqlite:///{default_data_dir() / 'silo.db'}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """The server's settings. Sizes in bytes, times in seconds.
+
+    database_url
+        ``sqlite:///path`` or ``postgresql://user:password@host/database``.
+    files_dir
+        where uploads are kept by hash; beside an SQLite database where not given.
+    poll_seconds
+        how often the event log is looked at without having been told of news: the safety net for a lost
+        notification, and how SQLite's changes by another process are seen.
+    event_log_size
+        events kept for replay; a client that was away longer gets ``reset``.
+    """
+
+    database_url: str
+    files_dir: Path | None = None
+    read_only: bool = False
+    heartbeat_seconds: float = 30.0
+    poll_seconds: float = 1.0
+    event_log_size: int = 100_000
+    max_body_bytes: int = 16 * MIB
+    max_file_bytes: int = 512 * MIB
+    max_merge_entries: int = 20_000
+    max_expanded_rows: int = 200_000
+    session_seconds: float = 24 * 3600.0
+    login_link_seconds: float = 3600.0
+    login_failures: int = 5
+    login_window_seconds: float = 300.0
+    secure_cookies: bool = False
+    admin_username: str = "admin"
+    admin_password: str | None = None
+
+    @property
+    def sqlalchemy_url(self) -> str:
+        """The URL with the driver that we ship."""
+        for short in ("postgresql://", "postgres://"):
+            if self.database_url.startswith(short):
+                return "postgresql+psycopg://" + self.database_url[len(short) :]
+        return self.database_url
+
+    @property
+    def is_sqlite(self) -> bool:
+        return self.sqlalchemy_url.startswith("sqlite")
+
+    @property
+    def sqlite_path(self) -> Path | None:
+        """The database file, None for another database; in-memory databases are refused."""
+        if not self.is_sqlite:
+            return None
+        name = self.database_url.partition(":///")[2].partition("?")[0]
+        if not name or name == ":memory:":
+            raise ConfigError(
+                f"database: wanted sqlite:///path/to/file.db, got {self.database_url!r}; "
+                "a database in memory is not shared between the server's threads"
+            )
+        return Path(name)
+
+    @property
+    def storage(self) -> Path:
+        """Where uploaded files are kept."""
+        if self.files_dir is not None:
+            return self.files_dir
+        path = self.sqlite_path
+        return path.with_name(path.stem + "-files") if path else default_data_dir() / "files"
+
+
+_ENVIRONMENT = {
+    "database_url": "SILO_DATABASE_URL",
+    "files_dir": "SILO_STORAGE_ROOT_DIR",
+    "read_only": "SILO_READ_ONLY",
+    "heartbeat_seconds": "SILO_HEARTBEAT_SECONDS",
+    "event_log_size": "SILO_EVENT_LOG_SIZE",
+    "max_body_bytes": "SILO_MAX_BODY_BYTES",
+    "max_file_bytes": "SILO_MAX_FILE_BYTES",
+    "max_merge_entries": "SILO_MAX_MERGE_ENTRIES",
+    "secure_cookies": "SILO_SECURE_COOKIES",
+    "admin_username": "SILO_ADMIN_USERNAME",
+    "admin_password": "SILO_ADMIN_PASSWORD",
+}
+
+
+def settings_from_environment(environ: Mapping[str, str] | None = None, **given: Any) -> Settings:
+    """Settings from ``SILO_…`` variables (docs/server.md lists them); what is given wins over them."""
+    environ = os.environ if environ is None else environ
+    values: dict[str, Any] = {"database_url": default_database_url()}
+    kinds = {f.name: str(f.type) for f in fields(Settings)}
+    for name, variable in _ENVIRONMENT.items():
+        if environ.get(variable):
+            values[name] = _convert(variable, environ[variable], kinds[name])
+    values.update({key: value for key, value in given.items() if value is not None})
+    return replace(Settings(database_url=values.pop("database_url")), **values)
+
+
+def _convert(variable: str, text: str, kind: str) -> Any:
+    try:
+        if kind == "bool":
+            return _boolean(text)
+        if kind == "int":
+            return int(text)
+        if kind == "float":
+            return float(text)
+    except ValueError:
+        raise ConfigError(f"{variable}: wanted {kind}, got {text!r}") from None
+    return Path(text) if "Path" in kind else text
+
+
+def _boolean(text: str) -> bool:
+    if text.lower() in ("1", "true", "yes", "on"):
+        return True
+    if text.lower() in ("0", "false", "no", "off"):
+        return False
+    raise ValueError(text)

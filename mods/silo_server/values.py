@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The server's own frozen values, between the services and whoever shows them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+
+class Role(StrEnum):
+    """Who may do what; each role includes the ones before it."""
+
+    VIEWER = "viewer"  # reads everything, manages the own tokens
+    EDITOR = "editor"  # changes items, BOMs and files
+    ADMIN = "admin"  # users, mode, audit
+
+    def covers(self, needed: Role) -> bool:
+        """True where this role may do what ``needed`` may."""
+        order = list(Role)
+        return order.index(self) >= order.index(needed)
+
+
+@dataclass(frozen=True, slots=True)
+class Actor:
+    """Who does something, and from where."""
+
+    username: str
+    role: Role
+    user_id: int | None = None
+    display_name: str = ""
+    auth_source: str = "local"
+    address: str = ""
+    csrf_token: str | None = None
+    session_hash: str | None = None
+
+
+SYSTEM = Actor("system", Role.ADMIN, auth_source="system")
+
+
+@dataclass(frozen=True, slots=True)
+class NewEvent:
+    """An event to be written to the log; ``data`` is its JSON text."""
+
+    name: str
+    data: str
+    item_uuid: str | None = None
+    part_number: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Item:
+    """An item. ``id`` is internal, ``uuid`` what the world knows; ``bom_version`` counts its BOM's states."""
+
+    id: int
+    uuid: str
+    part_number: str
+    name: str
+    description: str
+    item_type: str
+    schema: str | None
+    category: str | None
+    sourcing_type: str | None
+    long_description: str | None
+    thumbnail_key: str | None
+    properties: Mapping[str, Any]
+    current_revision: int
+    bom_version: int
+    created_at: str
+    created_by: str
+    updated_at: str
+    updated_by: str
+    archived_at: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Revision:
+    """A revision of an item: a property snapshot and, where one was uploaded, a file."""
+
+    revision_number: int
+    comment: str
+    status: str
+    properties: Mapping[str, Any]
+    file_name: str | None
+    file_checksum: str | None
+    file_size: int | None
+    thumbnail_key: str | None
+    created_at: str
+    created_by: str
+
+
+@dataclass(frozen=True, slots=True)
+class LineState:
+    """Everything on a BOM line that can change; what history stores before and after.
+
+    source
+        ``assembly`` or ``manual``.
+    unreferenced_since
+        since when no component of the assembly uses it (assembly lines only).
+    override, cad_quantity
+        an assembly line whose quantity a person changed, and what the assembly had said.
+    reason
+        why a person keeps it as an intentional, non-CAD line.
+    """
+
+    quantity: float
+    source: str
+    rel_type: str = "component"
+    unit: str | None = None
+    reference_designators: tuple[str, ...] = ()
+    find_number: str | None = None
+    notes: str | None = None
+    child_revision: int | None = None
+    unreferenced_since: str | None = None
+    override: bool = False
+    cad_quantity: float | None = None
+    reason: str | None = None
+    metadata: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A BOM line with what its child is called."""
+
+    id: str
+    parent_id: int
+    child_id: int
+    position: int
+    child_part_number: str
+    child_uuid: str
+    child_name: str
+    child_description: str
+    child_item_type: str
+    child_current_revision: int
+    child_archived: bool
+    state: LineState
+
+
+def dumps(value: Any) -> str:
+    """Compact JSON text, as stored and sent."""
+    return json.dumps(value, separators=(",", ":"), ensure_ascii=False)
+
+
+def number(value: float | None) -> float | int | None:
+    """A count reads as a count: 12.0 is told as 12."""
+    return int(value) if value is not None and value == int(value) else value
