@@ -4,7 +4,7 @@
 # The FreeCADs that the tests run in: the machine's own, and those of other Debian releases, each in a
 # root directory of its own below the user's cache.
 #
-#   scripts/freecad-roots.sh build [SUITE…]         build or complete the roots (default: trixie sid)
+#   scripts/freecad-roots.sh [build [SUITE…]]       build or complete the roots (default: trixie sid)
 #   scripts/freecad-roots.sh --list                 name, version, Python, command, dependency folder
 #   scripts/freecad-roots.sh run NAME COMMAND…      run a command of that root (freecadcmd, freecad, xvfb-run …)
 #   scripts/freecad-roots.sh remove NAME            delete a root
@@ -220,8 +220,8 @@ list() {
   done
 }
 
-case "${1:-}" in
-  build) shift; if [ $# = 0 ]; then set -- "${SUITES[@]}"; fi; build "$@" ;;
+case "${1:-build}" in
+  build) if [ $# -gt 0 ]; then shift; fi; if [ $# = 0 ]; then set -- "${SUITES[@]}"; fi; build "$@" ;;
   build-one) build_one "$2" ;;
   list | --list) list ;;
   run) shift; [ $# -ge 2 ] || { say "run NAME COMMAND…"; exit 2; }; run_in "$@" ;;

@@ -18,7 +18,10 @@ Run it with a screen (colours and thumbnails are then stored as well), real or v
 
     xvfb-run -a freecad examples/gearbox/generate.py
 
-or without: ``freecadcmd -c 'import runpy; runpy.run_path("examples/gearbox/generate.py", run_name="__main__")'``.
+or without::
+
+    freecadcmd -c 'import runpy; runpy.run_path("examples/gearbox/generate.py", run_name="__main__")'
+
 ``SILO_EXAMPLE_OUT`` names another folder than the script's own. The files carry no Silo identity:
 ``silo-mod register`` gives it to them.
 """
@@ -71,10 +74,10 @@ def plate(x0: float, x1: float, width: float, thickness: float, corner: float) -
 
 
 def toothed(teeth: int, height: float, root: float, tip: float) -> Any:
-    """A prism with straight-flanked teeth, one of them on the x axis. ``root`` > ``tip`` gives a ring's bore."""
+    """A prism with straight-flanked teeth, one of them on the x axis. ``root`` > ``tip``: a ring's bore."""
     pitch = MODULE_MM * teeth / 2
     step = 2 * math.pi / teeth
-    # Half widths of a tooth as a part of the step; a little less than half at the pitch circle is the backlash.
+    # Half widths of a tooth as a part of the step; less than a quarter at the pitch circle is the backlash.
     flank = ((root, 0.36), (pitch, 0.235), (tip, 0.13))
     points = []
     for k in range(teeth):
@@ -328,7 +331,7 @@ def main() -> int:
     try:
         prepare_preferences()
         generate(out)
-    except Exception:
+    except Exception:  # noqa: BLE001  (a script that raises would leave FreeCAD's window open)
         traceback.print_exc()
         return 1
     return 0
