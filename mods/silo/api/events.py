@@ -77,7 +77,7 @@ class Backoff:
     longest: float = 60.0
 
     def pause(self, attempt: int, chance: float) -> float:
-        """The pause after failed attempt ``attempt`` (from 1); ``chance`` in [0, 1) shortens it, half at most."""
+        """The pause after failed attempt ``attempt`` (from 1); ``chance`` in [0, 1) takes off up to half."""
         full = min(self.longest, self.first * self.factor ** min(attempt - 1, 60))
         return full * (1.0 - chance / 2.0)
 
@@ -149,8 +149,8 @@ class EventListener:
         if self._thread is not None and self._thread.is_alive() and not self._stop.is_set():
             return
         # A thread that is still on its way out keeps the old flags, and can call nobody any more.
-        self._stop, self._wake = threading.Event(), threading.Event()
-        self._thread = threading.Thread(target=self._run, args=(self._stop,), name="silo-events", daemon=True)
+        flags = self._stop, self._wake = threading.Event(), threading.Event()
+        self._thread = threading.Thread(target=self._run, args=flags, name="silo-events", daemon=True)
         self._thread.start()
 
     def retry_now(self) -> None:
@@ -166,13 +166,14 @@ class EventListener:
         if stream is not None:
             stream.close()
         thread = self._thread
-        if thread is None or thread is threading.current_thread():
-            return
-        thread.join(timeout)
-        with self._calling:
-            self.state = ConnectionState(Connection.STOPPED)
+        if thread is not None and thread is not threading.current_thread():
+            thread.join(timeout)
+            # A callback that still runs is waited for, but not for ever: it may be waiting for us.
+            if self._calling.acquire(timeout=timeout):
+                self._calling.release()
+        self.state = ConnectionState(Connection.STOPPED)
 
-    def _run(self, stop: threading.Event) -> None:
+    def _run(self, stop: threading.Event, wake: threading.Event) -> None:
         failures = 0
         while not stop.is_set():
             self._tell(stop, ConnectionState(Connection.CONNECTING))
@@ -190,9 +191,9 @@ class EventListener:
             failures = 1 if heard.anything else failures + 1
             pause = self._backoff.pause(failures, self._chance())
             self._tell(stop, ConnectionState(Connection.OFFLINE, reason, pause))
-            self._wait(self._wake, pause)
+            self._wait(wake, pause)
             if not stop.is_set():
-                self._wake.clear()
+                wake.clear()
         return None
 
     def _listen(self, stop: threading.Event, heard: _Heard) -> None:
@@ -212,7 +213,7 @@ class EventListener:
             stream.close()
             with self._lock:
                 self._stream = None
-            self._adopt(stop, getattr(stream, "last_event_id", None))
+            self._adopt(stop, stream.last_event_id)
 
     def _mode(self) -> Connection:
         try:
@@ -253,5 +254,6 @@ class EventListener:
                 return
             try:
                 callback(value)
-            except Exception:  # noqa: BLE001 - whatever a callback does, the connection must live on
+            except Exception:
+                # Whatever a callback does, the connection must live on.
                 log.exception("an error in the receiver of server events; the connection goes on")

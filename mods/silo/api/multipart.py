@@ -15,7 +15,7 @@ from typing import BinaryIO, Self
 from silo.api.transport import Cancel, stop_if
 from silo.bom.errors import DocumentError, InputError
 
-Progress = Callable[[int, int], None]
+Progress = Callable[[int, int], object]
 """Told (bytes done, bytes in all)."""
 
 _BLOCK = 1 << 18
