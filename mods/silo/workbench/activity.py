@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What the Database Activity pane shows, as plain values; the widgets only draw them (spec bom-sync §6).
+
+An :class:`Entry` is one box. Its texts are shown as text, never as markup, and are made safe here, once: the
+fields of an entry hold no control characters and are never longer than can be read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+
+from silo.workbench.words import counted, plain, translate
+
+MOST_ENTRIES = 300
+MOST_LINES = 12
+
+
+class Tone(StrEnum):
+    """How a text is meant; the pane gives it a colour and a sign."""
+
+    PLAIN = "plain"
+    QUIET = "quiet"  # beside the point, such as a time
+    GOOD = "good"
+    CHANGED = "changed"
+    WARNING = "warning"
+    ERROR = "error"
+
+
+class Do(StrEnum):
+    """What a button of the pane asks for."""
+
+    VIEW = "view"  # open a page of the server
+    SHOW = "show"  # select the instances in the 3D view and the tree
+    REGISTER = "register"  # open the Register Parts dialog
+    PREVIEW = "preview"  # open the BOM preview
+    DECIDE = "decide"  # same part or new part?
+    RETRY = "retry"  # send what waits in the outbox
+    DISCARD = "discard"  # drop what waits in the outbox
+    SETTINGS = "settings"  # open the preferences
+
+
+@dataclass(frozen=True)
+class Action:
+    """A button. ``document`` and ``objects`` are of the CAD model; ``target`` is a page or an id."""
+
+    do: Do
+    text: str
+    target: str = ""
+    document: str = ""
+    objects: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line of a box."""
+
+    text: str
+    tone: Tone = Tone.PLAIN
+    actions: tuple[Action, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "text", plain(self.text, 400))
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One box of the pane.
+
+    key
+        a later entry with the same key takes the place of this one.
+    rank
+        but only if it knows at least as much: our own sync (1) is not replaced by the server's event (0).
+    badges
+        the counts, each with its tone: ``+1 added``, ``~1 qty changed``, ``⚠1 unreferenced``.
+    """
+
+    key: str
+    title: str
+    when: float
+    tone: Tone = Tone.PLAIN
+    who: str = ""
+    badges: tuple[Line, ...] = ()
+    lines: tuple[Line, ...] = ()
+    actions: tuple[Action, ...] = ()
+    rank: int = 0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "title", plain(self.title))
+        object.__setattr__(self, "who", plain(self.who, 60))
+        if len(self.lines) > MOST_LINES:
+            object.__setattr__(self, "lines", shortened(self.lines))
+
+
+def shortened(lines: tuple[Line, ...], most: int = MOST_LINES) -> tuple[Line, ...]:
+    """The first lines, and how many more there are."""
+    if len(lines) <= most:
+        return lines
+    left = len(lines) - most + 1
+    more = counted(
+        left,
+        translate("Silo", "… and {n} more line"),
+        translate("Silo", "… and {n} more lines; the preview shows all"),
+    )
+    return (*lines[: most - 1], Line(more, Tone.QUIET))
+
+
+@dataclass(frozen=True)
+class Activity:
+    """All boxes, newest first; immutable, :meth:`add` gives the next state."""
+
+    entries: tuple[Entry, ...] = ()
+    most: int = field(default=MOST_ENTRIES, repr=False)
+
+    def add(self, entry: Entry) -> Activity:
+        """With one more entry. One with the same key and a higher rank stays as it is."""
+        before = self.get(entry.key)
+        if before is not None and before.rank > entry.rank:
+            return self
+        rest = tuple(e for e in self.entries if e.key != entry.key)
+        place = next((i for i, e in enumerate(rest) if e.when <= entry.when), len(rest))
+        return replace(self, entries=(*rest[:place], entry, *rest[place:])[: self.most])
+
+    def extend(self, entries: Iterable[Entry]) -> Activity:
+        """With several more."""
+        state = self
+        for entry in entries:
+            state = state.add(entry)
+        return state
+
+    def remove(self, key: str) -> Activity:
+        """Without the entry of this key."""
+        return replace(self, entries=tuple(e for e in self.entries if e.key != key))
+
+    def get(self, key: str) -> Entry | None:
+        """The entry of this key."""
+        return next((e for e in self.entries if e.key == key), None)
+
+
+def entry_text(entry: Entry) -> str:
+    """A box as plain text: for the clipboard, and to read in a test."""
+    parts = [entry.title]
+    if entry.badges:
+        parts.append("  ".join(badge.text for badge in entry.badges))
+    for line in entry.lines:
+        buttons = "".join(f" [{action.text}]" for action in line.actions)
+        parts.append(line.text + buttons)
+    if entry.actions:
+        parts.append(" ".join(f"[{action.text}]" for action in entry.actions))
+    return "\n".join(parts)

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The Python packages that the add-on needs inside FreeCAD, and what to say where one is missing."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable, Iterable
+
+from silo.workbench.words import translate
+
+# Import name → name on PyPI; package.xml declares the same to the Addon Manager.
+NEEDED = {"requests": "requests", "pydantic": "pydantic", "sseclient": "sseclient-py"}
+
+
+def _found(name: str) -> bool:
+    return importlib.util.find_spec(name) is not None
+
+
+def missing(found: Callable[[str], bool] = _found) -> tuple[str, ...]:
+    """The packages that are not there, by their names on PyPI."""
+    return tuple(package for name, package in NEEDED.items() if not found(name))
+
+
+def sentence(packages: Iterable[str]) -> str:
+    """What to tell the user, in one line."""
+    text = translate(
+        "Silo",
+        "Silo needs the Python packages {names}. Install them with the Addon Manager, "
+        "or with: silo-mod install-addon",
+    )
+    return text.replace("{names}", ", ".join(packages))

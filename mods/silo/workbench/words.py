@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Texts for people: translated, and made safe to show.
+
+``translate`` has the signature of ``FreeCAD.Qt.translate``, so Qt's tools find the texts; inside FreeCAD it
+is that function, elsewhere the text stays as it is. What comes from files and servers passes through
+:func:`plain` before it is shown: it may not steer a terminal, a label or a person.
+"""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Callable
+
+Translate = Callable[[str, str], str]
+
+_translate: Translate = lambda _context, text: text  # noqa: E731  (replaced as a whole by `use`)
+
+# Cc control (ANSI escapes begin with one), Cf format (bidirectional overrides), Co private use, Cs halves of
+# surrogate pairs, Zl and Zp line ends of other scripts.
+_HIDDEN = frozenset(("Cc", "Cf", "Co", "Cs", "Zl", "Zp"))
+
+
+def use(function: Translate) -> None:
+    """Translate with this function from now on."""
+    global _translate
+    _translate = function
+
+
+def translate(context: str, text: str) -> str:
+    """The text in the user's language. Write both arguments as literals, or Qt's tools do not see them."""
+    return _translate(context, text)
+
+
+def plain(text: str, most: int = 200) -> str:
+    """Text of others as one line of visible characters, cut where it is too long to help anybody."""
+    # Only a little more than can be shown is looked at: a label may be megabytes long.
+    head = text[: most * 4]
+    shown = "".join(" " if unicodedata.category(c) in _HIDDEN else c for c in head)
+    shown = " ".join(shown.split())
+    return shown if len(shown) <= most and len(text) <= most * 4 else shown[: most - 1].rstrip() + "…"
+
+
+def counted(count: int, one: str, many: str) -> str:
+    """``one`` or ``many``, with ``{n}`` replaced by the count."""
+    return (one if count == 1 else many).replace("{n}", str(count))
