@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""A report as plain values: JSON by ``docs/inertia-schema.json``, and CSV with one row per link and part."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from typing import Any
+
+from silo.inertia.core import MassProps
+from silo.inertia.report import InertiaReport, LinkResult, PartResult
+
+FORMAT = "silo-inertia/1"
+
+
+def report_data(report: InertiaReport) -> dict[str, Any]:
+    """The report as JSON values; SI units throughout, the order of links and parts is stable."""
+    return {
+        "format": FORMAT,
+        "assembly": {"name": report.assembly, "source": report.source},
+        "bom": report.bom or None,
+        "default_density": report.default_density,
+        "links": [_link(link) for link in report.links.values()],
+        "unclaimed": [_part(part) for part in report.unclaimed],
+        "total": None if report.total is None else _props(report.total),
+        "warnings": [
+            {"link": w.link_name, "part": w.part_name, "code": str(w.code), "message": w.message}
+            for w in report.warnings
+        ],
+    }
+
+
+def report_json(report: InertiaReport) -> str:
+    """:func:`report_data` as text; floats read back unchanged."""
+    return json.dumps(report_data(report), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _props(props: MassProps) -> dict[str, Any]:
+    return {"mass": props.mass, "com": props.com.tolist(), "inertia": props.inertia.tolist()}
+
+
+def _link(link: LinkResult) -> dict[str, Any]:
+    return {
+        "name": link.name,
+        "frame": {"description": link.frame.description, "placement": link.frame.placement.tolist()},
+        **_props(link.props),
+        "principal_moments": link.props.principal()[0].tolist(),
+        "problems": [str(problem) for problem in link.problems],
+        "parts": [_part(part) for part in link.parts],
+    }
+
+
+def _part(part: PartResult) -> dict[str, Any]:
+    return {
+        "name": part.name,
+        "part_number": part.part_number,
+        "path": part.paths[0] if part.paths else "",
+        "paths": list(part.paths),
+        "quantity": part.quantity,
+        "mass": part.mass,
+        "total_mass": part.total_mass,
+        "quantum": part.quantum,
+        "volume": part.volume,
+        "density": part.density,
+        "density_source": part.density_source,
+        "source": str(part.source),
+        "rule": str(part.rule),
+        "decided_by": str(part.decided_by),
+        "material": part.material,
+        "material_name": part.material_name,
+        "bom_lines": list(part.lines),
+        "warnings": [{"code": str(w.code), "message": w.message} for w in part.warnings],
+    }
+
+
+CSV_HEADER = (
+    "Link",
+    "Part",
+    "Part number",
+    "Quantity",
+    "Mass (kg)",
+    "Total mass (kg)",
+    "Volume (m3)",
+    "Density (kg/m3)",
+    "Source",
+    "Rule",
+    "Decided by",
+    "Material",
+    "BOM lines",
+    "Path",
+    "Warnings",
+)
+
+
+def report_csv(report: InertiaReport) -> str:
+    """One row per link and part (RFC 4180); text that a spreadsheet would take for a formula is quoted."""
+    out = io.StringIO()
+    writer = csv.writer(out)
+    writer.writerow(CSV_HEADER)
+    for link, part in report.parts():
+        writer.writerow(
+            [
+                _text(link),
+                _text(part.name),
+                _text(part.part_number),
+                part.quantity,
+                repr(part.mass),
+                repr(part.total_mass),
+                repr(part.volume),
+                "" if part.density is None else repr(part.density),
+                part.source,
+                part.rule,
+                part.decided_by,
+                _text(part.material or ""),
+                " ".join(str(line) for line in part.lines),
+                _text(part.paths[0] if part.paths else ""),
+                " ".join(dict.fromkeys(str(w.code) for w in part.warnings)),
+            ]
+        )
+    return out.getvalue()
+
+
+def _text(cell: str) -> str:
+    return "'" + cell if cell[:1] in ("=", "+", "-", "@", "\t", "\r") else cell

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""``<inertial>`` as URDF, SDF and MJCF want it: about the centre of mass, axes of the link, no rotation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from xml.sax.saxutils import quoteattr
+
+from silo.inertia.core import MassProps
+from silo.inertia.output.values import number
+from silo.inertia.types import InertialProperties
+
+
+def urdf_inertial(props: MassProps) -> str:
+    """``<inertial>`` of a URDF link (http://wiki.ros.org/urdf/XML/link)."""
+    v = props.to_inertial()
+    xyz = " ".join(number(c) for c in v.com)
+    elements = " ".join(f'{name}="{number(getattr(v, name))}"' for name in _UPPER)
+    return (
+        "<inertial>\n"
+        f'  <origin xyz="{xyz}" rpy="0 0 0"/>\n'
+        f'  <mass value="{number(v.mass)}"/>\n'
+        f"  <inertia {elements}/>\n"
+        "</inertial>"
+    )
+
+
+_UPPER = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+
+
+def sdf_inertial(props: MassProps) -> str:
+    """``<inertial>`` of an SDFormat link (http://sdformat.org/spec)."""
+    v = props.to_inertial()
+    pose = " ".join(number(c) for c in v.com)
+    elements = "\n".join(f"    <{name}>{number(getattr(v, name))}</{name}>" for name in _UPPER)
+    return (
+        "<inertial>\n"
+        f"  <pose>{pose} 0 0 0</pose>\n"
+        f"  <mass>{number(v.mass)}</mass>\n"
+        f"  <inertia>\n{elements}\n  </inertia>\n"
+        "</inertial>"
+    )
+
+
+def mjcf_inertial(props: MassProps) -> str:
+    """``<inertial>`` of a MuJoCo body; ``fullinertia`` has the order ixx iyy izz ixy ixz iyz."""
+    v = props.to_inertial()
+    pos = " ".join(number(c) for c in v.com)
+    full = " ".join(number(e) for e in _mujoco_order(v))
+    return f'<inertial pos="{pos}" mass="{number(v.mass)}" fullinertia="{full}"/>'
+
+
+def _mujoco_order(v: InertialProperties) -> tuple[float, ...]:
+    return (v.ixx, v.iyy, v.izz, v.ixy, v.ixz, v.iyz)
+
+
+_FORMATS: dict[str, tuple[str, Callable[[MassProps], str]]] = {
+    "urdf": ("link", urdf_inertial),
+    "sdf": ("link", sdf_inertial),
+    "mjcf": ("body", mjcf_inertial),
+}
+SNIPPETS = tuple(_FORMATS)
+
+
+def snippets(links: Mapping[str, MassProps], kind: str) -> str:
+    """All links, each in its ``<link>`` or ``<body>``, to paste from. ``kind``: one of :data:`SNIPPETS`."""
+    element, write = _FORMATS[kind]
+    blocks = []
+    for name, props in links.items():
+        body = write(props).replace("\n", "\n  ")
+        blocks.append(f"<{element} name={quoteattr(name)}>\n  {body}\n</{element}>\n")
+    return "".join(blocks)

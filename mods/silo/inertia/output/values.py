@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Numbers that go out: full precision, checked after rounding, on eigenvalues.
+
+Most consumers check nothing: PyBullet silently sets a bad inertia to zero, pinocchio computes NaN. So what
+no rigid body can have is refused here, and noise in the last digits is cleared before anything is printed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from silo.bom.errors import InputError
+from silo.inertia.aggregate import tensor_words
+from silo.inertia.core import CHECK_TOLERANCE, Floats, MassProps, TensorProblem
+from silo.inertia.report import LinkResult
+
+_MARGIN = 1e-14
+"""Relative; above what printing fifteen digits may change, far below what matters."""
+
+
+def number(value: float) -> str:
+    """Fifteen significant digits, which hide the last bit's noise; never "-0"."""
+    return f"{value + 0.0:.15g}"
+
+
+def settled(props: MassProps) -> MassProps:
+    """``props`` as they will be printed, symmetric, with principal moments that keep a + b >= c.
+
+    A flat plate has a + b = c, and rounding may push c above by some 1e-16: MuJoCo refuses that. All moments
+    are then raised by what is missing, which is below 1e-9 of the largest one; more than that is no rounding
+    and stays as it is, for the check to find.
+    """
+    tensor = _printed((props.inertia + props.inertia.T) / 2)
+    for _ in range(4):
+        low, mid, high = np.linalg.eigvalsh(tensor)
+        missing = float(high - low - mid)
+        if missing <= -_MARGIN / 2 * high or missing > CHECK_TOLERANCE * high:
+            break
+        tensor = _printed(tensor + (max(missing, 0.0) + _MARGIN * high) * np.eye(3))
+    return MassProps(float(number(props.mass)), _printed(props.com), tensor)
+
+
+def _printed(values: Floats) -> Floats:
+    return np.vectorize(lambda value: float(number(value)), otypes=[float])(values)
+
+
+def writable(links: Iterable[LinkResult]) -> dict[str, MassProps]:
+    """Link → properties fit for a simulator. Links without mass are left out.
+
+    Raises InputError with every link whose tensor no rigid body can have; then nothing is to be written.
+    """
+    fit: dict[str, MassProps] = {}
+    bad: list[str] = []
+    for link in links:
+        props = settled(link.props)
+        problems = props.check()
+        if TensorProblem.ZERO_MASS in problems:
+            continue
+        if problems:
+            bad.append(f"{link.name} {tensor_words(problems)}")
+        fit[link.name] = props
+    if bad:
+        raise InputError("not written, because no rigid body can have these inertias: " + "; ".join(bad))
+    return fit
