@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Which reader a file belongs to: by its content first, by its suffix where the content says nothing."""
+
+from __future__ import annotations
+
+import zipfile
+from enum import StrEnum
+from pathlib import Path
+
+from silo.bom.errors import DocumentError
+
+
+class Kind(StrEnum):
+    """A format we read."""
+
+    STEP = "step"
+    BREP = "brep"  # OpenCASCADE's own text or binary shape
+    FREECAD = "fcstd"
+    STL = "stl"
+    OBJ = "obj"
+    PLY = "ply"
+    GLB = "glb"
+    THREEMF = "3mf"
+
+    @property
+    def is_mesh(self) -> bool:
+        """True for triangles without a geometry kernel behind them."""
+        return self in (Kind.STL, Kind.OBJ, Kind.PLY, Kind.GLB, Kind.THREEMF)
+
+
+_SUFFIXES = {
+    ".step": Kind.STEP,
+    ".stp": Kind.STEP,
+    ".p21": Kind.STEP,
+    ".brep": Kind.BREP,
+    ".brp": Kind.BREP,
+    ".fcstd": Kind.FREECAD,
+    ".stl": Kind.STL,
+    ".obj": Kind.OBJ,
+    ".ply": Kind.PLY,
+    ".glb": Kind.GLB,
+    ".3mf": Kind.THREEMF,
+}
+
+_HEAD_BYTES = 1024
+READABLE = "STEP, FCStd, BREP, STL, OBJ, 3MF, GLB, PLY"
+
+
+def detect(path: Path) -> Kind:
+    """The format of a file.
+
+    Raises DocumentError where the file is missing, empty, a Git LFS pointer, or of no format we read. A file
+    whose content contradicts its suffix (an HTML page saved as .step) is refused as well.
+    """
+    head = _head(path)
+    by_suffix = _SUFFIXES.get(path.suffix.lower())
+    by_content = _by_content(path, head)
+    if by_content is not None:
+        return by_content
+    if by_suffix in (Kind.STL, Kind.OBJ):
+        # A binary STL begins with 80 free bytes and an OBJ with anything: only the suffix can say it.
+        return by_suffix
+    if by_suffix is not None:
+        raise DocumentError(
+            str(path), f"is named like a {by_suffix.value} file, but its content is not; export it again"
+        )
+    raise DocumentError(str(path), f"has no geometry format that is read here ({READABLE})")
+
+
+def _head(path: Path) -> bytes:
+    if path.is_dir():
+        raise DocumentError(str(path), "is a folder; name one file")
+    try:
+        with path.open("rb") as stream:
+            head = stream.read(_HEAD_BYTES)
+    except OSError as error:
+        raise DocumentError(str(path), f"cannot be opened: {error.strerror or error}") from error
+    if not head.strip():
+        raise DocumentError(str(path), "is empty; export it again")
+    if head.startswith(b"version https://git-lfs"):
+        raise DocumentError(str(path), "is a Git LFS pointer, not the file; run `git lfs pull` first")
+    return head
+
+
+def _by_content(path: Path, head: bytes) -> Kind | None:
+    text = head.removeprefix(b"\xef\xbb\xbf").lstrip()
+    if text.startswith(b"ISO-10303-21"):
+        return Kind.STEP
+    if text.startswith((b"DBRep_DrawableShape", b"CASCADE Topology", b"Open CASCADE Topology")):
+        return Kind.BREP
+    if head.startswith(b"glTF"):
+        return Kind.GLB
+    if text.startswith((b"ply\n", b"ply\r")):
+        return Kind.PLY
+    if text.startswith(b"solid") and b"facet" in head:
+        return Kind.STL
+    if head.startswith(b"PK"):
+        return _zip_kind(path)
+    return None
+
+
+def _zip_kind(path: Path) -> Kind | None:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = archive.namelist()
+    except (zipfile.BadZipFile, OSError) as error:
+        raise DocumentError(str(path), f"is a damaged zip file ({error}); save it again") from error
+    if "Document.xml" in names:
+        return Kind.FREECAD
+    if any(name.lower().endswith(".model") for name in names):
+        return Kind.THREEMF
+    return None

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Reading in a child process: the geometry kernel may crash, hang or eat memory, and only the child does.
+
+The child (:mod:`worker`) gets its task as one JSON line, answers with JSON lines (progress, then done or
+error), and leaves the result in a file in a folder that is ours. Its standard error is kept for the message.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import queue
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, Any
+
+from silo.bom.errors import CancelledError, ConfigError, DocumentError
+from silo.inertia.geometry.options import Progress, ReadOptions
+
+POLL_SECONDS = 0.05
+_WORKER = "from silo.inertia.geometry.worker import main; main()"
+
+
+def run(path: Path, options: ReadOptions, result: Path) -> None:
+    """Read ``path`` in a child process; the stored geometry is at ``result`` afterwards.
+
+    Raises DocumentError (bad file, crash, time or memory limit), ConfigError (kernel not installed) and
+    CancelledError.
+    """
+    task = {
+        "path": str(path),
+        "result": str(result),
+        "options": options.content_options(),
+        "memory_mb": options.memory_mb,
+        "cpu_s": options.timeout_s,
+    }
+    with tempfile.TemporaryFile() as errors, _child(errors) as process:
+        answer = _talk(process, path, options, task)
+        process.wait()
+        if answer is None:
+            raise DocumentError(str(path), _death(process.returncode, errors, options))
+    if answer.get("event") == "error":
+        if answer.get("config"):
+            raise ConfigError(str(answer["reason"]))
+        raise DocumentError(str(path), str(answer["reason"]))
+
+
+def _talk(
+    process: subprocess.Popen[bytes], path: Path, options: ReadOptions, task: dict[str, Any]
+) -> dict[str, Any] | None:
+    """The child's last word, None where it ended without one."""
+    lines: queue.Queue[bytes | None] = queue.Queue()
+    threading.Thread(target=_pump, args=(process.stdout, lines), daemon=True).start()
+    if process.stdin is not None:
+        try:
+            process.stdin.write(json.dumps(task).encode("utf-8") + b"\n")
+            process.stdin.close()
+        except BrokenPipeError:
+            return None
+    deadline = time.monotonic() + options.timeout_s if options.timeout_s else None
+    while True:
+        if options.cancelled is not None and options.cancelled():
+            raise CancelledError(f"{path}: reading was cancelled")
+        if deadline is not None and time.monotonic() > deadline:
+            raise DocumentError(
+                str(path),
+                f"could not be read within {options.timeout_s:g} s; allow more time, or simplify it",
+            )
+        try:
+            line = lines.get(timeout=POLL_SECONDS)
+        except queue.Empty:
+            continue
+        if line is None:
+            return None
+        event: dict[str, Any] = json.loads(line)
+        if event.get("event") != "progress":
+            return event
+        if options.progress is not None:
+            options.progress(Progress(str(event["stage"]), int(event["done"]), int(event["total"])))
+
+
+def _pump(stream: IO[bytes] | None, lines: queue.Queue[bytes | None]) -> None:
+    for line in stream or ():
+        lines.put(line)
+    lines.put(None)
+
+
+@contextmanager
+def _child(errors: IO[bytes]) -> Iterator[subprocess.Popen[bytes]]:
+    process = subprocess.Popen(
+        [python(), "-c", _WORKER],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=errors,
+        env=_environment(),
+    )
+    try:
+        yield process
+    finally:
+        if process.poll() is None:
+            process.kill()
+        process.wait()
+        if process.stdout is not None:
+            process.stdout.close()
+
+
+def python() -> str:
+    """A Python interpreter to start. Inside FreeCAD ``sys.executable`` is FreeCAD itself."""
+    if "python" in Path(sys.executable or "").name.lower():
+        return sys.executable
+    folder = Path(sys.base_exec_prefix)
+    names = ["python.exe", "bin/python.exe"] if os.name == "nt" else ["bin/python3", "bin/python"]
+    for name in names:
+        if (folder / name).is_file():
+            return str(folder / name)
+    raise ConfigError(
+        f"no Python interpreter was found beside {sys.executable} to read geometry with; "
+        "read it with isolate=False"
+    )
+
+
+def _environment() -> dict[str, str]:
+    # The child must find the same modules, however this process was told of them.
+    paths = os.pathsep.join(p for p in sys.path if p)
+    # One thread: numpy's pool would reserve memory for each core, which counts against the limit.
+    return {**os.environ, "PYTHONPATH": paths, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+
+
+def _death(code: int, errors: IO[bytes], options: ReadOptions) -> str:
+    errors.seek(0)
+    words = errors.read()[-4000:].decode("utf-8", errors="replace")
+    if "MemoryError" in words or "bad_alloc" in words or "Cannot allocate memory" in words:
+        return f"needs more than the {options.memory_mb} MB allowed to read it; allow more memory"
+    if code < 0:
+        name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
+        return (
+            f"the geometry kernel crashed on it ({name}); the file is damaged, or trips a bug of the kernel. "
+            "Export it again, or with another application protocol"
+        )
+    last = next((line for line in reversed(words.splitlines()) if line.strip()), f"exit code {code}")
+    return f"the reader stopped with an error: {last.strip()}"

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The one door to the geometry kernel: OpenCASCADE through OCP 7.8 to 8.x, its differences evened out.
+
+Version 8 moved the collections to ``OCP.collections`` and dropped the ``_s`` from some static methods; what
+the readers need of both is here under one name. Importing this module imports the kernel (half a second and
+200 MB): only the readers do, and they run in a child process.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from silo.bom.errors import ConfigError
+
+try:
+    import OCP
+except ImportError as error:  # pragma: no cover - the development environment always has it
+    raise ConfigError(
+        "STEP files and FreeCAD shapes need the geometry kernel, which is not installed: "
+        'pip install "silo-mod[inertia]"'
+    ) from error
+
+from OCP.BRep import BRep_Tool
+from OCP.Message import Message
+from OCP.TDataStd import TDataStd_Name
+from OCP.TDF import TDF_Label, TDF_Tool
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SOLID
+from OCP.TopExp import TopExp_Explorer
+from OCP.TopoDS import TopoDS
+
+try:
+    from OCP.TColStd import TColStd_SequenceOfAsciiString
+    from OCP.TDF import TDF_LabelSequence
+except ImportError:
+    from OCP.collections import Sequence_TCollection_AsciiString as TColStd_SequenceOfAsciiString
+    from OCP.collections import Sequence_TDF_Label as TDF_LabelSequence
+
+AsciiStrings = TColStd_SequenceOfAsciiString
+LabelSequence = TDF_LabelSequence
+
+VERSION: str = OCP.__version__
+"""The kernel's version; part of the key of everything that is kept of its results."""
+
+_as_face = getattr(TopoDS, "Face_s", None) or TopoDS.Face
+
+
+def quiet() -> None:
+    """Take the kernel's printers away: it reports to standard output otherwise."""
+    messenger = Message.DefaultMessenger_s()
+    for printer in list(messenger.Printers()):
+        messenger.RemovePrinter(printer)
+
+
+def labels(sequence: Any) -> list[Any]:
+    """A label sequence as a list (it counts from 1)."""
+    return [sequence.Value(i) for i in range(1, sequence.Length() + 1)]
+
+
+def entry(label: Any) -> str:
+    """The label's address in its document, such as ``0:1:1:3``."""
+    from OCP.TCollection import TCollection_AsciiString
+
+    text = TCollection_AsciiString()
+    TDF_Tool.Entry_s(label, text)
+    return str(text.ToCString())
+
+
+def name_of(label: Any) -> str:
+    """The label's name, "" where it has none."""
+    attribute = TDataStd_Name()
+    if not label.FindAttribute(TDataStd_Name.GetID_s(), attribute):
+        return ""
+    return str(attribute.Get().ToExtString())
+
+
+def attribute_of(label: Any, kind: Any) -> Any | None:
+    """The label's attribute of class ``kind``, or None.
+
+    Asked with IsAttribute first: FindAttribute on a label without the attribute ends the process with a
+    segmentation fault for some classes (seen in 7.9 and 8.0).
+    """
+    if not label.IsAttribute(kind.GetID_s()):
+        return None
+    attribute = kind()
+    label.FindAttribute(kind.GetID_s(), attribute)
+    return attribute
+
+
+def new_label() -> Any:
+    """An empty label, for the kernel to fill."""
+    return TDF_Label()
+
+
+def solids_of(shape: Any) -> list[Any]:
+    """All solids of a shape, placed."""
+    return _explored(shape, TopAbs_SOLID)
+
+
+def faces_of(shape: Any) -> list[Any]:
+    """All faces of a shape, placed and oriented."""
+    return [_as_face(face) for face in _explored(shape, TopAbs_FACE)]
+
+
+def has_edges(shape: Any) -> bool:
+    """True where there is any edge, in a face or alone."""
+    return not shape.IsNull() and TopExp_Explorer(shape, TopAbs_EDGE).More()
+
+
+def has_surface(face: Any) -> bool:
+    """False for a face that holds triangles only (tessellated STEP)."""
+    return BRep_Tool.Surface_s(face) is not None
+
+
+def _explored(shape: Any, kind: Any) -> list[Any]:
+    if shape is None or shape.IsNull():
+        return []
+    explorer = TopExp_Explorer(shape, kind)
+    found = []
+    while explorer.More():
+        found.append(explorer.Current())
+        explorer.Next()
+    return found

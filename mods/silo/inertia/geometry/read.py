@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Read the geometry of any file we know: from the cache, in a child process, or here."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+from silo.bom.errors import CancelledError
+from silo.inertia.geometry import isolate, store
+from silo.inertia.geometry.cache import Cache, default_folder, key_of
+from silo.inertia.geometry.detect import Kind, detect
+from silo.inertia.geometry.options import Progress, Reading, ReadOptions, Report
+from silo.inertia.model import Assembly
+
+
+def read(path: str | Path, *, options: ReadOptions | None = None) -> Assembly:
+    """The geometry of a STEP, BREP, FreeCAD or mesh file: prototypes measured once, and where they are.
+
+    Example::
+
+        assembly = read("arm.step", options=ReadOptions(timeout_s=60))
+        for instance in assembly.instances: ...
+
+    Raises DocumentError (the file is missing, of no known format, damaged, or beyond the limits), ConfigError
+    (the extra "inertia" is not installed) and CancelledError. What is doubtful but usable is a problem of the
+    assembly or of its prototypes.
+    """
+    options = options or ReadOptions()
+    path = Path(path)
+    detect(path)
+    if not options.isolate:
+        return read_here(path, options, _reporter(path, options)).assembly
+    cache = Cache(options.cache_dir or default_folder()) if options.cache else None
+    key = key_of(path, options.content_options()) if cache else ""
+    known = cache.get(key, path) if cache else None
+    if known is not None:
+        return known
+    with tempfile.TemporaryDirectory(prefix="silo-geometry-") as folder:
+        result = Path(folder) / "result.npz"
+        isolate.run(path, options, result)
+        if cache is not None:
+            cache.put(key, result)
+        return store.load(result)[0]
+
+
+def read_here(path: Path, options: ReadOptions, report: Report) -> Reading:
+    """Read in this process: what the child does; also for hosts that bring their own process."""
+    kind = detect(path)
+    if kind is Kind.STEP:
+        from silo.inertia.geometry.step import read_step
+
+        return read_step(path, options, report)
+    if kind.is_mesh:
+        from silo.inertia.geometry.meshfile import read_mesh
+
+        return read_mesh(path, kind, options, report)
+    if kind is Kind.BREP:
+        from silo.inertia.geometry.brep import read_brep
+
+        return read_brep(path, options, report)
+    raise NotImplementedError(kind)
+
+
+def _reporter(path: Path, options: ReadOptions) -> Report:
+    def report(stage: str, done: int, total: int) -> None:
+        if options.cancelled is not None and options.cancelled():
+            raise CancelledError(f"{path}: reading was cancelled")
+        if options.progress is not None:
+            options.progress(Progress(stage, done, total))
+
+    return report

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The child process that reads geometry; started by :mod:`isolate`, and by nothing else.
+
+Standard output is the line to the parent, so the kernel, which prints there too, gets a file instead. What it
+wrote is counted and becomes a problem of the assembly.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import sys
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from typing import IO, Any
+
+from silo.bom.errors import ConfigError, SiloError
+from silo.inertia.geometry import store
+from silo.inertia.geometry.options import Reading, ReadOptions
+from silo.inertia.model import GeometryCode, GeometryProblem
+
+_COMPLAINT = re.compile(rb"ERR|Fail|\*\*\*|Exception|Unresolved", re.IGNORECASE)
+_COLOUR = re.compile(rb"\x1b\[[0-9;]*m")
+
+
+def main() -> None:
+    """Read the task from standard input, do it, say how it went. Exit code 0 unless it crashed."""
+    parent = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    task = json.loads(sys.stdin.readline())
+    limit(int(task["memory_mb"]), float(task["cpu_s"]))
+    with tempfile.TemporaryFile() as noise:
+        os.dup2(noise.fileno(), 1)
+        try:
+            _read(task, parent, noise)
+        except SiloError as error:
+            reason = getattr(error, "reason", str(error))
+            _say(parent, event="error", reason=reason, config=isinstance(error, ConfigError))
+        else:
+            _say(parent, event="done")
+    # Taking a large document of the kernel down again can take longer than reading it, and may crash.
+    os._exit(0)
+
+
+def limit(memory_mb: int, cpu_s: float) -> None:
+    """Limits of this process, where the platform has them; no core files."""
+    try:
+        import resource
+    except ImportError:  # Windows: the parent's clock is all there is
+        return
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    if memory_mb:
+        resource.setrlimit(resource.RLIMIT_AS, (memory_mb * 1024**2, memory_mb * 1024**2))
+    if cpu_s:
+        # Only for the case that the parent died: its own clock is the one that counts.
+        seconds = int(cpu_s) + 30
+        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
+
+
+def _read(task: dict[str, Any], parent: IO[str], noise: IO[bytes]) -> None:
+    from silo.inertia.geometry.cache import provenance
+    from silo.inertia.geometry.read import read_here
+
+    options = ReadOptions.from_content(task["options"])
+
+    def report(stage: str, done: int, total: int) -> None:
+        _say(parent, event="progress", stage=stage, done=done, total=total)
+
+    reading = read_here(Path(task["path"]), options, report)
+    reading = with_complaints(reading, _complaints(noise))
+    store.save(reading.assembly, Path(task["result"]), provenance(reading, options))
+
+
+def with_complaints(reading: Reading, lines: list[str]) -> Reading:
+    """What the kernel printed, as one problem of the assembly."""
+    if not lines:
+        return reading
+    problem = GeometryProblem(
+        GeometryCode.READER, f"the geometry kernel complained {len(lines)} times while reading: {lines[0]}"
+    )
+    assembly = replace(reading.assembly, problems=(*reading.assembly.problems, problem))
+    return replace(reading, assembly=assembly)
+
+
+def _complaints(noise: IO[bytes]) -> list[str]:
+    sys.stdout.flush()
+    noise.seek(0)
+    lines = (_COLOUR.sub(b"", line).strip() for line in noise)
+    return [line.decode("utf-8", errors="replace")[:200] for line in lines if _COMPLAINT.search(line)]
+
+
+def _say(parent: IO[str], **event: object) -> None:
+    parent.write(json.dumps(event) + "\n")
+    parent.flush()
