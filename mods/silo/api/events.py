@@ -19,7 +19,7 @@ from typing import Protocol, TypeVar
 from silo.api.protocol import EventStream
 from silo.api.sse import HEARTBEAT, MERGE, RESET, STATE, ServerEvent, SseParser, parse
 from silo.api.wire import MergeEvent, ServerState
-from silo.bom.errors import AuthError, RouteMissingError, SiloError
+from silo.bom.errors import AuthError, RejectedError, RouteMissingError, SiloError
 
 __all__ = [
     "HEARTBEAT",
@@ -185,6 +185,10 @@ class EventListener:
                 return self._tell(stop, ConnectionState(Connection.UNSUPPORTED, str(error)))
             except AuthError as error:
                 return self._tell(stop, ConnectionState(Connection.REFUSED, str(error)))
+            except RejectedError as error:
+                # The mark is another server's; without it there is a gap, which a reset says.
+                reason = str(error)
+                self._forget_mark(stop)
             except SiloError as error:
                 reason = str(error)
             # Only what was really received counts as success: a server that greets and drops us is not up.
@@ -242,6 +246,12 @@ class EventListener:
             # The server counts anew, so what happened around its restart was never replayed.
             anew = ServerEvent(marker, RESET, {"reason": "the server counts anew"})
             self._call(stop, self._on_event, anew)
+
+    def _forget_mark(self, stop: threading.Event) -> None:
+        if self._last_id is not None:
+            self._last_id = None
+            gap = ServerEvent(None, RESET, {"reason": "the server does not know where we stopped"})
+            self._call(stop, self._on_event, gap)
 
     def _tell(self, stop: threading.Event, state: ConnectionState) -> None:
         if not stop.is_set():

@@ -9,7 +9,7 @@ from typing import Any
 from uuid import UUID
 
 from silo.api.bodies import ItemBody, ItemChanges, NumberAnswer, NumberBody, UuidsBody, body
-from silo.api.caller import LISTS, Caller
+from silo.api.caller import LISTS, Caller, Params
 from silo.api.replies import WebPageError
 from silo.api.schemas import categories_of
 from silo.api.transport import Cancel, stop_if
@@ -79,8 +79,8 @@ class ItemCalls(Caller):
             # One malformed identity spoils the batch; asked one by one, only that one is unknown.
             return None
         self._has_batch = True
-        known = {item.id.lower(): item for item in reply.models(Item, *LISTS)}
-        return {uuid: known[uuid.lower()] for uuid in uuids if uuid.lower() in known}
+        known = {_written(item.id): item for item in reply.models(Item, *LISTS)}
+        return {uuid: known[_written(uuid)] for uuid in uuids if _written(uuid) in known}
 
     def _one_by_one(self, uuids: Sequence[str], cancelled: Cancel | None) -> dict[str, Item]:
         def one(uuid: str) -> Item | None:
@@ -116,13 +116,15 @@ class ItemCalls(Caller):
         params: dict[str, str | int] = {"limit": limit, "offset": offset}
         if item_type:
             params["item_type"] = item_type
-        if query:
+        if query and not item_type and not offset:
             try:
-                reply = self._get(f"items like {query!r}", "items", "search", params={"q": query, **params})
+                asked: Params = {"q": query, "limit": limit}
+                reply = self._get(f"items like {query!r}", "items", "search", params=asked)
                 return reply.models(Item, *LISTS)
             except NotFoundError:
-                # A server without the fuzzy search may still filter its list.
-                params["search"] = query
+                pass  # A server without the fuzzy search may still filter its list.
+        if query:
+            params["search"] = query
         return self._get("its items", "items", params=params).models(Item, *LISTS)
 
     def create_item(
@@ -196,6 +198,14 @@ class ItemCalls(Caller):
         except NotFoundError:
             reply = self._get(f"the properties of {name}", "schemas", name, "properties", params=params)
             return reply.mapping()
+
+
+def _written(uuid: str) -> str:
+    # CAD files hold identities in capitals, in braces, without dashes; the server answers with its own form.
+    try:
+        return str(UUID(uuid))
+    except ValueError:
+        return uuid.lower()
 
 
 def is_uuid(text: str | None) -> bool:

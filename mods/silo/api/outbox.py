@@ -156,7 +156,7 @@ class Outbox:
         if entry.superseded:
             thing = "file" if entry.kind is Kind.FILE else "BOM"
             raise ConflictError(
-                f"{entry.part_number}: a newer {thing} was sent since, and this one would undo that. Discard it"
+                f"{entry.part_number}: a newer {thing} was sent since, and this one would undo it. Discard it"
             )
         changed: dict[str, Any] = {"state": State.WAITING, "reason": "", "next_attempt": 0.0}
         if server is not None and server != entry.server:

@@ -39,6 +39,8 @@ _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u206
 _TITLE = re.compile(r"<title[^>]*>(.{1,200}?)</title>", re.IGNORECASE | re.DOTALL)
 # What routers, not handlers, say to a path they do not know: Go's net/http and chi; Starlette and FastAPI.
 _ROUTER_SAYS = {"404 page not found", "Not Found", "Method Not Allowed"}
+# Codes of a 503 that says "I am not well", not "I take no changes".
+_AWAY = {"unavailable", "busy", "degraded", "overloaded"}
 
 
 class WebPageError(RouteMissingError):
@@ -171,7 +173,7 @@ def error_of(reply: Reply, *, writing: bool = False) -> SiloError:
         return VersionConflictError(
             f"{asked}: somebody changed it meanwhile{told}. Read it again, then repeat"
         )
-    if status == 503 and writing and not reply.is_html:
+    if status == 503 and writing and not reply.is_html and said.code not in _AWAY:
         return ReadOnlyError(f"{host} takes no changes now{told}. Nothing is lost; it can be sent later")
     if status in (408, 429, 502, 503, 504):
         return UnreachableError(f"{host} cannot answer now ({status}){told}. Try again later")
@@ -182,7 +184,8 @@ def error_of(reply: Reply, *, writing: bool = False) -> SiloError:
 
 
 def _router_speaks(said: Complaint) -> bool:
-    return said.code == RouteMissingError.code or (not said.code and said.text in _ROUTER_SAYS)
+    named = said.code == RouteMissingError.code or said.text.startswith("Not Found: ")
+    return named or (not said.code and said.text in _ROUTER_SAYS)
 
 
 def _under(data: Any, keys: Sequence[str]) -> list[Any] | None:

@@ -171,8 +171,9 @@ class Transport:
             error, told = self._attempt(call)
             if isinstance(error, Reply):
                 return error
-            again = isinstance(error, UnreachableError) or told is not None
-            wait = self._retries.pause(attempt, self._chance(), told) if call.repeatable and again else None
+            # A read-only server stays so until a person changes that; waiting here would help nobody.
+            again = call.repeatable and isinstance(error, UnreachableError)
+            wait = self._retries.pause(attempt, self._chance(), told) if again else None
             if wait is None:
                 raise error
             self._rest(wait, call.cancelled)

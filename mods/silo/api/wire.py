@@ -128,6 +128,8 @@ class Item(Record):
     sourcing_type: str | None = None
     long_description: str | None = None
     thumbnail_key: str | None = None
+    category: str | None = None
+    bom_version: int | None = None
     properties: dict[str, Any] = Field(default_factory=dict)
 
     @model_validator(mode="after")
@@ -145,9 +147,12 @@ class BomLine(Record):
     parent_part_number: str | None = None
     child_part_number: str
     child_id: str | None = None
+    child_name: str = ""
     child_description: str = ""
+    child_item_type: str = ""
     rel_type: str = "component"
     quantity: Number | None = None
+    total_quantity: Number | None = None
     unit: str | None = None
     reference_designators: Annotated[list[str], BeforeValidator(_designators)] = Field(default_factory=list)
     find_number: str | None = None

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The pure part of :class:`silo.api.fake.FakeSilo`: checking a merge, and walking BOMs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+from urllib.parse import quote
+
+from silo.api.wire import (
+    BomLine,
+    FlatLine,
+    MergeDiff,
+    MergeRequest,
+    MergeResult,
+    MergeWarning,
+    QuantityLine,
+    QuantityUpdate,
+)
+from silo.bom.errors import CycleError, RejectedError
+from silo.bom.model import BomDiff
+
+Bom = Callable[[str], Sequence[BomLine]]
+
+
+def entries_of(request: MergeRequest, known: Mapping[str, str]) -> list[dict[str, Any]]:
+    """The request's entries under the server's own numbers (``known``: case-folded → number).
+
+    Raises :class:`RejectedError` with all unknown children at once, each with its index.
+    """
+    problems = [
+        f"entries[{index}].child_part_number: {entry.child_part_number!r} does not exist on this server"
+        for index, entry in enumerate(request.entries)
+        if entry.child_part_number.casefold() not in known
+    ]
+    if problems:
+        raise RejectedError(
+            f"{len(problems)} of the entries cannot be merged: {'; '.join(problems)}", problems
+        )
+    return [
+        {"child_part_number": known[entry.child_part_number.casefold()], "quantity": entry.quantity}
+        for entry in request.entries
+    ]
+
+
+def check_cycle(bom: Bom, parent: str, children: Sequence[str]) -> None:
+    """Raise :class:`CycleError` where one of the children contains the parent."""
+    for child in children:
+        path = _way(bom, child, parent, (parent,))
+        if path is not None:
+            raise CycleError(path)
+
+
+def _way(bom: Bom, here: str, goal: str, path: tuple[str, ...]) -> tuple[str, ...] | None:
+    path = (*path, here)
+    if here == goal:
+        return path
+    for line in bom(here):
+        found = _way(bom, line.child_part_number, goal, path)
+        if found is not None:
+            return found
+    return None
+
+
+def result_of(diff: BomDiff, part_number: str, sync_id: str | None) -> MergeResult:
+    """The answer of spec §5 for a planned merge."""
+    warnings = [
+        MergeWarning(
+            type="unreferenced",
+            part_number=change.part_number,
+            message="Present in server BOM but not in assembly",
+        )
+        for change in diff.removed
+    ] + [
+        MergeWarning(
+            type="conflict",
+            part_number=conflict.part_number,
+            message="Set by a person to another quantity than the assembly's",
+            assembly_quantity=conflict.local_quantity,
+            server_quantity=conflict.remote_quantity,
+        )
+        for conflict in diff.conflicts
+    ]
+    return MergeResult(
+        diff=MergeDiff(
+            added=[QuantityLine(**change) for change in diff.added],
+            removed=[QuantityLine(**change) for change in diff.removed],
+            quantity_changed=[
+                QuantityUpdate(
+                    part_number=change.part_number,
+                    old_quantity=change.remote_quantity,
+                    new_quantity=change.local_quantity,
+                )
+                for change in diff.quantity_changed
+            ],
+            unchanged=[QuantityLine(**change) for change in diff.unchanged],
+        ),
+        warnings=warnings,
+        resolve_url=f"/items/{quote(part_number, safe='')}/bom",
+        sync_id=sync_id,
+    )
+
+
+def expanded(bom: Bom, part_number: str, depth: int) -> list[BomLine]:
+    """All lines below an item, parents before children, each with its depth and its total quantity."""
+
+    def below(parent: str, level: int, factor: float) -> list[BomLine]:
+        rows: list[BomLine] = []
+        for line in bom(parent) if level <= depth else ():
+            total = factor * (line.quantity or 0.0)
+            rows.append(line.model_copy(update={"depth": level, "total_quantity": total}))
+            rows += below(line.child_part_number, level + 1, total)
+        return rows
+
+    return below(part_number, 1, 1.0)
+
+
+def flat(bom: Bom, part_number: str) -> list[FlatLine]:
+    """The leaves below an item with their total quantities."""
+    totals: dict[str, FlatLine] = {}
+    for line in expanded(bom, part_number, 1000):
+        if bom(line.child_part_number):
+            continue
+        before = totals.get(line.child_part_number)
+        total = (line.total_quantity or 0.0) + (before.total_quantity or 0.0 if before else 0.0)
+        totals[line.child_part_number] = FlatLine(
+            part_number=line.child_part_number, description=line.child_description, total_quantity=total
+        )
+    return list(totals.values())

@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What :class:`silo.api.fake.FakeSilo` holds, and how it changes: items, revisions, lines, the event log."""
+
+from __future__ import annotations
+
+import hashlib
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from typing import Any
+
+from silo.api.multipart import as_json
+from silo.api.sse import MERGE, ServerEvent
+from silo.api.wire import BomLine, Item, MergeEvent, MergeResult, Revision
+from silo.bom.errors import NotFoundError, ReadOnlyError, RejectedError
+
+CATEGORIES = {
+    "A01": "Mechanical assembly",
+    "C01": "Adhesives and thread lockers",
+    "F01": "Screws and bolts",
+    "M01": "Machined parts",
+    "X99": "Other",
+}
+
+
+@dataclass
+class Stored:
+    """An item with all that hangs on it."""
+
+    item: Item
+    revisions: list[Revision] = field(default_factory=list)
+    files: dict[int, bytes] = field(default_factory=dict)
+    lines: list[dict[str, Any]] = field(default_factory=list)
+    answers: dict[str, tuple[list[tuple[str, float]], MergeResult]] = field(default_factory=dict)
+
+
+def _nothing(name: str) -> None:
+    return None
+
+
+class FakeStore:
+    """The memory of a fake Silo. ``before`` and ``after`` see the name of each change; they may raise."""
+
+    user = "designer"
+
+    def __init__(self, base_url: str, clock: Callable[[], datetime] | None) -> None:
+        self.base_url = base_url
+        self.mode = "normal"
+        self.before: Callable[[str], None] = _nothing
+        self.after: Callable[[str], None] = _nothing
+        self.items: dict[str, Stored] = {}  # by case-folded part number
+        self.log: list[ServerEvent] = []
+        self._clock = clock or (lambda: datetime.now(UTC))
+        self._lock = threading.RLock()
+        self._news = threading.Condition(self._lock)
+
+    @contextmanager
+    def _changing(self, name: str, *, reads: bool = False) -> Iterator[None]:
+        self.before(name)
+        with self._lock:
+            if self.mode == "read-only" and not reads:
+                raise ReadOnlyError(f"{self.base_url} takes no changes now; it can be sent later")
+            yield
+        self.after(name)
+
+    def _stored(self, part_number: str) -> Stored:
+        stored = self.items.get(part_number.casefold())
+        if stored is None:
+            raise NotFoundError(f"{self.base_url} has no item {part_number}")
+        return stored
+
+    def _next_number(self, category: str) -> str:
+        if category not in CATEGORIES:
+            raise RejectedError(f"there is no category {category}; wanted one of {', '.join(CATEGORIES)}")
+        serial = 1
+        while f"{category}-{serial:04d}".casefold() in self.items:
+            serial += 1
+        return f"{category}-{serial:04d}"
+
+    def _find_line(self, part_number: str, child: str) -> dict[str, Any]:
+        for line in self._stored(part_number).lines:
+            if line["child_part_number"].casefold() == child.casefold():
+                return line
+        raise NotFoundError(f"{child} is not on the BOM of {part_number}")
+
+    def _line(self, stored: Stored, line: Mapping[str, Any]) -> BomLine:
+        child = self._stored(line["child_part_number"]).item
+        return BomLine.model_validate(
+            {
+                **line,
+                "parent_part_number": stored.item.part_number,
+                "child_id": child.id,
+                "child_name": child.name,
+                "child_description": child.description,
+                "child_item_type": child.item_type,
+            }
+        )
+
+    def _write(
+        self, stored: Stored, lines: list[dict[str, Any]] | None, event: str, data: dict[str, Any]
+    ) -> None:
+        if lines is not None:
+            stored.lines = lines
+            stored.item = stored.item.model_copy(update={"bom_version": (stored.item.bom_version or 0) + 1})
+        self._announce(event, data)
+
+    def _revise(
+        self,
+        stored: Stored,
+        comment: str,
+        properties: Mapping[str, Any] | None,
+        content: bytes | None = None,
+        file_name: str | None = None,
+    ) -> Revision:
+        known = {**stored.item.properties, **(properties or {})} if content is not None else properties or {}
+        as_json(known)
+        revision = Revision(
+            revision_number=len(stored.revisions) + 1,
+            comment=comment,
+            properties=dict(known),
+            file_name=file_name,
+            file_checksum=hashlib.sha256(content).hexdigest() if content is not None else None,
+            file_size=len(content) if content is not None else None,
+            created_by=self.user,
+            created_at=self._clock(),
+        )
+        stored.revisions.append(revision)
+        if content is not None:
+            stored.files[revision.revision_number] = content
+        stored.item = stored.item.model_copy(
+            update={"current_revision": revision.revision_number, "properties": dict(known)}
+        )
+        number = stored.item.part_number
+        data = {"part_number": number, "revision_number": revision.revision_number, "comment": comment}
+        self._announce("revision.created", data)
+        return revision
+
+    def _announce(self, kind: str, data: dict[str, Any]) -> None:
+        merge = MergeEvent.model_validate(data) if kind == MERGE else None
+        with self._news:
+            self.log.append(ServerEvent(str(len(self.log) + 1), kind, data, merge))
+            self._news.notify_all()
+
+
+class FakeStream:
+    """An open stream of a :class:`FakeSilo`; waits for what is new until it is closed."""
+
+    def __init__(self, news: threading.Condition, log: list[ServerEvent], start: int) -> None:
+        self._news, self._log, self._next = news, log, start
+        self._closed = False
+
+    @property
+    def last_event_id(self) -> str | None:
+        return str(self._next)
+
+    def __iter__(self) -> Iterator[ServerEvent]:
+        while True:
+            with self._news:
+                self._news.wait_for(lambda: self._closed or self._next < len(self._log))
+                if self._closed:
+                    return
+                event = self._log[self._next]
+                self._next += 1
+            yield event
+
+    def close(self) -> None:
+        with self._news:
+            self._closed = True
+            self._news.notify_all()
