@@ -16,13 +16,22 @@ from silo_server.db.engine import Database
 from silo_server.events.hub import Hub
 from silo_server.files import FileStore
 from silo_server.middleware import BodyLimit, SecurityHeaders
-from silo_server.routes import auth, bom, items, pages, revisions, system
+from silo_server.routes import auth, bom, items, pages, review, revisions, system, transfer
 from silo_server.routes.context import Server
 from silo_server.settings import Settings, settings_from_environment
 
 VERSION = "0.1.0"
 # Routes are matched in this order; /items/by-uuid and /items/search stand before /items/{part_number}.
-ROUTERS = (system.router, auth.router, items.router, revisions.router, bom.router, pages.router)
+ROUTERS = (
+    system.router,
+    auth.router,
+    items.router,
+    revisions.router,
+    bom.router,
+    review.router,
+    transfer.router,
+    pages.router,
+)
 
 
 def create_app(settings: Settings, clock: Clock = utc_now) -> FastAPI:

@@ -3,14 +3,7 @@
 
 from __future__ import annotations
 
-from silo.bom.errors import AuthError, ConflictError, RejectedError, RemoteError
-
-
-class ForbiddenError(AuthError):
-    """403: known, but the role is too low (or the form's secret is missing)."""
-
-    status_hint = 403
-    code = "forbidden"
+from silo.bom.errors import ConflictError, RejectedError, RemoteError
 
 
 class TooLargeError(RejectedError):

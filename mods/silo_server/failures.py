@@ -14,7 +14,7 @@ from sqlalchemy.exc import DataError, DBAPIError, IntegrityError, OperationalErr
 from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, Response
 
-from silo.bom.errors import CycleError, ReadOnlyError, RejectedError, SiloError
+from silo.bom.errors import CycleError, ReadOnlyError, RejectedError, RouteMissingError, SiloError
 from silo_server.errors import BusyError, TooManyAttemptsError
 
 logger = logging.getLogger("silo_server")
@@ -82,7 +82,7 @@ def _problem(entry: Mapping[str, Any]) -> str:
 
 async def _http_exception(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
-    codes = {404: "not_found", 405: "method_not_allowed", 413: "too_large"}
+    codes = {404: RouteMissingError.code, 405: RouteMissingError.code, 413: "too_large"}
     message = str(error.detail)
     if message == HTTPStatus(error.status_code).phrase:
         message = f"{message}: {request.method} {request.url.path}"

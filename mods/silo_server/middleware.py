@@ -12,7 +12,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from silo_server.failures import error_answer
 from silo_server.settings import MIB, Settings
 
-UPLOAD_PATH = re.compile(r"/api/items/[^/]+/(?:file|bom/import)$|/items/.*(?:upload|import)$")
+UPLOAD_PATH = re.compile(r"/(?:api/)?items/[^/]+/file$")
 
 SECURITY_HEADERS = {
     "Content-Security-Policy": (

@@ -15,9 +15,8 @@ from fastapi import Depends, Request
 from starlette.responses import Response
 
 from silo.api.wire import ErrorBody
-from silo.bom.errors import AuthError, RejectedError
+from silo.bom.errors import AuthError, ForbiddenError, RejectedError
 from silo_server.db.engine import Database
-from silo_server.errors import ForbiddenError
 from silo_server.events.hub import Hub
 from silo_server.files import FileStore
 from silo_server.services.credentials import actor_by_token

@@ -56,10 +56,18 @@ def list_items(
 
 
 @router.get("/items/search", response_model=list[ItemOut], responses=READ_ERRORS)
-def search_items(server: ServerDep, caller: Viewer, q: Word = "", limit: Limit = 20) -> Response:
+def search_items(
+    server: ServerDep,
+    caller: Viewer,
+    q: Word = "",
+    item_type: Word | None = None,
+    limit: Limit = 20,
+    offset: Offset = 0,
+) -> Response:
     """Search as you type: every word must be somewhere in number, name or description."""
+    query = service.ItemQuery(search=q, item_type=item_type, limit=limit, offset=offset)
     with server.db.read(caller) as tx:
-        found, total = service.list_items(tx, service.ItemQuery(search=q, limit=limit))
+        found, total = service.list_items(tx, query)
     return json_answer([item_to_wire(item) for item in found], headers={"X-Total-Count": str(total)})
 
 

@@ -93,6 +93,7 @@ def add_revision(server: ServerDep, caller: Editor, part_number: str, body: Revi
 async def upload_file(server: ServerDep, caller: Editor, part_number: str, request: Request) -> Response:
     """Upload a file (form part ``file``, texts ``comment`` and ``properties``) as a new revision.
 
+    ``Idempotency-Key`` makes a repeat give the revision that the first request made.
     The form is read here and not by a parameter, so that nobody without a role fills the disk.
     """
     async with request.form(max_files=1, max_fields=20) as form:
@@ -103,7 +104,7 @@ async def upload_file(server: ServerDep, caller: Editor, part_number: str, reque
             raise RejectedError("comment, properties: wanted texts, got files")
         properties = _properties(raw)
         revision = await anyio.to_thread.run_sync(
-            _store, server, caller, part_number, file, comment or "", properties
+            _store, server, caller, part_number, file, comment or "", properties, _idempotency_key(request)
         )
     return json_answer(revision_to_wire(part_number, revision), 201)
 
@@ -148,6 +149,7 @@ def _store(
     file: UploadFile,
     comment: str,
     properties: dict[str, Any] | None,
+    key: str | None,
 ) -> Revision:
     with server.db.read(caller) as tx:
         items.get_item(tx, part_number)  # before anything is written to the disk
@@ -155,7 +157,16 @@ def _store(
     with server.db.write(caller) as tx:
         item = items.get_item(tx, part_number, lock=True)
         merged = None if properties is None else {**item.properties, **properties}
-        return revisions.add_revision(tx, item, comment=comment, properties=merged, file=stored)
+        return revisions.add_revision(
+            tx, item, comment=comment, properties=merged, file=stored, idempotency_key=key
+        )
+
+
+def _idempotency_key(request: Request) -> str | None:
+    key = request.headers.get("idempotency-key")
+    if key is not None and not 0 < len(key) <= 128:
+        raise RejectedError("Idempotency-Key: wanted 1 to 128 characters")
+    return key
 
 
 def _properties(raw: str | None) -> dict[str, Any] | None:

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import uuid as uuids
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
+from itertools import count
 from typing import Any
 
 from sqlalchemy import delete, func, insert, select, update
@@ -36,12 +37,16 @@ class ChangeKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class LineChange:
-    """One line that becomes something else: ``before`` None = new, ``after`` None = removed."""
+    """One line that becomes something else: ``before`` None = new, ``after`` None = removed.
+
+    ``position`` is its place in the BOM, None for a new line at the end.
+    """
 
     line_id: str
     child_id: int
     before: LineState | None
     after: LineState | None
+    position: int | None = None
 
     @property
     def action(self) -> str:
@@ -87,7 +92,8 @@ def apply_changes(tx: Tx, parent: Item, changes: Sequence[LineChange], note: Cha
     Returns (change id, version after). The version moves only when a line does.
     """
     version = parent.bom_version + (1 if changes else 0)
-    _write_lines(tx, parent, changes)
+    placed = _placed(tx, parent, changes)
+    _write_lines(tx, parent, placed)
     change_id = tx.conn.execute(
         insert(bom_changes)
         .values(
@@ -108,7 +114,7 @@ def apply_changes(tx: Tx, parent: Item, changes: Sequence[LineChange], note: Cha
         .returning(bom_changes.c.id)
     ).scalar_one()
     if changes:
-        insert_rows(tx, bom_change_lines, [_history_row(change_id, change) for change in changes])
+        insert_rows(tx, bom_change_lines, [_history_row(change_id, change) for change in placed])
         tx.conn.execute(update(items).where(items.c.id == parent.id).values(bom_version=version))
     return change_id, version
 
@@ -159,33 +165,32 @@ def _ring(tx: Tx, parent_id: int, child_id: int, above: Mapping[int, int]) -> li
     return [names[i] for i in ids]
 
 
+def _placed(tx: Tx, parent: Item, changes: Sequence[LineChange]) -> list[LineChange]:
+    if all(change.position is not None for change in changes):
+        return list(changes)
+    last = tx.conn.scalar(select(func.max(bom_lines.c.position)).where(bom_lines.c.parent_id == parent.id))
+    places = count((last or 0) + 1)
+    return [c if c.position is not None else replace(c, position=next(places)) for c in changes]
+
+
 def _write_lines(tx: Tx, parent: Item, changes: Sequence[LineChange]) -> None:
     added = [(c, c.after) for c in changes if c.before is None and c.after is not None]
     changed = [(c, c.after) for c in changes if c.before is not None and c.after is not None]
     removed = [c.line_id for c in changes if c.after is None]
     if removed:
         tx.conn.execute(delete(bom_lines).where(one_of(tx, bom_lines.c.id, removed)))
-    if changed:
-        update_rows(tx, bom_lines, "id", [{"id": c.line_id, **state_columns(s)} for c, s in changed])
-    if added:
-        last = tx.conn.scalar(
-            select(func.max(bom_lines.c.position)).where(bom_lines.c.parent_id == parent.id)
-        )
-        first = (last or 0) + 1
-        insert_rows(
-            tx,
-            bom_lines,
-            [
-                {
-                    "id": c.line_id,
-                    "parent_id": parent.id,
-                    "child_id": c.child_id,
-                    "position": first + n,
-                    **state_columns(state),
-                }
-                for n, (c, state) in enumerate(added)
-            ],
-        )
+    update_rows(tx, bom_lines, "id", [{"id": c.line_id, **state_columns(s)} for c, s in changed])
+    rows = [
+        {
+            "id": c.line_id,
+            "parent_id": parent.id,
+            "child_id": c.child_id,
+            "position": c.position,
+            **state_columns(state),
+        }
+        for c, state in added
+    ]
+    insert_rows(tx, bom_lines, rows)
 
 
 def _history_row(change_id: int, change: LineChange) -> dict[str, Any]:
@@ -193,6 +198,7 @@ def _history_row(change_id: int, change: LineChange) -> dict[str, Any]:
         "change_id": change_id,
         "line_id": change.line_id,
         "child_id": change.child_id,
+        "position": change.position,
         "action": change.action,
         "before": dumps(state_to_json(change.before)) if change.before else None,
         "after": dumps(state_to_json(change.after)) if change.after else None,

@@ -104,7 +104,7 @@ def change_line(
     what = ", ".join(sorted(k for k in changes if getattr(after, k) != getattr(line.state, k))) or "source"
     if not same_quantity(after.quantity, line.state.quantity):
         what = f"quantity {number(line.state.quantity)} → {number(after.quantity)}"
-    change = LineChange(line.id, line.child_id, line.state, after)
+    change = LineChange(line.id, line.child_id, line.state, after, line.position)
     return _apply(tx, parent, change, line.child_part_number, f"{line.child_part_number} changed: {what}")
 
 
@@ -113,7 +113,7 @@ def remove_line(tx: Tx, part_number: str, child: str, expected: int | None = Non
     parent = get_item(tx, part_number, lock=True)
     check_version(parent, expected)
     line = line_of(lines_of(tx, parent), child, parent)
-    change = LineChange(line.id, line.child_id, line.state, None)
+    change = LineChange(line.id, line.child_id, line.state, None, line.position)
     return _apply(tx, parent, change, None, f"{line.child_part_number} removed")
 
 

@@ -56,7 +56,7 @@ class ItemQuery:
     offset: int = 0
 
 
-def to_item(row: Row[Any]) -> Item:
+def to_item(row: Any) -> Item:
     """A frozen item from its row."""
     return Item(
         id=row.id,

@@ -191,7 +191,7 @@ def _line_changes(tx: Tx, prepared: _Prepared) -> list[LineChange]:
             continue
         since = tx.stamp if name in flag else None if name in unflag else before.unreferenced_since
         after = replace(before, quantity=quantities.get(name, before.quantity), unreferenced_since=since)
-        changes.append(LineChange(line.id, line.child_id, before, after))
+        changes.append(LineChange(line.id, line.child_id, before, after, line.position))
     return changes
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from sqlalchemy import Row, func, insert, select, update
 
-from silo.bom.errors import NotFoundError
+from silo.bom.errors import ConflictError, NotFoundError
 from silo_server.db.engine import Tx
 from silo_server.db.tables import items, revisions
 from silo_server.services import events
@@ -34,11 +34,18 @@ def add_revision(
     comment: str = "",
     properties: Mapping[str, Any] | None = None,
     file: StoredFile | None = None,
+    idempotency_key: str | None = None,
 ) -> Revision:
     """Append a revision. Without ``properties`` it carries those of the one before on.
 
+    A repeat with the same ``idempotency_key`` gives the revision that the first one made.
+
     The caller holds the item's lock; the unique key on (item, number) guards the rest.
     """
+    if idempotency_key is not None:
+        earlier = _by_key(tx, item, idempotency_key, file)
+        if earlier is not None:
+            return earlier
     last = tx.conn.scalar(select(func.max(revisions.c.revision_number)).where(revisions.c.item_id == item.id))
     number = (last or 0) + 1
     snapshot = dict(item.properties) if properties is None else dict(properties)
@@ -53,6 +60,7 @@ def add_revision(
             file_checksum=file.checksum if file else None,
             file_size=file.size if file else None,
             thumbnail_key=file.thumbnail_key if file else None,
+            idempotency_key=idempotency_key,
             created_at=tx.stamp,
             created_by=tx.actor.username,
         )
@@ -110,6 +118,20 @@ def items_with_file(tx: Tx, checksum: str) -> list[tuple[str, int]]:
         .order_by(items.c.part_number, revisions.c.revision_number)
     ).all()
     return [(row.part_number, row.revision_number) for row in rows]
+
+
+def _by_key(tx: Tx, item: Item, key: str, file: StoredFile | None) -> Revision | None:
+    row = tx.conn.execute(
+        select(revisions).where(revisions.c.item_id == item.id, revisions.c.idempotency_key == key)
+    ).one_or_none()
+    if row is None:
+        return None
+    if row.file_checksum != (file.checksum if file else None):
+        raise ConflictError(
+            f"this Idempotency-Key was used before for another file of {item.part_number}; "
+            "send a new key with new content"
+        )
+    return _to_revision(row)
 
 
 def _to_revision(row: Row[Any]) -> Revision:

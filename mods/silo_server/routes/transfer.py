@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""BOM export and import."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import anyio.to_thread
+from fastapi import APIRouter, Query, Request
+from starlette.datastructures import UploadFile
+from starlette.responses import Response
+
+from silo.bom.errors import RejectedError
+from silo_server.routes.context import (
+    FORM_TYPES,
+    READ_ERRORS,
+    WRITE_ERRORS,
+    Editor,
+    ExpectedVersion,
+    ServerDep,
+    Viewer,
+    etag_of,
+    json_answer,
+)
+from silo_server.routes.review import state_to_wire
+from silo_server.services import exports, imports
+from silo_server.services.exports import View
+from silo_server.values import Item
+
+router = APIRouter(prefix="/api/items/{part_number}/bom", tags=["bom transfer"])
+
+XLSX = "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet"
+
+
+def _content(media_type: str) -> dict[int | str, dict[str, Any]]:
+    return {**READ_ERRORS, 200: {"content": {media_type: {}}, "description": "The file"}}
+
+
+IMPORT_BODY = {
+    "requestBody": {
+        "required": True,
+        "content": {
+            "text/csv": {"schema": {"type": "string"}},
+            "multipart/form-data": {
+                "schema": {
+                    "type": "object",
+                    "required": ["file"],
+                    "properties": {"file": {"type": "string", "format": "binary"}},
+                }
+            },
+        },
+    }
+}
+
+
+@router.get("/export.csv", response_class=Response, responses=_content("text/csv"))
+def export_csv(server: ServerDep, caller: Viewer, part_number: str, view: View = View.SINGLE) -> Response:
+    """The BOM as CSV (RFC 4180, UTF-8); cells that would run as formulas are made text."""
+    with server.db.read(caller) as tx:
+        root, rows = exports.export_rows(tx, part_number, view)
+    return _file(exports.to_csv(rows), "text/csv; charset=utf-8; header=present", root, view, "csv")
+
+
+@router.get("/export.xlsx", response_class=Response, responses=_content(XLSX))
+def export_xlsx(server: ServerDep, caller: Viewer, part_number: str, view: View = View.SINGLE) -> Response:
+    """The BOM as a workbook."""
+    with server.db.read(caller) as tx:
+        root, rows = exports.export_rows(tx, part_number, view)
+    return _file(exports.to_xlsx(rows, root.part_number), XLSX, root, view, "xlsx")
+
+
+@router.get("/export.json", responses=READ_ERRORS)
+def export_json(server: ServerDep, caller: Viewer, part_number: str, view: View = View.SINGLE) -> Response:
+    """The BOM as JSON."""
+    with server.db.read(caller) as tx:
+        root, rows = exports.export_rows(tx, part_number, view)
+    return json_answer(exports.to_json(root, view, rows))
+
+
+@router.post("/import", responses=WRITE_ERRORS, openapi_extra=IMPORT_BODY)
+async def import_csv(
+    server: ServerDep,
+    caller: Editor,
+    part_number: str,
+    request: Request,
+    expected: ExpectedVersion,
+    dry_run: Annotated[bool, Query()] = False,
+) -> Response:
+    """Import a CSV (as the body, or as the form part ``file``).
+
+    ``dry_run`` says row by row what would happen; without it everything is imported, or, where a row is
+    wrong, nothing (400 with all problems).
+    """
+    data, name = await _uploaded(request)
+
+    def work() -> tuple[imports.ImportPlan, int | None]:
+        if dry_run:
+            with server.db.read(caller) as tx:
+                return imports.plan_import(tx, part_number, data), None
+        with server.db.write(caller) as tx:
+            return imports.apply_import(tx, part_number, data, name, expected)
+
+    plan, version = await anyio.to_thread.run_sync(work)
+    headers = {} if version is None else {"ETag": etag_of(version)}
+    return json_answer(plan_to_wire(plan, dry_run), headers=headers)
+
+
+def plan_to_wire(plan: imports.ImportPlan, dry_run: bool) -> dict[str, Any]:
+    """What an import does, or would do."""
+    return {
+        "dry_run": dry_run,
+        "counts": {status: plan.count(status) for status in ("add", "change", "same", "skip", "error")},
+        "problems": plan.problems,
+        "rows": [
+            {
+                "row": row.row,
+                "part_number": row.part_number,
+                "status": row.status,
+                "problems": list(row.problems),
+                "before": state_to_wire(row.before),
+                "after": state_to_wire(row.after),
+            }
+            for row in plan.rows
+        ],
+    }
+
+
+async def _uploaded(request: Request) -> tuple[bytes, str | None]:
+    if not request.headers.get("content-type", "").startswith(FORM_TYPES):
+        return await request.body(), None
+    async with request.form(max_files=1, max_fields=20) as form:
+        file = form.get("file")
+        if not isinstance(file, UploadFile):
+            raise RejectedError("file: wanted a multipart form with the CSV in a part named 'file'")
+        return await file.read(), file.filename
+
+
+def _file(data: bytes, media_type: str, root: Item, view: View, suffix: str) -> Response:
+    stem = "".join(c if c.isascii() and (c.isalnum() or c in "-_.") else "_" for c in root.part_number)
+    disposition = f'attachment; filename="{stem}-bom-{view.value}.{suffix}"'
+    return Response(data, media_type=media_type, headers={"Content-Disposition": disposition})

@@ -1,0 +1,282 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The BOM's history: every change that ever was, the state at any of them, two states side by side.
+
+Nothing is stored twice: the state after a change is, per line, what the last change up to it made of it.
+Change 0 is the empty BOM before everything.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+from sqlalchemy import func, select
+
+from silo.bom.errors import ConflictError, NotFoundError
+from silo_server.db.engine import Tx
+from silo_server.db.tables import bom_change_lines, bom_changes, bom_conflicts
+from silo_server.services import events
+from silo_server.services.changes import (
+    ChangeKind,
+    ChangeNote,
+    LineChange,
+    apply_changes,
+    check_no_cycle,
+    check_version,
+)
+from silo_server.services.items import by_ids, get_item
+from silo_server.services.lines import lines_of, state_from_json
+from silo_server.values import Item, LineState
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One change of a BOM: who, when, why, and from which file."""
+
+    id: int
+    version: int
+    kind: ChangeKind
+    at: str
+    username: str
+    summary: str
+    reason: str | None
+    document_file: str | None
+    document_sha256: str | None
+    document_revision: int | None
+    sync_id: str | None
+    refers_to: int | None
+    decisions: Sequence[Mapping[str, Any]]
+    line_count: int
+
+
+@dataclass(frozen=True, slots=True)
+class ChangedLine:
+    """What one change made of one line; ``before`` None = added, ``after`` None = removed."""
+
+    line_id: str
+    child: Item
+    position: int
+    before: LineState | None
+    after: LineState | None
+
+
+@dataclass(frozen=True, slots=True)
+class PastLine:
+    """A line as it was at some point."""
+
+    line_id: str
+    child: Item
+    position: int
+    state: LineState
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """A line in two states; ``fields`` names what differs. ``status``: added removed changed unchanged."""
+
+    child: Item
+    status: str
+    before: LineState | None
+    after: LineState | None
+    fields: Sequence[str]
+
+
+def list_changes(tx: Tx, parent: Item, limit: int = 50, before: int | None = None) -> list[Change]:
+    """The BOM's changes, newest first; ``before`` is a change id to page on."""
+    conditions = [bom_changes.c.parent_id == parent.id]
+    if before is not None:
+        conditions.append(bom_changes.c.id < before)
+    return _changes(tx, conditions, limit)
+
+
+def get_change(tx: Tx, parent: Item, change_id: int) -> tuple[Change, list[ChangedLine]]:
+    """One change with its lines; NotFoundError where this BOM has no such change."""
+    found = _changes(tx, [bom_changes.c.parent_id == parent.id, bom_changes.c.id == change_id], 1)
+    if not found:
+        raise NotFoundError(f"the BOM of {parent.part_number} has no change {change_id}")
+    rows = tx.conn.execute(
+        select(bom_change_lines)
+        .where(bom_change_lines.c.change_id == change_id)
+        .order_by(bom_change_lines.c.position)
+    ).all()
+    children = by_ids(tx, {row.child_id for row in rows})
+    lines = [
+        ChangedLine(row.line_id, children[row.child_id], row.position, _state(row.before), _state(row.after))
+        for row in rows
+    ]
+    return found[0], lines
+
+
+def last_merge(tx: Tx, parent: Item) -> Change | None:
+    """The newest merge, None where there was none."""
+    conditions = [bom_changes.c.parent_id == parent.id, bom_changes.c.kind == ChangeKind.MERGE.value]
+    return next(iter(_changes(tx, conditions, 1)), None)
+
+
+def change_at(tx: Tx, parent: Item, when: str) -> int:
+    """The change that made the BOM what it was at ``when`` (as stored: ISO 8601, UTC); 0 before the first."""
+    found = tx.conn.scalar(
+        select(func.max(bom_changes.c.id)).where(
+            bom_changes.c.parent_id == parent.id, bom_changes.c.at <= when
+        )
+    )
+    return found or 0
+
+
+def state_at(tx: Tx, parent: Item, change_id: int) -> list[PastLine]:
+    """The BOM as change ``change_id`` left it; NotFoundError where this BOM has no such change."""
+    if change_id != 0:
+        get_own_change(tx, parent, change_id)
+    newest = (
+        select(bom_change_lines.c.line_id, func.max(bom_change_lines.c.change_id).label("change_id"))
+        .join(bom_changes, bom_changes.c.id == bom_change_lines.c.change_id)
+        .where(bom_changes.c.parent_id == parent.id, bom_changes.c.id <= change_id)
+        .group_by(bom_change_lines.c.line_id)
+        .subquery()
+    )
+    rows = tx.conn.execute(
+        select(bom_change_lines)
+        .join(
+            newest,
+            (newest.c.line_id == bom_change_lines.c.line_id)
+            & (newest.c.change_id == bom_change_lines.c.change_id),
+        )
+        .where(bom_change_lines.c.after.is_not(None))
+        .order_by(bom_change_lines.c.position)
+    ).all()
+    children = by_ids(tx, {row.child_id for row in rows})
+    return [
+        PastLine(row.line_id, children[row.child_id], row.position, state_from_json(json.loads(row.after)))
+        for row in rows
+    ]
+
+
+def get_own_change(tx: Tx, parent: Item, change_id: int) -> int:
+    """``change_id`` where it is a change of this BOM; NotFoundError otherwise."""
+    owner = tx.conn.scalar(select(bom_changes.c.parent_id).where(bom_changes.c.id == change_id))
+    if owner != parent.id:
+        raise NotFoundError(f"the BOM of {parent.part_number} has no change {change_id}")
+    return change_id
+
+
+def compare(before: Sequence[PastLine], after: Sequence[PastLine]) -> list[Difference]:
+    """Two states side by side, in the order of the later one, what is gone last; pure."""
+    old = {line.line_id: line for line in before}
+    new = {line.line_id: line for line in after}
+    rows = [_difference(line.child, _state_of(old.get(line.line_id)), line.state) for line in after]
+    rows.extend(_difference(line.child, line.state, None) for line in before if line.line_id not in new)
+    return rows
+
+
+def restore(
+    tx: Tx, part_number: str, change_id: int, reason: str | None, expected: int | None
+) -> tuple[int, int]:
+    """Make the BOM again what change ``change_id`` left; a new change. Returns (change id, version)."""
+    parent = get_item(tx, part_number, lock=True)
+    check_version(parent, expected)
+    target = {line.line_id: line for line in state_at(tx, parent, change_id)}
+    changes = []
+    current = {line.id: line for line in lines_of(tx, parent)}
+    for line_id, line in current.items():
+        wanted = target.get(line_id)
+        after = wanted.state if wanted else None
+        if after != line.state:
+            changes.append(LineChange(line_id, line.child_id, line.state, after, line.position))
+    missing = [line for line_id, line in target.items() if line_id not in current]
+    check_no_cycle(tx, parent, [line.child.id for line in missing])
+    changes.extend(LineChange(m.line_id, m.child.id, None, m.state, m.position) for m in missing)
+    text = f"restored as of change {change_id}: {len(changes)} lines changed"
+    note = ChangeNote(kind=ChangeKind.RESTORE, summary=text, reason=reason, refers_to=change_id)
+    done = apply_changes(tx, parent, changes, note)
+    events.bom_updated(tx, parent, ChangeKind.RESTORE, text)
+    return done
+
+
+def undo(tx: Tx, part_number: str, change_id: int, expected: int | None) -> tuple[int, int]:
+    """Take one change back, as a new change. Returns (change id, version).
+
+    Raises ConflictError, naming the lines, where one of them was changed again since.
+    """
+    parent = get_item(tx, part_number, lock=True)
+    check_version(parent, expected)
+    change, lines = get_change(tx, parent, change_id)
+    current = {line.id: line for line in lines_of(tx, parent)}
+    touched = [
+        line.child.part_number
+        for line in lines
+        if line.after != (current[line.line_id].state if line.line_id in current else None)
+    ]
+    if touched:
+        raise ConflictError(
+            f"change {change_id} cannot be undone: {', '.join(touched[:10])} changed again since; "
+            "restore the BOM of that time instead, or change the lines"
+        )
+    check_no_cycle(tx, parent, [line.child.id for line in lines if line.after is None])
+    changes = [LineChange(n.line_id, n.child.id, n.after, n.before, n.position) for n in lines]
+    _reopen(tx, parent, change)
+    text = f"undone: {change.summary}"
+    done = apply_changes(
+        tx, parent, changes, ChangeNote(kind=ChangeKind.UNDO, summary=text, refers_to=change_id)
+    )
+    events.bom_updated(tx, parent, ChangeKind.UNDO, text)
+    return done
+
+
+def _reopen(tx: Tx, parent: Item, change: Change) -> None:
+    # "Keep Silo's quantity" lives beside the line; undoing it asks the question again.
+    for decision in change.decisions:
+        if decision["action"] == "keep_silo":
+            child = get_item(tx, decision["child_part_number"], include_archived=True)
+            tx.conn.execute(
+                bom_conflicts.update()
+                .where(bom_conflicts.c.parent_id == parent.id, bom_conflicts.c.child_id == child.id)
+                .values(accepted=False)
+            )
+
+
+def _changes(tx: Tx, conditions: Sequence[Any], limit: int) -> list[Change]:
+    lines = (
+        select(func.count())
+        .where(bom_change_lines.c.change_id == bom_changes.c.id)
+        .scalar_subquery()
+        .label("line_count")
+    )
+    query = select(bom_changes, lines).where(*conditions).order_by(bom_changes.c.id.desc()).limit(limit)
+    return [
+        Change(
+            id=row.id,
+            version=row.version,
+            kind=ChangeKind(row.kind),
+            at=row.at,
+            username=row.username,
+            summary=row.summary,
+            reason=row.reason,
+            document_file=row.document_file,
+            document_sha256=row.document_sha256,
+            document_revision=row.document_revision,
+            sync_id=row.sync_id,
+            refers_to=row.refers_to,
+            decisions=json.loads(row.decisions) if row.decisions else (),
+            line_count=row.line_count,
+        )
+        for row in tx.conn.execute(query)
+    ]
+
+
+def _difference(child: Item, before: LineState | None, after: LineState | None) -> Difference:
+    if before is None:
+        return Difference(child, "added", None, after, ())
+    if after is None:
+        return Difference(child, "removed", before, None, ())
+    names = [f.name for f in fields(LineState) if getattr(before, f.name) != getattr(after, f.name)]
+    return Difference(child, "changed" if names else "unchanged", before, after, names)
+
+
+def _state(text: str | None) -> LineState | None:
+    return None if text is None else state_from_json(json.loads(text))
+
+
+def _state_of(line: PastLine | None) -> LineState | None:
+    return None if line is None else line.state

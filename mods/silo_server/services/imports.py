@@ -1,0 +1,239 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""BOM import from CSV: first what would happen, row by row; then, when nothing is wrong, all of it at once.
+
+Rows add manual lines or change lines that are there (by the rules of a person's edit); lines that the file
+does not name stay as they are. Our own single-level export, imported again, changes nothing.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import select
+
+from silo.bom.errors import RejectedError
+from silo_server.db.bulk import one_of
+from silo_server.db.engine import Tx
+from silo_server.db.tables import items
+from silo_server.errors import TooLargeError
+from silo_server.services import events
+from silo_server.services.changes import (
+    ChangeKind,
+    ChangeNote,
+    LineChange,
+    apply_changes,
+    check_no_cycle,
+    check_version,
+    new_line_id,
+)
+from silo_server.services.edits import check_state, edited_state
+from silo_server.services.exports import plain_cell
+from silo_server.services.items import get_item
+from silo_server.services.lines import lines_of
+from silo_server.values import Line, LineState
+
+# Header (lower case, without punctuation) → field.
+ALIASES = {
+    "part number": "part_number",
+    "partnumber": "part_number",
+    "child part number": "part_number",
+    "number": "part_number",
+    "quantity": "quantity",
+    "qty": "quantity",
+    "unit": "unit",
+    "uom": "unit",
+    "reference designators": "reference_designators",
+    "ref des": "reference_designators",
+    "designators": "reference_designators",
+    "find number": "find_number",
+    "find no": "find_number",
+    "notes": "notes",
+    "note": "notes",
+    "type": "rel_type",
+    "rel type": "rel_type",
+    "revision": "child_revision",
+    "level": "level",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ImportRow:
+    """What becomes of one row of the file. ``status``: add change same skip error."""
+
+    row: int
+    part_number: str
+    status: str
+    problems: Sequence[str] = ()
+    before: LineState | None = None
+    after: LineState | None = None
+    child_id: int | None = None
+    line: Line | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ImportPlan:
+    """What an import would do; ``problems`` are those of all rows."""
+
+    rows: Sequence[ImportRow]
+
+    @property
+    def problems(self) -> list[str]:
+        return [f"row {row.row}: {problem}" for row in self.rows for problem in row.problems]
+
+    def count(self, status: str) -> int:
+        """How many rows have this status."""
+        return sum(row.status == status for row in self.rows)
+
+
+def plan_import(tx: Tx, part_number: str, data: bytes) -> ImportPlan:
+    """Read ``data`` and say what an import would do, row by row; changes nothing."""
+    parent = get_item(tx, part_number)
+    records = read_csv(data, tx.settings.max_merge_entries)
+    lines = {(line.child_part_number.casefold(), line.state.rel_type): line for line in lines_of(tx, parent)}
+    keys = {record.get("part_number", "").casefold() for _, record in records}
+    query = select(items.c.id, items.c.part_number_key, items.c.archived_at)
+    known = {
+        row.part_number_key: (row.id, row.archived_at is not None)
+        for row in tx.conn.execute(query.where(one_of(tx, items.c.part_number_key, keys)))
+    }
+    rows: list[ImportRow] = []
+    seen: set[tuple[str, str]] = set()
+    for number, record in records:
+        row = _plan_row(number, record, lines, known)
+        key = (row.part_number.casefold(), row.after.rel_type if row.after else "")
+        if row.status not in ("error", "skip") and key in seen:
+            row = ImportRow(number, row.part_number, "error", (f"{row.part_number} stands here twice",))
+        seen.add(key)
+        rows.append(row)
+    return ImportPlan(rows)
+
+
+def apply_import(
+    tx: Tx, part_number: str, data: bytes, file_name: str | None, expected: int | None
+) -> tuple[ImportPlan, int]:
+    """Import ``data`` as one change; RejectedError lists every problem, and then nothing was changed.
+
+    Returns what was done, and the BOM's version.
+    """
+    parent = get_item(tx, part_number, lock=True)
+    check_version(parent, expected)
+    plan = plan_import(tx, part_number, data)
+    if plan.problems:
+        raise RejectedError(
+            f"{len(plan.problems)} problems in the file, so nothing was imported: {plan.problems[0]}",
+            plan.problems,
+        )
+    changes = []
+    for row in plan.rows:
+        if row.status == "add" and row.child_id is not None:
+            changes.append(LineChange(new_line_id(), row.child_id, None, row.after))
+        elif row.status == "change" and row.line is not None:
+            changes.append(
+                LineChange(row.line.id, row.line.child_id, row.before, row.after, row.line.position)
+            )
+    check_no_cycle(tx, parent, [c.child_id for c in changes if c.before is None])
+    text = f"imported: {plan.count('add')} added, {plan.count('change')} changed"
+    note = ChangeNote(kind=ChangeKind.IMPORT, summary=text, document_file=file_name)
+    _, version = apply_changes(tx, parent, changes, note)
+    events.bom_updated(tx, parent, ChangeKind.IMPORT, text)
+    return plan, version
+
+
+def read_csv(data: bytes, max_rows: int) -> list[tuple[int, dict[str, str]]]:
+    """(row number, field → text) of each row that says anything; RejectedError where this is no BOM."""
+    text = _decode(data)
+    sample = text[:4096]
+    delimiter = max(",;\t", key=lambda d: sample.splitlines()[0].count(d) if sample.strip() else 0)
+    try:
+        table = list(csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True))
+    except csv.Error as error:
+        raise RejectedError(f"file: wanted CSV, got something that does not read as such ({error})") from None
+    start = next((n for n, row in enumerate(table) if "part_number" in _fields(row)), None)
+    if start is None or "quantity" not in _fields(table[start]):
+        raise RejectedError("file: wanted a header row with 'Part number' and 'Quantity', found none")
+    if len(table) - start > max_rows + 1:
+        raise TooLargeError(f"file: this server takes at most {max_rows} rows, got {len(table) - start - 1}")
+    names = _fields(table[start])
+    records = []
+    for number, cells in enumerate(table[start + 1 :], start=start + 2):
+        record = {name: plain_cell(cell.strip()) for name, cell in zip(names, cells, strict=False) if name}
+        if any(record.values()):
+            record["decimal_comma"] = "1" if delimiter != "," else ""
+            records.append((number, record))
+    return records
+
+
+def _plan_row(
+    number: int,
+    record: Mapping[str, str],
+    lines: Mapping[tuple[str, str], Line],
+    known: Mapping[str, tuple[int, bool]],
+) -> ImportRow:
+    name = record.get("part_number", "")
+    if record.get("level", "1") not in ("", "1"):
+        return ImportRow(number, name, "skip")
+    problems: list[str] = []
+    changes = _changes(record, problems)
+    key = name.casefold()
+    line = lines.get((key, changes.get("rel_type", "component")))
+    child = known.get(key)
+    if not name:
+        problems.append("Part number: is empty")
+    elif child is None:
+        problems.append(f"Part number: {name!r} does not exist on this server")
+    elif child[1] and line is None:
+        problems.append(f"Part number: {name!r} is archived")
+    before = line.state if line else None
+    after = None
+    if not problems:
+        after = edited_state(before, changes) if before else LineState(**{"source": "manual", **changes})
+        try:
+            check_state(after)
+        except RejectedError as error:
+            problems.extend(error.problems)
+    if problems or child is None:
+        return ImportRow(number, name, "error", problems)
+    status = "add" if before is None else "same" if after == before else "change"
+    return ImportRow(number, name, status, (), before, after, child[0], line)
+
+
+def _changes(record: Mapping[str, str], problems: list[str]) -> dict[str, Any]:
+    changes: dict[str, Any] = {}
+    text = record.get("quantity", "")
+    try:
+        changes["quantity"] = float(text.replace(",", ".") if record.get("decimal_comma") else text)
+    except ValueError:
+        problems.append(f"Quantity: wanted a number, got {text!r}")
+    for name in ("unit", "find_number", "notes"):
+        if name in record:
+            changes[name] = record[name] or None
+    if record.get("rel_type"):
+        changes["rel_type"] = record["rel_type"].lower()
+    if "reference_designators" in record:
+        changes["reference_designators"] = tuple(record["reference_designators"].replace(",", " ").split())
+    if "child_revision" in record:
+        revision = record["child_revision"]
+        if revision and not (revision.isascii() and revision.isdigit() and len(revision) < 7):
+            problems.append(f"Revision: wanted a whole number, got {revision!r}")
+        changes["child_revision"] = int(revision) if revision.isdigit() else None
+    return changes
+
+
+def _fields(header: Sequence[str]) -> list[str]:
+    cleaned = ["".join(c if c.isalnum() else " " for c in cell.lower()) for cell in header]
+    return [ALIASES.get(" ".join(cell.split()), "") for cell in cleaned]
+
+
+def _decode(data: bytes) -> str:
+    for mark, encoding in ((b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"), (b"", "utf-8-sig")):
+        if data.startswith(mark):
+            try:
+                return data.decode(encoding)
+            except UnicodeDecodeError:
+                break
+    # What spreadsheets in western Europe and America write when they are not asked for Unicode.
+    return data.decode("cp1252", errors="replace")

@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What a merge left for a person to decide, and the decisions: remove, keep, take CAD's, keep Silo's."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+from sqlalchemy import select, update
+
+from silo.bom.diff import same_quantity
+from silo.bom.errors import NotFoundError, RejectedError
+from silo_server.db.engine import Tx
+from silo_server.db.tables import bom_conflicts
+from silo_server.services import events
+from silo_server.services.changes import ChangeKind, ChangeNote, LineChange, apply_changes, check_version
+from silo_server.services.history import Change, last_merge
+from silo_server.services.items import get_item
+from silo_server.services.lines import line_of, lines_of
+from silo_server.values import Item, Line, LineState
+
+
+class Action(StrEnum):
+    """What a person decides about a line."""
+
+    REMOVE = "remove"  # take it out of the BOM
+    KEEP = "keep"  # keep it as an intentional, non-CAD line, with a reason
+    TAKE_CAD = "take_cad"  # a conflict: the assembly is right, and owns the line from now on
+    KEEP_SILO = (
+        "keep_silo"  # a conflict: Silo is right; asked again only when the assembly says another number
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """One decision about one line."""
+
+    child_part_number: str
+    action: Action
+    reason: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Conflict:
+    """CAD and a person's line differ. ``cad_quantity`` 0: the assembly has it no more."""
+
+    line: Line
+    cad_quantity: float
+    since: str
+
+
+@dataclass(frozen=True, slots=True)
+class Review:
+    """What is open on a BOM."""
+
+    parent: Item
+    unreferenced: Sequence[Line]
+    conflicts: Sequence[Conflict]
+    last_merge: Change | None
+
+
+def review(tx: Tx, part_number: str) -> Review:
+    """What is open on the BOM of this item."""
+    parent = get_item(tx, part_number)
+    lines = lines_of(tx, parent)
+    return Review(
+        parent,
+        [line for line in lines if line.state.unreferenced_since],
+        open_conflicts(tx, parent, lines),
+        last_merge(tx, parent),
+    )
+
+
+def open_conflicts(tx: Tx, parent: Item, lines: Sequence[Line]) -> list[Conflict]:
+    """The conflicts of the last merge that neither a decision nor an edit has settled since."""
+    rows = tx.conn.execute(
+        select(bom_conflicts).where(bom_conflicts.c.parent_id == parent.id, ~bom_conflicts.c.accepted)
+    ).all()
+    found = {row.child_id: row for row in rows}
+    return [
+        Conflict(line, found[line.child_id].cad_quantity, found[line.child_id].since)
+        for line in lines
+        if line.child_id in found
+        and line.state.source == "manual"
+        and line.state.rel_type == "component"
+        and not same_quantity(line.state.quantity, found[line.child_id].cad_quantity)
+    ]
+
+
+def resolve(
+    tx: Tx, part_number: str, decisions: Sequence[Decision], expected: int | None = None
+) -> tuple[int, int]:
+    """Carry all ``decisions`` out as one change. Returns (change id, version).
+
+    Raises RejectedError with everything that does not fit; then nothing was changed.
+    """
+    parent = get_item(tx, part_number, lock=True)
+    check_version(parent, expected)
+    lines = lines_of(tx, parent)
+    conflicts = {c.line.id: c for c in open_conflicts(tx, parent, lines)}
+    changes: list[LineChange] = []
+    problems: list[str] = []
+    seen: set[str] = set()
+    for index, decision in enumerate(decisions):
+        try:
+            line = line_of(lines, decision.child_part_number, parent)
+            if line.id in seen:
+                raise RejectedError(f"{line.child_part_number} is decided twice")
+            seen.add(line.id)
+            after = _decided(line, decision, conflicts.get(line.id))
+        except (RejectedError, NotFoundError) as error:
+            problems.append(f"decisions[{index}]: {error}")
+            continue
+        if decision.action is Action.KEEP_SILO:
+            _accept(tx, parent, line)
+        if after != line.state:
+            changes.append(LineChange(line.id, line.child_id, line.state, after, line.position))
+    if problems:
+        raise RejectedError(f"nothing was changed: {problems[0]}", problems)
+    return _write(tx, parent, decisions, changes)
+
+
+def _decided(line: Line, decision: Decision, conflict: Conflict | None) -> LineState | None:
+    state, reason = line.state, decision.reason
+    if decision.action is Action.REMOVE:
+        return None
+    if decision.action is Action.KEEP:
+        if state.unreferenced_since is None:
+            raise RejectedError(f"{line.child_part_number} is not unreferenced; there is nothing to keep")
+        return replace(state, source="manual", unreferenced_since=None, reason=reason)
+    if conflict is None:
+        raise RejectedError(f"{line.child_part_number} is not in conflict")
+    if decision.action is Action.KEEP_SILO:
+        return replace(state, override=False, cad_quantity=None, reason=reason or state.reason)
+    if conflict.cad_quantity == 0:
+        return None
+    return replace(
+        state,
+        quantity=conflict.cad_quantity,
+        source="assembly",
+        override=False,
+        cad_quantity=None,
+        reason=None,
+    )
+
+
+def _accept(tx: Tx, parent: Item, line: Line) -> None:
+    tx.conn.execute(
+        update(bom_conflicts)
+        .where(bom_conflicts.c.parent_id == parent.id, bom_conflicts.c.child_id == line.child_id)
+        .values(accepted=True)
+    )
+
+
+_WORDS = {
+    Action.REMOVE: "removed",
+    Action.KEEP: "kept as intentional",
+    Action.TAKE_CAD: "set to the assembly's quantity",
+    Action.KEEP_SILO: "kept at Silo's quantity",
+}
+
+
+def _write(
+    tx: Tx, parent: Item, decisions: Sequence[Decision], changes: Sequence[LineChange]
+) -> tuple[int, int]:
+    counts = {action: sum(d.action is action for d in decisions) for action in Action}
+    text = ", ".join(f"{count} {_WORDS[action]}" for action, count in counts.items() if count)
+    reasons = list(dict.fromkeys(d.reason for d in decisions if d.reason))
+    note = ChangeNote(
+        kind=ChangeKind.RESOLVE,
+        summary=text or "nothing decided",
+        reason="; ".join(reasons) or None,
+        decisions=[
+            {"child_part_number": d.child_part_number, "action": d.action.value, "reason": d.reason}
+            for d in decisions
+        ],
+    )
+    done = apply_changes(tx, parent, changes, note)
+    events.bom_updated(tx, parent, ChangeKind.RESOLVE, note.summary)
+    return done
