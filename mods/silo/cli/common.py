@@ -4,23 +4,18 @@
 from __future__ import annotations
 
 import argparse
-import hashlib
 import json
-import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from silo.bom.errors import DocumentError
 from silo.bom.links import extract
-from silo.bom.model import BomEntry, Extraction
+from silo.bom.model import Extraction
 from silo.bom.roots import choose_assembly
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
-    from silo.api.wire import SourceDocument
 
 Commands = Any  # argparse keeps the type of its sub-parsers to itself
 
@@ -79,31 +74,3 @@ def print_json(data: Any) -> None:
     """JSON on standard output."""
     json.dump(data, sys.stdout, indent=2, ensure_ascii=False)
     sys.stdout.write("\n")
-
-
-def source_document(entry: BomEntry) -> SourceDocument:
-    """Which file, with which content, an assembly's BOM was taken from."""
-    from silo.api.wire import SourceDocument
-
-    return SourceDocument(file=os.path.basename(entry.doc_path), sha256=sha256_of(entry.doc_path))
-
-
-def sha256_of(path: str) -> str:
-    """The hash of a file's content."""
-    try:
-        with open(path, "rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError as error:
-        raise DocumentError(path, error.strerror or str(error)) from error
-
-
-def documents_in(tops: list[str]) -> list[str]:
-    """The files that are meant: a folder stands for all FCStd files below it, backups left out."""
-    found: list[str] = []
-    for top in tops:
-        path = Path(top)
-        if path.is_dir():
-            found += sorted(str(p) for p in path.rglob("*") if p.suffix.lower() == ".fcstd" and p.is_file())
-        else:
-            found.append(top)
-    return list(dict.fromkeys(found))

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from silo.api.activity import activity_text
+from silo.batch import source_document
 from silo.bom.errors import InputError, ServerFaultError
 from silo.bom.model import Extraction
 from silo.bom.report import base_of
@@ -166,7 +167,7 @@ class Demo:
         self.say(title)
         whole = resolve(common.read_assembly(str(self.top)), self.client)
         outcomes = list(
-            sync_tree(whole, self.client, sync_id=lambda: str(uuid.uuid4()), describe=common.source_document)
+            sync_tree(whole, self.client, sync_id=lambda: str(uuid.uuid4()), describe=source_document)
         )
         names = names_of(whole)
         for outcome in outcomes:
@@ -204,12 +205,12 @@ class Demo:
 
         self.say("Edit: the cover goes, four more bolts come, a person adds glue in Silo")
         remove_from_assembly(self.top, "Cover")
-        before, after = set_element_count(self.top, "BoltArray", added=4)
+        before, after = set_element_count(self.top, "CoverBolts", added=4)
         number = resolve(common.read_assembly(str(self.top)), self.client).assembly.part_number or ""
         glue = self.client.create_item("kindred-rd", "C01", "Thread locker", item_type="consumable")
         self.client.add_bom_line(number, glue.part_number, quantity=1)
         self.out.print("- Cover removed from the assembly")
-        self.out.print(f"~ bolt array: {before} → {after} elements")
+        self.out.print(f"~ cover bolts, a link array: {before} → {after} elements")
         self.out.print(f"✎ {glue.part_number} Thread locker added to {number} by hand, on the server")
 
     def _finish(self) -> None:

@@ -5,39 +5,15 @@ from __future__ import annotations
 
 import argparse
 import sys
-import uuid
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
+from silo.batch import Options, TopResult, documents_in, result_json, sync_top
 from silo.bom.errors import InputError, SiloError
 from silo.bom.model import Extraction
-from silo.bom.report import base_of, diff_json, entry_json, finding_json, relative
-from silo.bom_sync import Outcome, Resolved, Status, blocking, resolve, sync, sync_tree
+from silo.bom_sync import Status
 from silo.cli import common
 from silo.cli.common import Commands
-
-if TYPE_CHECKING:
-    from silo.api.client import SiloClient
-
-_FINE = (Status.MERGED, Status.UNCHANGED, Status.DRY_RUN)
-
-
-@dataclass(frozen=True)
-class TopResult:
-    """What became of one file: its outcomes, or the error that kept it from being read."""
-
-    top: str
-    base: str = ""
-    whole: Resolved | None = None
-    outcomes: tuple[Outcome, ...] = ()
-    error: SiloError | None = None
-    skipped: str = ""
-
-    @property
-    def fine(self) -> bool:
-        return self.error is None and all(outcome.status in _FINE for outcome in self.outcomes)
 
 
 def register(commands: Commands) -> None:
@@ -73,20 +49,25 @@ def register(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Sync each file; one failure does not stop the rest. 1 where anything was left undone."""
-    tops = common.documents_in(args.tops)
+    tops = documents_in(args.tops)
     if not tops:
         raise InputError(f"no FreeCAD files (*.FCStd) in {', '.join(args.tops)}")
-    folders = any(Path(top).is_dir() for top in args.tops)
+    options = Options(
+        recursive=args.recursive,
+        allow_missing=args.allow_missing,
+        dry_run=args.dry_run,
+        skip_parts=any(Path(top).is_dir() for top in args.tops),
+    )
     results: list[TopResult] = []
     with common.client_of(args) as client:
         for number, (top, found) in enumerate(_extractions(args, tops), start=1):
             if len(tops) > 1 and sys.stderr.isatty():
                 print(f"[{number}/{len(tops)}] {top}", file=sys.stderr)
-            results.append(_sync_one(args, client, top, found, in_folder=folders))
+            results.append(sync_top(top, found, client, options))
             if not args.json:
                 _show(results[-1])
     if args.report:
-        from silo.cli.report import markdown
+        from silo.batch_report import markdown
 
         Path(args.report).write_text(markdown(results), encoding="utf-8")
     if args.json:
@@ -105,67 +86,6 @@ def _extractions(args: argparse.Namespace, tops: list[str]) -> Iterator[tuple[st
             yield top, common.read_assembly(top, args.assembly)
         except SiloError as error:
             yield top, error
-
-
-def _sync_one(
-    args: argparse.Namespace, client: SiloClient, top: str, found: Extraction | SiloError, *, in_folder: bool
-) -> TopResult:
-    if isinstance(found, SiloError):
-        return TopResult(top, error=found)
-    base = base_of(found)
-    if in_folder and not found.entries and not found.blocked:
-        return TopResult(top, base, skipped="no components of other files: a part, not an assembly")
-    try:
-        whole = resolve(found, client)
-        options = {"allow_missing": args.allow_missing, "dry_run": args.dry_run}
-        if args.recursive:
-            outcomes = tuple(
-                sync_tree(whole, client, sync_id=_new_id, describe=common.source_document, **options)
-            )
-        else:
-            document = common.source_document(whole.assembly)
-            outcomes = (sync(whole, client, sync_id=_new_id(), document=document, **options),)
-    except SiloError as error:
-        return TopResult(top, base, error=error)
-    return TopResult(top, base, whole, outcomes)
-
-
-def _new_id() -> str:
-    return str(uuid.uuid4())
-
-
-def result_json(result: TopResult) -> dict[str, Any]:
-    """One file's result for machines."""
-    data: dict[str, Any] = {"top": result.top, "ok": result.fine}
-    if result.error is not None:
-        data["error"] = {"code": result.error.code, "message": str(result.error)}
-    if result.skipped:
-        data["skipped"] = result.skipped
-    data["assemblies"] = [outcome_json(outcome, result.base) for outcome in result.outcomes]
-    if result.whole is not None:
-        data["unregistered"] = [entry_json(entry, result.base) for entry in result.whole.unresolved]
-        data["findings"] = [finding_json(finding, result.base) for finding in result.whole.findings]
-    return data
-
-
-def outcome_json(outcome: Outcome, base: str) -> dict[str, Any]:
-    """One assembly's outcome for machines."""
-    head = outcome.assembly
-    data: dict[str, Any] = {
-        "doc_path": relative(head.doc_path, base),
-        "object": head.object_name,
-        "part_number": head.part_number,
-        "status": outcome.status.value,
-    }
-    if outcome.plan is not None:
-        data["diff"] = diff_json(outcome.plan.diff)
-    if outcome.result is not None:
-        data["result"] = outcome.result.model_dump(mode="json", exclude_none=True)
-    if outcome.error is not None:
-        data["error"] = {"code": outcome.error.code, "message": str(outcome.error)}
-    if outcome.status is Status.BLOCKED:
-        data["blocked_by"] = [finding_json(f, base) for f in blocking(outcome.resolved)]
-    return data
 
 
 def _show(result: TopResult) -> None:

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Many files in one run, each on its own: what the command line and the headless add-on share.
+
+One failure does not stop the rest; every file ends in a :class:`TopResult`, which becomes JSON here and
+Markdown in :mod:`silo.batch_report`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import uuid
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from silo.api.wire import SourceDocument
+from silo.bom.errors import DocumentError, SiloError
+from silo.bom.model import BomEntry, Extraction
+from silo.bom.report import base_of, diff_json, entry_json, finding_json, relative
+from silo.bom_sync import Outcome, Resolved, Status, SyncApi, blocking, resolve, sync, sync_tree
+
+_FINE = (Status.MERGED, Status.UNCHANGED, Status.DRY_RUN)
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """How to sync.
+
+    recursive
+        sub-assemblies too, children before parents.
+    allow_missing
+        sync although links are broken.
+    dry_run
+        compare and send nothing.
+    skip_parts
+        a file without components of other files is a part and left alone (for whole folders).
+    """
+
+    recursive: bool = False
+    allow_missing: bool = False
+    dry_run: bool = False
+    skip_parts: bool = False
+
+
+@dataclass(frozen=True)
+class TopResult:
+    """What became of one file: its outcomes, or the error that kept it from being read."""
+
+    top: str
+    base: str = ""
+    whole: Resolved | None = None
+    outcomes: tuple[Outcome, ...] = ()
+    error: SiloError | None = None
+    skipped: str = ""
+
+    @property
+    def fine(self) -> bool:
+        return self.error is None and all(outcome.status in _FINE for outcome in self.outcomes)
+
+
+def sync_top(top: str, found: Extraction | SiloError, api: SyncApi, options: Options) -> TopResult:
+    """Sync one file's BOM, or say why it was not read."""
+    if isinstance(found, SiloError):
+        return TopResult(top, error=found)
+    base = base_of(found)
+    if options.skip_parts and not found.entries and not found.blocked:
+        return TopResult(top, base, skipped="no components of other files: a part, not an assembly")
+    try:
+        whole = resolve(found, api)
+        outcomes = tuple(_outcomes(whole, api, options))
+    except SiloError as error:
+        return TopResult(top, base, error=error)
+    return TopResult(top, base, whole, outcomes)
+
+
+def _outcomes(whole: Resolved, api: SyncApi, options: Options) -> Iterable[Outcome]:
+    if options.recursive:
+        return sync_tree(
+            whole,
+            api,
+            sync_id=_new_id,
+            describe=source_document,
+            allow_missing=options.allow_missing,
+            dry_run=options.dry_run,
+        )
+    one = sync(
+        whole,
+        api,
+        sync_id=_new_id(),
+        document=source_document(whole.assembly),
+        allow_missing=options.allow_missing,
+        dry_run=options.dry_run,
+    )
+    return (one,)
+
+
+def _new_id() -> str:
+    return str(uuid.uuid4())
+
+
+# --- files ----------------------------------------------------------------------------------------------
+
+
+def documents_in(tops: Iterable[str]) -> list[str]:
+    """The files that are meant: a folder stands for all FCStd files below it, backups left out."""
+    found: list[str] = []
+    for top in tops:
+        path = Path(top)
+        if path.is_dir():
+            found += sorted(str(p) for p in path.rglob("*") if p.suffix.lower() == ".fcstd" and p.is_file())
+        else:
+            found.append(top)
+    return list(dict.fromkeys(found))
+
+
+def source_document(entry: BomEntry) -> SourceDocument:
+    """Which file, with which content, an assembly's BOM was taken from."""
+    return SourceDocument(file=os.path.basename(entry.doc_path), sha256=sha256_of(entry.doc_path))
+
+
+def sha256_of(path: str) -> str:
+    """The hash of a file's content."""
+    try:
+        with open(path, "rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise DocumentError(path, error.strerror or str(error)) from error
+
+
+# --- for machines ---------------------------------------------------------------------------------------
+
+
+def result_json(result: TopResult) -> dict[str, Any]:
+    """One file's result for machines."""
+    data: dict[str, Any] = {"top": result.top, "ok": result.fine}
+    if result.error is not None:
+        data["error"] = {"code": result.error.code, "message": str(result.error)}
+    if result.skipped:
+        data["skipped"] = result.skipped
+    data["assemblies"] = [outcome_json(outcome, result.base) for outcome in result.outcomes]
+    if result.whole is not None:
+        data["unregistered"] = [entry_json(entry, result.base) for entry in result.whole.unresolved]
+        data["findings"] = [finding_json(finding, result.base) for finding in result.whole.findings]
+    return data
+
+
+def outcome_json(outcome: Outcome, base: str) -> dict[str, Any]:
+    """One assembly's outcome for machines."""
+    head = outcome.assembly
+    data: dict[str, Any] = {
+        "doc_path": relative(head.doc_path, base),
+        "object": head.object_name,
+        "part_number": head.part_number,
+        "status": outcome.status.value,
+    }
+    if outcome.plan is not None:
+        data["diff"] = diff_json(outcome.plan.diff)
+    if outcome.result is not None:
+        data["result"] = outcome.result.model_dump(mode="json", exclude_none=True)
+    if outcome.error is not None:
+        data["error"] = {"code": outcome.error.code, "message": str(outcome.error)}
+    if outcome.status is Status.BLOCKED:
+        data["blocked_by"] = [finding_json(f, base) for f in blocking(outcome.resolved)]
+    return data
