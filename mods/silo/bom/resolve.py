@@ -111,7 +111,7 @@ def consolidation_findings(entries: Iterable[BomEntry]) -> tuple[Finding, ...]:
     return tuple(
         Finding(
             FindingCode.CONSOLIDATION,
-            Severity.INFO,
+            Severity.WARNING,
             consolidation_message(entry),
             (Place(entry.doc_path, entry.object_name),),
         )

@@ -25,9 +25,6 @@ _COMMANDS = (
     "serve",
     "watch",
     "demo",
-    "inertia",
-    "mass",
-    "install_addon",
 )
 
 _EPILOG = """exit codes: 0 done, 1 differences or something left undone, 2 bad input, 3 server, 130 cancelled

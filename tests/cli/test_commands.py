@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The commands as a user runs them, on the example and a real embedded server."""
+
+from __future__ import annotations
+
+import os
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from silo.cli.demo_edit import remove_from_assembly, set_element_count
+from silo.cli.main import build_parser
+
+
+def counts(rows: list[dict[str, Any]]) -> dict[str, int]:
+    return {row["object"]: row["quantity"] for row in rows}
+
+
+def numbers(rows: list[dict[str, Any]]) -> dict[str, float]:
+    return {row["part_number"]: row["quantity"] for row in rows}
+
+
+def test_bom_prints_the_json_that_is_documented(run: Any, gearbox: Path) -> None:
+    """Keys, relative paths with /, quantities per one parent, levels by nesting."""
+    ran = run("bom", gearbox, "--json")
+    assert ran.code == 0
+    data = ran.json()
+    assert data["assembly"]["doc_path"] == "TopAssembly.FCStd"
+    assert set(data["entries"][0]) == {
+        "doc_path",
+        "object",
+        "label",
+        "silo_uuid",
+        "part_number",
+        "name",
+        "quantity",
+        "level",
+        "consolidation_warning",
+        "children",
+    }
+    assert counts(data["entries"]) == {
+        "BasePlate": 1,
+        "Gearbox": 2,
+        "Cover": 1,
+        "M8x20Bolt": 12,
+        "MotorMount": 1,
+    }
+    gear = next(e for e in data["entries"] if e["object"] == "Gearbox")
+    assert counts(gear["children"]) == {"Housing": 1, "Gear": 4, "Shaft": 1}
+    assert {child["level"] for child in gear["children"]} == {2}
+    assert gear["children"][0]["doc_path"].startswith("parts/")
+    for finding in data["findings"]:
+        assert set(finding) == {"code", "severity", "message", "where"}
+
+
+def test_flat_multiplies_down_the_tree(run: Any, gearbox: Path) -> None:
+    """Two gearboxes with four gears each are eight gears; sub-assemblies are listed too."""
+    flat = run("bom", gearbox, "--flat", "--json").json()
+    assert all(set(row) == {"doc_path", "object", "quantity"} for row in flat)
+    assert counts(flat) == {
+        "BasePlate": 1,
+        "Gearbox": 2,
+        "Housing": 2,
+        "Gear": 8,
+        "Shaft": 2,
+        "Cover": 1,
+        "M8x20Bolt": 12,
+        "MotorMount": 1,
+    }
+
+
+def test_the_consolidation_warning_has_the_words_of_the_spec(run: Any, gearbox: Path) -> None:
+    """With the count of individual links; the array beside them does not count as one."""
+    findings = run("bom", gearbox, "--json").json()["findings"]
+    [message] = [f["message"] for f in findings if f["code"] == "consolidation"]
+    assert message == (
+        "[Silo BOM] M8x20 Bolt has 8 individual links. "
+        "Consider using a link array (ElementCount) for cleaner assembly management."
+    )
+
+
+def test_the_whole_story(run: Any, silo: Any, gearbox: Path) -> None:
+    """Register, sync, sync again, edit, sync: each step as the spec's merge table says."""
+    assert run("register", gearbox, "--yes").code == 0
+    first = run("sync", gearbox, "--recursive", "--json").json()["results"][0]
+    assert [a["status"] for a in first["assemblies"]] == ["merged", "merged"]
+    top = first["assemblies"][-1]["part_number"]
+    assert len(first["assemblies"][-1]["diff"]["added"]) == 5
+
+    again = run("sync", gearbox, "--recursive", "--json")
+    assert again.code == 0
+    assert [a["status"] for a in again.json()["results"][0]["assemblies"]] == ["unchanged", "unchanged"]
+    assert run("diff", gearbox, "--check").code == 0
+
+    remove_from_assembly(gearbox, "Cover")
+    set_element_count(gearbox, "CoverBolts", added=4)
+    glue = silo.client.create_item("kindred-rd", "C01", "Thread locker", item_type="consumable")
+    silo.client.add_bom_line(top, glue.part_number, quantity=1)
+    assert run("diff", gearbox, "--check").code == 1
+    third = run("sync", gearbox, "--json").json()["results"][0]["assemblies"][0]
+    assert [c["local_quantity"] for c in third["diff"]["quantity_changed"]] == [16]
+    assert len(third["diff"]["removed"]) == 1
+    assert numbers(third["diff"]["manual"]) == {glue.part_number: 1}
+    lines = {line.child_part_number: line for line in silo.client.get_bom(top)}
+    assert len(lines) == 6, "nothing is ever deleted"
+    assert lines[glue.part_number].source == "manual"
+    assert sum(line.unreferenced_since is not None for line in lines.values()) == 1
+
+
+def test_register_twice_creates_nothing_twice(run: Any, silo: Any, gearbox: Path) -> None:
+    """The identity is in the files, so the second run finds nothing to do."""
+    assert len(run("register", gearbox, "--yes", "--json").json()["registered"]) == 9
+    assert run("register", gearbox, "--yes", "--json").json()["registered"] == []
+    assert len(silo.client.search_items()) == 9
+
+
+def test_register_without_anybody_to_ask_says_so(run: Any, silo: Any, gearbox: Path) -> None:
+    """No prompt hangs in a script."""
+    ran = run("register", gearbox)
+    assert ran.code == 2
+    assert "--yes" in ran.err
+
+
+def test_sync_without_a_server_says_how_to_start_one(run: Any, gearbox: Path) -> None:
+    """The message names the command; nothing else happens."""
+    ran = run("sync", gearbox)
+    assert ran.code == 2
+    assert "silo-mod serve" in ran.err
+    assert "Traceback" not in ran.err
+
+
+def test_a_server_that_is_not_there_is_exit_code_3(
+    run: Any, gearbox: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The way to the server is nobody's bad input."""
+    monkeypatch.setenv("SILO_API_URL", "http://127.0.0.1:9")
+    ran = run("diff", gearbox)
+    # An assembly without any identity needs no look-up; a registered one does.
+    assert ran.code in (0, 3)
+    assert run("register", gearbox, "--yes").code == 3
+
+
+def test_a_missing_file_never_reads_as_removed(run: Any, silo: Any, gearbox: Path) -> None:
+    """The BOM is blocked, says what is missing and who uses it, and is synced on consent only."""
+    run("register", gearbox, "--yes")
+    run("sync", gearbox, "--recursive")
+    os.remove(gearbox.parent / "parts" / "Cover.FCStd")
+    ran = run("sync", gearbox, "--json")
+    assert ran.code == 1
+    [result] = ran.json()["results"]
+    [outcome] = result["assemblies"]
+    assert outcome["status"] == "blocked"
+    [cause] = outcome["blocked_by"]
+    assert cause["code"] == "missing_file"
+    assert "parts/Cover.FCStd" in cause["message"]
+    assert cause["where"] == ["TopAssembly.FCStd#Cover"]
+    allowed = run("sync", gearbox, "--allow-missing", "--json").json()["results"][0]["assemblies"][0]
+    assert allowed["status"] == "merged"
+    assert len(allowed["diff"]["removed"]) == 1
+
+
+def test_dry_run_sends_nothing(run: Any, silo: Any, gearbox: Path) -> None:
+    """The preview leaves the server's BOM as it was."""
+    run("register", gearbox, "--yes")
+    outcome = run("sync", gearbox, "--dry-run", "--json").json()["results"][0]["assemblies"][0]
+    assert outcome["status"] == "dry_run"
+    assert silo.client.get_bom(outcome["part_number"]) == []
+
+
+def test_a_folder_is_synced_file_by_file_and_one_bad_file_does_not_stop_it(
+    run: Any, silo: Any, gearbox: Path, tmp_path: Path
+) -> None:
+    """Parts are passed over, the damaged file is told, assemblies are merged, a report is written."""
+    run("register", gearbox, "--yes")
+    (gearbox.parent / "parts" / "Broken.FCStd").write_bytes(b"no zip at all")
+    report = tmp_path / "report.md"
+    ran = run("sync", gearbox.parent, "--recursive", "--json", "--report", report)
+    assert ran.code == 1
+    results = {Path(r["top"]).name: r for r in ran.json()["results"]}
+    assert "error" in results["Broken.FCStd"]
+    assert results["TopAssembly.FCStd"]["ok"]
+    assert results["Housing.FCStd"]["skipped"]
+    text = report.read_text(encoding="utf-8")
+    assert "Broken.FCStd" in text
+    assert "| merged |" in text
+
+
+def test_labels_cannot_steer_the_terminal(run: Any, gearbox: Path) -> None:
+    """Control characters of a hostile document are shown as a replacement, markup as text."""
+    with zipfile.ZipFile(gearbox) as archive:
+        entries = {info.filename: archive.read(info) for info in archive.infolist()}
+    xml = entries["Document.xml"].decode()
+    assert "Layout reference" in xml
+    entries["Document.xml"] = xml.replace("Layout reference", "[red]&#x9b;31m&lt;b&gt;").encode()
+    with zipfile.ZipFile(gearbox, "w") as archive:
+        for name, content in entries.items():
+            archive.writestr(name, content)
+    ran = run("bom", gearbox)
+    assert ran.code == 0
+    assert "\x9b" not in ran.out
+    assert "[red]" in ran.out
+
+
+def test_every_command_has_help_with_an_example(run: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    """A user finds a line to copy in each --help."""
+    parser = build_parser()
+    [choices] = [a.choices for a in parser._subparsers._group_actions]  # type: ignore[union-attr]
+    assert choices is not None
+    for name, command in dict(choices).items():
+        text = command.format_help()  # type: ignore[attr-defined]
+        assert "example:" in text, name
+        assert f"silo-mod {name}" in text, name
