@@ -40,6 +40,10 @@ class SiloClient(ItemCalls, BomCalls):
         a :class:`requests.Session` of one's own (adapters, proxies); else the client makes one.
     verify
         True, False (no check of the certificate), or the path of a file with certificate authorities.
+    retries
+        how often and how soon a harmless request is repeated.
+    max_bytes
+        more than this is refused in an answer (downloads have their own limit).
     silence
         seconds after which an event stream without a byte counts as dead.
 
@@ -56,6 +60,7 @@ class SiloClient(ItemCalls, BomCalls):
         session: requests.Session | None = None,
         verify: bool | str | Path = True,
         retries: Retries | None = None,
+        max_bytes: int = 64 << 20,
         silence: float = SILENCE,
     ) -> None:
         connect, read = timeout if isinstance(timeout, tuple) else (timeout, timeout)
@@ -68,6 +73,7 @@ class SiloClient(ItemCalls, BomCalls):
             retries=retries or Retries(),
             verify=verify if isinstance(verify, bool) else str(verify),
             session=session,
+            max_bytes=max_bytes,
         )
 
     def __repr__(self) -> str:

@@ -32,7 +32,7 @@ class ItemCalls(Caller):
 
     def get_item_by_uuid(self, uuid: str, /) -> Item | None:
         """The item with this identity; None where the server has none (unknown, archived, or no UUID)."""
-        if not uuid.strip(". "):
+        if not uuid.strip(". ") or any(c in "/\\?#%" or c < " " for c in uuid):
             return None
         try:
             return self._get(f"item {uuid}", "items", "by-uuid", uuid).model(Item)

@@ -61,23 +61,28 @@ class Timeouts:
 
 @dataclass(frozen=True)
 class Retries:
-    """How often to try in all, the first pause and the longest one (seconds)."""
+    """How often to try in all, the first pause and the longest one (seconds).
+
+    ``chance`` gives numbers in [0, 1) that spread many clients out; ``sleep`` waits.
+    """
 
     tries: int = 3
     first: float = 0.25
     longest: float = 10.0
+    chance: Callable[[], float] = random.random
+    sleep: Callable[[float], object] = time.sleep
 
-    def pause(self, attempt: int, chance: float, told: float | None) -> float | None:
+    def pause(self, attempt: int, told: float | None) -> float | None:
         """Seconds to wait after failed attempt number ``attempt`` (from 1); None means give up.
 
-        ``chance`` in [0, 1) spreads many clients out; ``told`` is the server's own Retry-After.
+        ``told`` is the server's own Retry-After.
         """
         if attempt >= self.tries or (told is not None and told > self.longest):
             return None
         return (
             told
             if told is not None
-            else min(self.longest, self.first * 2.0 ** (attempt - 1)) * (0.5 + chance)
+            else min(self.longest, self.first * 2.0 ** (attempt - 1)) * (0.5 + self.chance())
         )
 
 
@@ -95,7 +100,7 @@ class Call:
     body: Callable[[], Any] | None = None
     headers: Mapping[str, str] = field(default_factory=dict)
     repeatable: bool = False
-    max_bytes: int = 64 << 20
+    max_bytes: int | None = None
     endless: bool = False
     cancelled: Cancel | None = None
 
@@ -139,9 +144,8 @@ class Transport:
         retries: Retries,
         verify: bool | str = True,
         session: requests.Session | None = None,
-        pause: Callable[[float], None] = time.sleep,
+        max_bytes: int = 64 << 20,
         clock: Callable[[], float] = time.monotonic,
-        chance: Callable[[], float] = random.random,
     ) -> None:
         self.address = address
         self.timeouts = timeouts
@@ -149,7 +153,7 @@ class Transport:
         self._token = clean_token(token)
         self._verify = verify
         self._session = session or _new_session()
-        self._pause, self._clock, self._chance = pause, clock, chance
+        self._max_bytes, self._clock = max_bytes, clock
 
     @property
     def has_token(self) -> bool:
@@ -173,7 +177,7 @@ class Transport:
                 return error
             # A read-only server stays so until a person changes that; waiting here would help nobody.
             again = call.repeatable and isinstance(error, UnreachableError)
-            wait = self._retries.pause(attempt, self._chance(), told) if again else None
+            wait = self._retries.pause(attempt, told) if again else None
             if wait is None:
                 raise error
             self._rest(wait, call.cancelled)
@@ -245,14 +249,14 @@ class Transport:
         """The body as it comes, each piece at once; ends by error when it is too much or takes too long."""
         where = self.where(call.subject)
         deadline = self._clock() + self.timeouts.total
-        size = 0
+        size, limit = 0, call.max_bytes or self._max_bytes
         with translated(where):
             while piece := read_some(response):
                 stop_if(call.cancelled)
                 size += len(piece)
-                if size > call.max_bytes:
+                if size > limit:
                     raise ServerFaultError(
-                        f"{where.asked} answered more than {call.max_bytes / 1e6:.0f} MB, which is refused"
+                        f"{where.asked} answered more than {limit / 1e6:g} MB, which is refused"
                     )
                 yield piece
                 if self._clock() > deadline and not call.endless:
@@ -262,7 +266,7 @@ class Transport:
 
     def _rest(self, seconds: float, cancelled: Cancel | None) -> None:
         if cancelled is None:
-            self._pause(seconds)
+            self._retries.sleep(seconds)
         else:
             cancelled.wait(seconds)
             stop_if(cancelled)

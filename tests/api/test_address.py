@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The base URL rule, and which server is the same."""
+
+from __future__ import annotations
+
+import pytest
+
+from silo.api.address import ServerAddress, may_carry_token, origin_of
+from silo.bom.errors import ConfigError, InputError
+
+
+@pytest.mark.parametrize(
+    ("written", "api", "web"),
+    [
+        ("https://silo.example.com", "https://silo.example.com/api", "https://silo.example.com"),
+        ("https://silo.example.com/", "https://silo.example.com/api", "https://silo.example.com"),
+        (" http://127.0.0.1:7480 ", "http://127.0.0.1:7480/api", "http://127.0.0.1:7480"),
+        ("https://silo.example.com/api", "https://silo.example.com/api", "https://silo.example.com"),
+        ("https://silo.example.com/api/", "https://silo.example.com/api", "https://silo.example.com"),
+        ("https://host/silo/api", "https://host/silo/api", "https://host/silo"),
+        ("https://host/plm", "https://host/plm", "https://host/plm"),
+        ("http://[::1]:8000", "http://[::1]:8000/api", "http://[::1]:8000"),
+    ],
+)
+def test_api_is_appended_only_where_the_address_has_no_path(written: str, api: str, web: str) -> None:
+    """The rule of the older workbench (silo-contract §0.1)."""
+    address = ServerAddress.parse(written)
+    assert (address.api_root, address.web_root) == (api, web)
+
+
+@pytest.mark.parametrize(
+    "written",
+    ["", "silo.example.com", "ftp://host", "http://", "http://host:99999", "http://host?x=1", "http://ho st", "//x"],
+)
+def test_an_address_that_is_none_says_how_to_write_one(written: str) -> None:
+    """Plain words and an example."""
+    with pytest.raises(ConfigError, match=r"https://silo\.example\.com"):
+        ServerAddress.parse(written)
+
+
+def test_a_password_in_an_address_is_refused_and_not_shown() -> None:
+    """It would end up in logs."""
+    with pytest.raises(ConfigError) as caught:
+        ServerAddress.parse("https://designer:hunter2@silo.example.com")
+    assert "hunter2" not in str(caught.value)
+
+
+def test_a_part_number_is_one_segment_whatever_it_holds() -> None:
+    """Slashes and blanks are quoted; dots alone would ask for another resource."""
+    address = ServerAddress.parse("http://h")
+    assert address.api("items", "A/1 ä?#", "bom") == "http://h/api/items/A%2F1%20%C3%A4%3F%23/bom"
+    for odd in ("", " ", ".", ".."):
+        with pytest.raises(InputError):
+            address.api("items", odd)
+
+
+def test_pages_of_other_servers_are_not_given() -> None:
+    """Only the configured server's pages are opened."""
+    address = ServerAddress.parse("https://silo.example.com/api")
+    assert address.web("/items/A/bom") == "https://silo.example.com/items/A/bom"
+    assert address.web("https://silo.example.com/items/A") == "https://silo.example.com/items/A"
+    for foreign in ("https://evil.example/items", "//evil.example/x", "http://silo.example.com/x"):
+        with pytest.raises(InputError, match="not on silo.example.com"):
+            address.web(foreign)
+
+
+@pytest.mark.parametrize(
+    ("sender", "receiver", "allowed"),
+    [
+        ("https://a", "https://a:443/x", True),
+        ("http://a", "https://a", True),
+        ("http://a:8000", "https://a", False),
+        ("https://a", "http://a", False),
+        ("https://a", "https://a:8443", False),
+        ("https://a", "https://b", False),
+        ("http://A.example", "http://a.EXAMPLE", True),
+    ],
+)
+def test_the_token_stays_with_its_server(sender: str, receiver: str, allowed: bool) -> None:
+    """Same scheme, host and port; or the server's own upgrade to https."""
+    assert may_carry_token(origin_of(sender), origin_of(receiver)) is allowed
+
+
+def test_this_computer_is_known() -> None:
+    """No proxy is asked for loopback."""
+    assert [ServerAddress.parse(f"http://{h}").is_loopback for h in ("127.0.0.1", "localhost", "[::1]", "a")] == [
+        True,
+        True,
+        True,
+        False,
+    ]

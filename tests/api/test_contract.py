@@ -1,0 +1,342 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""One contract for everything that answers like a Silo: the fake in memory, and the embedded server over HTTP."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from pathlib import Path
+from uuid import uuid4
+
+import pytest
+
+from silo.api.client import SiloClient
+from silo.api.fake import FakeSilo
+from silo.api.protocol import SiloApi
+from silo.api.wire import MergeEntry, MergeRequest, MergeResult
+from silo.bom.diff import diff_bom
+from silo.bom.errors import (
+    ConflictError,
+    CycleError,
+    InputError,
+    NotFoundError,
+    RejectedError,
+    VersionConflictError,
+)
+
+
+@pytest.fixture(scope="module")
+def server_client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SiloClient]:
+    run = pytest.importorskip("silo_server.run", reason="the embedded server needs the extra 'server'")
+    database = f"sqlite:///{tmp_path_factory.mktemp('silo') / 'silo.db'}"
+    with (
+        run.running_server(database, token="silo_contract") as server,
+        SiloClient(server.base_url, server.token) as client,
+    ):
+        yield client
+
+
+@pytest.fixture(params=["fake", "server"])
+def silo(request: pytest.FixtureRequest) -> SiloApi:
+    if request.param == "fake":
+        return FakeSilo()
+    client: SiloClient = request.getfixturevalue("server_client")
+    return client
+
+
+def make(silo: SiloApi, name: str, category: str = "M01") -> str:
+    """A new item's part number."""
+    kind = "assembly" if category.startswith("A") else "part"
+    return silo.create_item("kindred-rd", category, name, item_type=kind).part_number
+
+
+def merge(silo: SiloApi, parent: str, **quantities: float) -> MergeResult:
+    return silo.merge_bom(parent, request(**quantities))
+
+
+def request(sync_id: str | None = None, *, dry_run: bool = False, **quantities: float) -> MergeRequest:
+    entries = [
+        MergeEntry(child_part_number=pn.replace("_", "-"), quantity=q) for pn, q in quantities.items()
+    ]
+    return MergeRequest(entries=entries, sync_id=sync_id, dry_run=dry_run)
+
+
+def key(part_number: str) -> str:
+    return part_number.replace("-", "_")
+
+
+def lines(silo: SiloApi, parent: str) -> dict[str, tuple[float | None, str, bool]]:
+    return {
+        line.child_part_number: (line.quantity, line.source, line.unreferenced_since is not None)
+        for line in silo.get_bom(parent)
+    }
+
+
+def test_an_item_is_found_by_its_identity_and_reads_as_a_mapping(silo: SiloApi) -> None:
+    """The contract of resolve_part_numbers: a mapping with part_number and name, or None."""
+    made = silo.create_item("kindred-rd", "M01", "Base plate", properties={"mass_kg": 1.5})
+    found = silo.get_item_by_uuid(made.id)
+    assert found is not None
+    assert found["part_number"] == made.part_number
+    assert found["name"] == "Base plate"
+    assert dict(found)["properties"] == {"mass_kg": 1.5}
+    assert silo.get_item_by_uuid(str(uuid4())) is None
+
+
+@pytest.mark.parametrize("odd", ["", "..", "not-a-uuid", "a/b", "ä"])
+def test_what_is_no_identity_is_no_item(silo: SiloApi, odd: str) -> None:
+    """Files hold garbage where an identity should be; that is an unregistered part, not a failure."""
+    assert silo.get_item_by_uuid(odd) is None
+    assert silo.get_items_by_uuid([odd]) == {}
+
+
+def test_identities_are_found_in_any_spelling_under_the_spelling_given(silo: SiloApi) -> None:
+    """Capitals, braces and missing dashes are one identity; unknown ones are left out."""
+    made = silo.create_item("kindred-rd", "M01", "Cover")
+    loud, bare = made.id.upper(), made.id.replace("-", "")
+    found = silo.get_items_by_uuid([loud, str(uuid4()), bare, loud])
+    assert {uuid: item.part_number for uuid, item in found.items()} == {
+        loud: made.part_number,
+        bare: made.part_number,
+    }
+
+
+def test_a_part_number_is_found_in_any_case_and_a_missing_one_is_told(silo: SiloApi) -> None:
+    """kindred-rd: numbers compare case-insensitively."""
+    number = make(silo, "Shaft")
+    assert silo.get_item(number.lower()).part_number == number
+    with pytest.raises(NotFoundError, match="Z99-0001"):
+        silo.get_item("Z99-0001")
+
+
+def test_a_number_preview_reserves_nothing(silo: SiloApi) -> None:
+    """The form asks for it again and again; the next item gets it."""
+    preview = silo.generate_part_number("kindred-rd", "F01")
+    assert silo.generate_part_number("kindred-rd", "F01") == preview
+    assert make(silo, "Bolt", "F01") == preview
+    with pytest.raises(RejectedError):
+        silo.generate_part_number("kindred-rd", "no-such")
+
+
+def test_creating_twice_with_one_key_makes_one_item(silo: SiloApi) -> None:
+    """A crash between creation and stamping must not give a part two numbers."""
+    wanted = str(uuid4())
+    first = silo.create_item("kindred-rd", "M01", "Bracket", idempotency_key=wanted)
+    again = silo.create_item("kindred-rd", "M01", "Bracket", idempotency_key=wanted)
+    assert (again.id, again.part_number) == (wanted, first.part_number)
+
+
+def test_the_search_looks_for_every_word_and_by_type(silo: SiloApi) -> None:
+    """Words in any order; the type narrows."""
+    word = uuid4().hex
+    part, assembly = make(silo, f"Gear {word}"), make(silo, f"Gearbox {word}", "A01")
+    assert {item.part_number for item in silo.search_items(f"{word} gear")} == {part, assembly}
+    assert [item.part_number for item in silo.search_items(word, item_type="assembly")] == [assembly]
+    assert silo.search_items("no such thing at all") == []
+    assert len(silo.search_items(limit=1)) == 1
+
+
+def test_an_item_keeps_its_identity_under_a_new_number(silo: SiloApi) -> None:
+    """The number is a name, the UUID is the item; properties make a revision, a description does not."""
+    made = silo.create_item("kindred-rd", "M01", "Old name")
+    renamed = f"X-{uuid4().hex[:8]}"
+    after = silo.update_item(made.part_number, part_number=renamed, description="New name")
+    assert (after.id, after.part_number, after.description) == (made.id, renamed, "New name")
+    assert after.current_revision == made.current_revision
+    revised = silo.update_item(renamed, properties={"mass_kg": 2}, comment="weighed")
+    assert revised.current_revision == made.current_revision + 1
+    with pytest.raises(InputError, match="colour"):
+        silo.update_item(renamed, colour="red")
+
+
+def test_the_schema_names_its_categories(silo: SiloApi) -> None:
+    """Code and text, whatever form the schema has; an unknown schema is told."""
+    assert silo.categories()["F01"] == "Screws and bolts"
+    assert silo.get_schema("kindred-rd")["name"] == "kindred-rd"
+    assert silo.get_schema_form("kindred-rd", "F01")["schema"] == "kindred-rd"
+    with pytest.raises(NotFoundError):
+        silo.get_schema("no-such")
+
+
+def test_a_merge_gives_the_diff_and_the_server_has_it(silo: SiloApi) -> None:
+    """Spec §5: added, changed, removed (kept and flagged), unchanged; warnings; the page to look at."""
+    top = make(silo, "Top", "A01")
+    kept, changed, gone, new = (make(silo, name) for name in ("Kept", "Changed", "Gone", "New"))
+    merge(silo, top, **{key(kept): 1, key(changed): 8, key(gone): 2})
+    result = merge(silo, top, **{key(kept): 1, key(changed): 12, key(new): 1})
+    assert result.status == "merged"
+    assert [dict(q) for q in result.diff.added] == [{"part_number": new, "quantity": 1}]
+    assert [dict(q) for q in result.diff.removed] == [{"part_number": gone, "quantity": 2}]
+    assert [dict(q) for q in result.diff.quantity_changed] == [
+        {"part_number": changed, "old_quantity": 8, "new_quantity": 12}
+    ]
+    assert [dict(q) for q in result.diff.unchanged] == [{"part_number": kept, "quantity": 1}]
+    assert [(w.type, w.part_number) for w in result.warnings] == [("unreferenced", gone)]
+    assert result.resolve_url == f"/items/{top}/bom"
+    assert lines(silo, top) == {
+        kept: (1, "assembly", False),
+        changed: (12, "assembly", False),
+        gone: (2, "assembly", True),
+        new: (1, "assembly", False),
+    }
+
+
+def test_what_the_server_has_diffs_as_the_core_does(silo: SiloApi) -> None:
+    """The lines are the mappings that diff_bom takes."""
+    top, part = make(silo, "Top", "A01"), make(silo, "Part")
+    merge(silo, top, **{key(part): 3})
+    assert diff_bom([{"child_part_number": part, "quantity": 3}], silo.get_bom(top)).drifted is False
+
+
+def test_a_manual_line_is_never_touched_and_a_difference_is_a_conflict(silo: SiloApi) -> None:
+    """What people wrote stays; the assembly's other quantity is told."""
+    top, glue = make(silo, "Top", "A01"), make(silo, "Glue", "C01")
+    silo.add_bom_line(top, glue, quantity=2, notes="one drop each")
+    result = merge(silo, top, **{key(glue): 5})
+    assert [(w.type, w.part_number) for w in result.warnings] == [("conflict", glue)]
+    assert lines(silo, top) == {glue: (2, "manual", False)}
+    assert silo.get_bom(top)[0].notes == "one drop each"
+
+
+def test_the_same_sync_id_gives_the_same_answer(silo: SiloApi) -> None:
+    """Sending twice does no harm, even when something happened in between."""
+    top, part = make(silo, "Top", "A01"), make(silo, "Part")
+    first = silo.merge_bom(top, request("sync-1", **{key(part): 1}))
+    merge(silo, top, **{key(part): 7})
+    again = silo.merge_bom(top, request("sync-1", **{key(part): 1}))
+    assert again.diff == first.diff
+    assert lines(silo, top) == {part: (7, "assembly", False)}
+    with pytest.raises(ConflictError, match="sync-1"):
+        silo.merge_bom(top, request("sync-1", **{key(part): 2}))
+
+
+def test_a_dry_run_answers_and_changes_nothing(silo: SiloApi) -> None:
+    """The preview is the merge's own answer."""
+    top, part = make(silo, "Top", "A01"), make(silo, "Part")
+    result = silo.merge_bom(top, request(dry_run=True, **{key(part): 4}))
+    assert [dict(q) for q in result.diff.added] == [{"part_number": part, "quantity": 4}]
+    assert silo.get_bom(top) == []
+
+
+def test_all_unknown_children_are_told_at_once_and_nothing_changes(silo: SiloApi) -> None:
+    """One 400 with every bad entry, by its index."""
+    top, part = make(silo, "Top", "A01"), make(silo, "Part")
+    with pytest.raises(RejectedError) as caught:
+        merge(silo, top, no_such_1=1, **{key(part): 1}, no_such_2=2)
+    assert len(caught.value.problems) == 2
+    assert "entries[0]" in caught.value.problems[0]
+    assert "entries[2]" in caught.value.problems[1]
+    assert silo.get_bom(top) == []
+
+
+def test_an_unknown_assembly_is_told_as_such(silo: SiloApi) -> None:
+    """404 for the parent."""
+    part = make(silo, "Part")
+    with pytest.raises(NotFoundError, match="Z98-0001"):
+        merge(silo, "Z98-0001", **{key(part): 1})
+
+
+def test_a_ring_is_refused_with_its_way(silo: SiloApi) -> None:
+    """A in B in A: the path says how."""
+    top, sub = make(silo, "Top", "A01"), make(silo, "Sub", "A01")
+    merge(silo, top, **{key(sub): 1})
+    with pytest.raises(CycleError) as caught:
+        merge(silo, sub, **{key(top): 1})
+    assert {top, sub} <= set(caught.value.path)
+    with pytest.raises(CycleError):
+        merge(silo, top, **{key(top): 1})
+
+
+def test_a_version_that_is_not_the_newest_is_refused(silo: SiloApi) -> None:
+    """If-Match: somebody was quicker."""
+    top, part = make(silo, "Top", "A01"), make(silo, "Part")
+    version = silo.get_bom_version(top)
+    silo.merge_bom(top, request(**{key(part): 1}), if_match=version)
+    with pytest.raises(VersionConflictError):
+        silo.merge_bom(top, request(**{key(part): 2}), if_match=version)
+    silo.merge_bom(top, request(**{key(part): 2}), if_match=silo.get_bom_version(top))
+    assert lines(silo, top) == {part: (2, "assembly", False)}
+
+
+def test_the_tree_expands_and_flattens(silo: SiloApi) -> None:
+    """Quantities multiply down the tree; only leaves are in the flat BOM."""
+    top, sub = make(silo, "Top", "A01"), make(silo, "Gearbox", "A01")
+    gear, bolt = make(silo, "Gear"), make(silo, "Bolt", "F01")
+    merge(silo, sub, **{key(gear): 4, key(bolt): 2})
+    merge(silo, top, **{key(sub): 2, key(bolt): 12})
+    rows = [(row.depth, row.child_part_number, row.quantity) for row in silo.get_bom_expanded(top)]
+    assert sorted(rows) == sorted([(1, sub, 2), (2, gear, 4), (2, bolt, 2), (1, bolt, 12)])
+    assert {row.depth for row in silo.get_bom_expanded(top, depth=1)} == {1}
+    assert {row.part_number: row.total_quantity for row in silo.get_bom_flat(top)} == {gear: 8, bolt: 16}
+    assert [(use.parent_part_number, use.quantity) for use in silo.where_used(gear)] == [(sub, 4)]
+
+
+def test_a_line_is_edited_and_removed_by_hand(silo: SiloApi) -> None:
+    """A person's quantity makes the line the person's."""
+    top, part = make(silo, "Top", "A01"), make(silo, "Part")
+    merge(silo, top, **{key(part): 4})
+    changed = silo.update_bom_line(top, part, quantity=6, find_number="10")
+    assert (changed.quantity, changed.source, changed.find_number) == (6, "manual", "10")
+    with pytest.raises(ConflictError):
+        silo.add_bom_line(top, part)
+    silo.remove_bom_line(top, part)
+    assert silo.get_bom(top) == []
+    with pytest.raises(NotFoundError):
+        silo.remove_bom_line(top, part)
+
+
+def test_a_file_becomes_a_revision_and_comes_back(silo: SiloApi, tmp_path: Path) -> None:
+    """Upload, list, download: the bytes and their hash are the same."""
+    number, content = make(silo, "Housing"), bytes(range(256)) * 700
+    source, back = tmp_path / 'Ho"use ä.FCStd', tmp_path / "back.FCStd"
+    source.write_bytes(content)
+    seen: list[tuple[int, int]] = []
+    before = [r.revision_number for r in silo.revisions(number)]
+    made = silo.upload_file(
+        number, source, "first ✓", {"mass_kg": 0.2}, lambda done, total: seen.append((done, total))
+    )
+    sha256 = hashlib.sha256(content).hexdigest()
+    assert (made.file_checksum, made.file_size, made.comment) == (sha256, len(content), "first ✓")
+    assert seen[-1] == (len(content), len(content))
+    assert silo.get_item(number).properties["mass_kg"] == 0.2
+    second = silo.upload_file(number, source, "second", file_name="other.FCStd")
+    assert [r.revision_number for r in silo.revisions(number)] == [
+        second.revision_number,
+        made.revision_number,
+        *before,
+    ]
+    assert silo.download_file(number, back) == sha256
+    assert back.read_bytes() == content
+    assert silo.download_file(number, back, made.revision_number) == sha256
+    with pytest.raises(NotFoundError):
+        silo.upload_file("Z97-0001", source)
+    with pytest.raises(NotFoundError):
+        silo.download_file(number, back, 99)
+    assert back.read_bytes() == content
+
+
+def test_the_server_says_who_and_how_it_is(silo: SiloApi) -> None:
+    """User, mode, health, and full addresses of pages."""
+    assert silo.whoami().username
+    assert silo.ready().mode == "normal"
+    assert silo.health()["status"] == "ok"
+    assert silo.web_url("/items/A01-0001/bom") == f"{silo.base_url}/items/A01-0001/bom"
+
+
+def test_a_merge_is_announced(silo: SiloApi) -> None:
+    """The event that the activity pane shows; replay gives it again."""
+    top, part = make(silo, "Top", "A01"), make(silo, "Part")
+    first = silo.open_events()
+    events = iter(first)
+    result = silo.merge_bom(top, request("announced", **{key(part): 1}))
+    event = next(event for event in events if event.merge is not None)
+    first.close()
+    assert event.merge is not None
+    assert (event.type, event.item, event.merge.sync_id) == ("bom_merge", top, "announced")
+    assert event.merge.summary == "BOM updated: 1 added, 0 quantity changed, 0 unreferenced"
+    assert event.merge.diff.added == result.diff.added
+    assert event.merge.resolve_url == result.resolve_url
+    assert event.id is not None
+    replay = silo.open_events(str(int(event.id) - 1))
+    assert next(iter(replay)) == event
+    replay.close()
