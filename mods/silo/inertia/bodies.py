@@ -19,7 +19,7 @@ from silo.inertia.model import Prototype, SolidProps
 
 
 def body(name: str, volume: float, second: Sequence[float], **more: Any) -> Prototype:
-    """A body with ``volume`` [m^3] and principal tensor ``second`` [m^2 per unit mass]; ``more``: of Prototype."""
+    """A body of ``volume`` [m^3] with principal moments ``second`` [m^2 per unit mass]."""
     unit = np.diag(np.asarray(second, float)) * volume
     solid = SolidProps(volume, np.zeros(3), unit)
     more.setdefault("key", name)

@@ -43,7 +43,7 @@ def settled(props: MassProps) -> MassProps:
 
 
 def _printed(values: Floats) -> Floats:
-    return np.vectorize(lambda value: float(number(value)), otypes=[float])(values)
+    return np.array([float(number(value)) for value in values.flat]).reshape(values.shape)
 
 
 def writable(links: Iterable[LinkResult]) -> dict[str, MassProps]:

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Hand-made assemblies of closed-form bodies, and BOMs from text."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from silo.inertia.bodies import placement
+from silo.inertia.bom import BOMParser, BomTable
+from silo.inertia.calculator import Task, calculate
+from silo.inertia.materials import load_materials
+from silo.inertia.model import Assembly, Instance, Prototype
+from silo.inertia.report import InertiaReport
+
+STEP_FILES = Path(__file__).parents[2] / "../shared/data/step"
+
+
+@pytest.fixture(name="step_files", scope="session")
+def _step_files() -> Path:
+    """The public STEP files; without them the test is skipped, loudly."""
+    if not STEP_FILES.is_dir():
+        pytest.skip(f"the STEP test data is not at {STEP_FILES}")
+    return STEP_FILES.resolve()
+
+
+@pytest.fixture(name="materials", scope="session")
+def _materials() -> Any:
+    """The package's table alone: an installed FreeCAD must not decide a test."""
+    return load_materials(freecad=False)
+
+
+@pytest.fixture(name="assemble")
+def _assemble() -> Callable[..., Assembly]:
+    """``assemble(("link/part", prototype[, transform[, products]]), …)`` → an assembly."""
+
+    def assemble(*placed: Sequence[Any], name: str = "asm", **more: Any) -> Assembly:
+        prototypes: dict[str, Prototype] = {}
+        instances = []
+        for path, prototype, *rest in placed:
+            prototypes[prototype.key] = prototype
+            names = tuple(path.split("/"))
+            transform = rest[0] if rest and rest[0] is not None else np.eye(4)
+            products = tuple(rest[1].split("/")) if len(rest) > 1 else (*names[:-1], prototype.name)
+            instances.append(Instance(names, products, prototype.key, transform))
+        return Assembly(name, prototypes, tuple(instances), **more)
+
+    return assemble
+
+
+@pytest.fixture(name="bom")
+def _bom() -> Callable[..., BomTable]:
+    """A BOM from CSV text."""
+
+    def bom(text: str, **options: Any) -> BomTable:
+        return BOMParser(**options).parse_bytes(text.encode("utf-8"), "bom.csv")
+
+    return bom
+
+
+@pytest.fixture(name="compute")
+def _compute(materials: Any, bom: Callable[..., BomTable]) -> Callable[..., InertiaReport]:
+    """``compute(assembly, csv_text | table | None, **task)``."""
+
+    def compute(assembly: Assembly, table: BomTable | str | None = None, **task: Any) -> InertiaReport:
+        if isinstance(table, str):
+            table = bom(table)
+        return calculate(assembly, table, Task(materials=materials, **task))
+
+    return compute
+
+
+@pytest.fixture(name="codes")
+def _codes() -> Callable[..., list[str]]:
+    """Warning codes of a report, for one part or for all."""
+
+    def codes(report: InertiaReport, part: str | None = None) -> list[str]:
+        return [str(w.code) for w in report.warnings if part is None or w.part_name == part]
+
+    return codes
+
+
+@pytest.fixture(name="part")
+def _part() -> Callable[..., Any]:
+    """The only part result with a name."""
+
+    def part(report: InertiaReport, name: str) -> Any:
+        (found,) = [p for _, p in report.parts() if p.name == name]
+        return found
+
+    return part
+
+
+@pytest.fixture(name="at")
+def _at() -> Callable[..., Any]:
+    """``at(x, y, z)``: a placement."""
+    return lambda *xyz, turn=None: placement(xyz, turn)

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""FreeCAD's material cards: both formats, their traps, and a real installation where there is one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from silo.inertia.materials.cards import card_folders, read_cards
+
+INI = """; (c) somebody
+[General]
+Name = Steel-Generic
+Description = generic
+[Mechanical]
+Density = 7900 kg/m^3
+"""
+YAML = """---
+General:
+  UUID: "68b152b2-fd5e-4f10-8db0-1a2df3fe0fda"
+  Name: "Aluminum 6061-T6"
+Models:
+  LinearElastic:
+    UUID: '7b561d1d-fb9b-44f6-9da9-56a4f74d7536'
+    Density: "2700 kg/m^3"
+"""
+HEIR = """---
+General:
+  UUID: "11111111-fd5e-4f10-8db0-1a2df3fe0fda"
+  Name: "Aluminum heir"
+Inherits:
+  Aluminum:
+    UUID: "68b152b2-fd5e-4f10-8db0-1a2df3fe0fda"
+"""
+
+
+def cards(tmp_path: Path, **texts: str) -> dict[str, float]:
+    for name, text in texts.items():
+        (tmp_path / f"{name}.FCMat").write_text(text, "utf-8")
+    return {card.name: card.density for card in read_cards([tmp_path])}
+
+
+def test_both_formats_and_inheritance(tmp_path: Path) -> None:
+    """INI of 0.20, YAML of 1.0, and a card that inherits its density."""
+    found = cards(tmp_path, a=INI, b=YAML, c=HEIR)
+    assert found == {"Steel-Generic": 7900, "Aluminum 6061-T6": 2700, "Aluminum heir": 2700}
+
+
+@pytest.mark.parametrize("density", ["1 kg/m^3", "0 kg/m^3", "1.204 kg/m^3", "x,000 kg/m^3"])
+def test_cards_that_are_no_material(tmp_path: Path, density: str) -> None:
+    """FreeCAD 1.0's "Default" (1 kg/m^3) and "None" (0), air, and 0.20's unreadable graphite."""
+    assert cards(tmp_path, a=YAML.replace("2700 kg/m^3", density)) == {}
+
+
+def test_a_ring_of_inheritance_ends(tmp_path: Path) -> None:
+    """Two cards that inherit from each other have no density, and the reader returns."""
+    other = (
+        HEIR.replace("68b152b2", "22222222", 1)
+        .replace("11111111", "68b152b2")
+        .replace("22222222", "11111111")
+    )
+    assert cards(tmp_path, a=HEIR, b=other) == {}
+
+
+def test_folders_by_environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """FREECAD_MATERIALS comes first; folders that do not exist are left out."""
+    monkeypatch.setenv("FREECAD_MATERIALS", f"{tmp_path}:{tmp_path}/none")
+    assert card_folders()[0] == tmp_path
+    assert tmp_path / "none" not in card_folders()
+
+
+@pytest.mark.freecad
+def test_a_real_freecad() -> None:
+    """An installed FreeCAD's cards: steel is there, and nothing has the density of a gas."""
+    roots = [*Path.home().glob(".cache/silo-mod/freecad/*/usr/share/freecad/Mod/Material"), *card_folders()]
+    if not roots:
+        pytest.skip("no FreeCAD with material cards on this machine")
+    for root in roots:
+        found = {card.name: card.density for card in read_cards([root])}
+        assert len(found) > 100
+        assert found["Steel-Generic"] == pytest.approx(7900)
+        assert "Default" not in found
+        assert min(found.values()) > 5

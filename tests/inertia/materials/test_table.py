@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Case 35: densities by whole words, never by parts of words."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from silo.bom.errors import ConfigError
+from silo.inertia.materials import Found, Material, MaterialHit, MaterialMiss, MaterialTable, load_materials
+from silo.inertia.materials.density import parse_density
+from silo.inertia.materials.files import package_rows
+
+# The spec's table, Task 3.
+SPEC = {
+    "aluminum": 2700, "aluminium": 2700, "steel": 7850, "stainless steel": 8000, "brass": 8500,
+    "copper": 8960, "titanium": 4500, "abs": 1050, "pla": 1250, "petg": 1270, "nylon": 1150, "pc": 1200,
+    "polycarbonate": 1200,
+    "acrylic": 1180, "pmma": 1180, "hdpe": 970, "pp": 905, "pom": 1410, "delrin": 1410, "ppa-cf": 1400,
+    "nylon-cf": 1200, "carbon fiber": 1600, "fiberglass": 1900, "rubber": 1100, "silicone": 1100, "tpu": 1200,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SPEC)
+def test_the_specs_materials(materials: MaterialTable, name: str) -> None:
+    """Every material of the spec has the spec's density, under its own name."""
+    hit = materials.find(name)
+    assert isinstance(hit, MaterialHit)
+    assert hit.material.density == SPEC[name]
+    assert hit.found is Found.NAME
+    assert hit.material.source
+
+
+@pytest.mark.parametrize(
+    ("text", "density"),
+    [
+        ("Aluminum - 6061", 2700),
+        ("Aluminium 6082-T6", 2700),
+        ("EN AW-7075 T651", 2810),
+        ("AISI 304", 8000),
+        ("Stainless Steel 316L", 8000),
+        ("Edelstahl 1.4301", 8000),
+        ("Steel - AISI 1020", 7850),
+        ("Zinc plated steel", 7850),
+        ("Steel, zinc plated", 7850),
+        ("anodized aluminum", 2700),
+        ("FR4", 1850),
+        ("PCB", 1850),
+        ("PCB FR4", 1850),
+        ("PLA+", 1250),
+        ("PC", 1200),
+        ("PC/ABS", 1130),
+        ("ABS Plastic", 1050),
+        ("Polypropylene", 905),
+        ("Magnesium", 1740),
+        ("Tungsten", 19300),
+        ("Lead", 11340),
+        ("Plexiglass", 1180),
+        ("POM-C, black", 1410),
+        ("Messing", 8500),
+        ("不锈钢", 8000),
+        ("ＡＢＳ", 1050),
+        ("Ti-6Al-4V", 4430),
+        ("pa12-cf", 1200),
+    ],
+)
+def test_texts_that_name_a_material(materials: MaterialTable, text: str, density: float) -> None:
+    """Alloys, standards' numbers, other languages, platings, colours."""
+    hit = materials.find(text)
+    assert isinstance(hit, MaterialHit), hit
+    assert hit.material.density == density
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "A",
+        "Environment coating",  # holds "iron"
+        "Scfoam",  # holds "cf"
+        "Aluminum foam",
+        "lead free solder",
+        "Nylon glass filled",
+        "PA6-GF30",
+        "PETG-CF",
+        "LW-PLA",
+        "Brass/Steel",
+        "Nickel silver",
+        "Silver paint",
+        "Titanium dioxide",
+        "Unobtainium",
+        "Default",
+        "---",
+    ],
+)
+def test_texts_that_only_look_like_one(materials: MaterialTable, text: str) -> None:
+    """A part of a word, a filled or foamed plastic, two materials at once: no guess, and a reason."""
+    miss = materials.find(text)
+    assert isinstance(miss, MaterialMiss), miss
+    assert miss.reason
+
+
+def test_rows_of_the_package_are_sound() -> None:
+    """Names are unique, densities are those of solids, sources are named, families exist."""
+    rows = package_rows()
+    names = [row.name for row in rows]
+    assert len(set(names)) == len(names)
+    assert all(50 < row.density < 23_000 for row in rows)
+    assert all(row.source for row in rows)
+    assert {row.family for row in rows if row.family} <= set(names)
+
+
+def test_no_alias_names_two_densities() -> None:
+    """An alias of two rows would decide by the order of a file."""
+    from silo.inertia.materials.words import words
+
+    seen: dict[tuple[str, ...], Material] = {}
+    for row in package_rows():
+        for alias in (row.name, *row.aliases):
+            other = seen.setdefault(words(alias), row)
+            assert other is row, f"“{alias}” is {row.name} and {other.name}"
+
+
+def test_user_table_wins(tmp_path: Path) -> None:
+    """CSV with a density unit in the header, TOML in both forms; the last file wins over the first."""
+    csv = tmp_path / "ours.csv"
+    csv.write_text("name,density (g/cm3),aliases\nsteel,7.7,\nour alloy,2.81,OA 5; oa-five\n", "utf-8")
+    toml = tmp_path / "ours.toml"
+    toml.write_text(
+        '[materials]\n"foam core" = 60\nsteel = "7.6 g/cm3"\n'
+        'resin = { density = 1150, aliases = ["tough 2000"] }\n',
+        "utf-8",
+    )
+    table = load_materials([csv, toml], freecad=False)
+
+    def density(text: str) -> float:
+        hit = table.find(text)
+        assert isinstance(hit, MaterialHit)
+        return hit.material.density
+
+    assert density("steel") == pytest.approx(7600)
+    assert density("OA-5") == pytest.approx(2810)
+    assert density("Foam core") == 60
+    assert density("Tough 2000 (grey)") == 1150
+    assert density("brass") == 8500
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("a.csv", "material,rho\nsteel,7850\n", "wanted columns “name” and “density”"),
+        ("a.csv", "name,density\nsteel,heavy\nlead,-3\n", "line 2.*line 3"),
+        ("a.csv", "name,density (stone)\nsteel,1\n", "unknown density unit"),
+        ("a.toml", "materials = 3\n", r"\[materials\]"),
+        ("a.toml", "[materials\n", "no TOML"),
+        ("a.xls", "", r"\.csv or \.toml"),
+    ],
+)
+def test_bad_user_tables_are_plain_errors(tmp_path: Path, name: str, text: str, words: str) -> None:
+    """All bad rows at once, with their lines."""
+    path = tmp_path / name
+    path.write_text(text, "utf-8")
+    with pytest.raises(ConfigError, match=words):
+        load_materials([path], freecad=False)
+
+
+def test_a_missing_user_table_is_a_plain_error(tmp_path: Path) -> None:
+    """With its path."""
+    with pytest.raises(ConfigError, match=r"none\.csv"):
+        load_materials([tmp_path / "none.csv"])
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("7900 kg/m^3", 7900),
+        ("1200,00 kg/m^3", 1200),
+        ("1.204 kg/m^3", 1.204),
+        ("1,19 g/cm³", 1190),
+        ("0.2852 lb/in3", 7894.308823),
+        ("7850", 7850),
+        ("7.85 t/m3", 7850),
+        ("x,000 kg/m^3", None),
+        ("0 kg/m^3", None),
+        ("-3", None),
+        ("7 stones/barrel", None),
+    ],
+)
+def test_densities(text: str, value: float | None) -> None:
+    """Units of cards and of people; what cannot be read is None."""
+    assert parse_density(text) == (pytest.approx(value, rel=1e-5) if value is not None else None)
+
+
+def test_cards_come_last(materials: Any) -> None:
+    """A FreeCAD card fills a gap of the table and never overrides it; only its whole name counts."""
+    cards = (Material("Steel", 7777), Material("Reinforcement-Harry", 7850), Material("Wood", 700))
+    table = MaterialTable(materials.layers, lambda: cards)
+    steel, harry = table.find("Steel"), table.find("reinforcement harry")
+    assert isinstance(steel, MaterialHit)
+    assert isinstance(harry, MaterialHit)
+    assert steel.material.density == 7850
+    assert harry.found is Found.CARD
+    assert isinstance(table.find("Wood screw thing"), MaterialMiss)
