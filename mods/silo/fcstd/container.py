@@ -1,0 +1,247 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The zip container of an FCStd file, read without trust (APPNOTE.TXT 4.3).
+
+The standard ``zipfile`` builds an object for each of the two entries per link that FreeCAD writes, and cannot
+copy an entry as it stands; both matter here, for a quick walk and for stamping. The central directory is the
+authority, the local header must agree with it. ZIP64, encryption and methods other than stored and deflated
+are refused: FreeCAD writes none of them and cannot read them.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Iterator
+from struct import Struct
+from typing import NamedTuple
+
+from silo.bom.findings import FindingCode
+from silo.fcstd.limits import Limits
+from silo.fcstd.problem import FcstdError
+
+DOCUMENT_XML = b"Document.xml"
+
+# signature, versions, flags, method, time, date, crc, packed, size, name, extra, comment, disk, attributes,
+# offset
+CENTRAL = Struct("<4sHHHHHHLLLHHHHHLL")
+_LENGTHS = Struct("<HHH")
+LOCAL = Struct("<4sHHHHHLLLHH")
+# signature, disk, disk of directory, entries here, entries, size of directory, its offset, comment length
+END = Struct("<4sHHHHLLH")
+
+_CENTRAL_MARK = b"PK\x01\x02"
+_LOCAL_MARK = b"PK\x03\x04"
+_END_MARK = b"PK\x05\x06"
+_LFS_MARK = b"version https://git-lfs.github.com/spec/"
+_TAIL = END.size + 0xFFFF
+_ENCRYPTED = 0x1 | 0x40 | 0x2000
+STORED, _DEFLATED = 0, 8
+
+
+class FileState(NamedTuple):
+    """What tells one state of a file from another without reading it."""
+
+    device: int
+    inode: int
+    size: int
+    modified_ns: int
+
+    @classmethod
+    def of(cls, status: os.stat_result) -> FileState:
+        """From ``os.stat`` or ``os.fstat``."""
+        return cls(status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)
+
+
+class Entry(NamedTuple):
+    """One file in the container, as the central directory has it. ``offset`` counts from the file's begin."""
+
+    name: bytes
+    flags: int
+    method: int
+    crc: int
+    packed: int
+    size: int
+    offset: int
+    central: int  # where its record begins in the directory
+
+
+class Directory(NamedTuple):
+    """The central directory: raw, since most readers want one entry of thousands."""
+
+    raw: bytes
+    entry_count: int
+    offset: int  # of the directory in the file
+    shift: int  # bytes before the zip's own begin, which its offsets do not count
+    tail: bytes  # end record, comment, and whatever follows
+
+    def entries(self, wanted: bytes | None = None) -> Iterator[Entry]:
+        """The entries in directory order, or only those of one name. Raises ValueError where it is
+        damaged."""
+        raw, position = self.raw, 0
+        for _ in range(self.entry_count):
+            if raw[position : position + 4] != _CENTRAL_MARK or position + CENTRAL.size > len(raw):
+                raise ValueError("its directory is damaged")
+            name_length, extra, comment = _LENGTHS.unpack_from(raw, position + 28)
+            name_at = position + CENTRAL.size
+            name = raw[name_at : name_at + name_length]
+            if wanted is None or name == wanted:
+                yield self._entry(name, position)
+            position = name_at + name_length + extra + comment
+        if position > len(raw):
+            raise ValueError("its directory is damaged")
+
+    def _entry(self, name: bytes, position: int) -> Entry:
+        fields = CENTRAL.unpack_from(self.raw, position)
+        flags, method, crc, packed, size, offset = fields[3], fields[4], *fields[7:10], fields[16]
+        if 0xFFFFFFFF in (packed, size, offset):
+            raise ValueError("it is in the ZIP64 format, which FreeCAD does not write")
+        return Entry(name, flags, method, crc, packed, size, offset + self.shift, position)
+
+
+class ContainerFile:
+    """An open container. Use it as a context manager; ``path`` is for messages and is not opened again."""
+
+    def __init__(self, path: str, limits: Limits) -> None:
+        self.path = path
+        self.limits = limits
+        self._descriptor = _open(path)
+        self._window, self._window_at = b"", 0
+        self.state = FileState(0, 0, 0, 0)
+        try:
+            self.state = self._regular_file()
+            length = min(self.state.size, _TAIL)
+            window_at = self.state.size - length
+            self._window, self._window_at = self._read(window_at, length), window_at
+            self.directory = self._directory()
+        except BaseException:
+            os.close(self._descriptor)
+            raise
+
+    def __enter__(self) -> ContainerFile:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        os.close(self._descriptor)
+
+    def changed(self) -> bool:
+        """True where somebody wrote into this very file since it was opened."""
+        return FileState.of(os.fstat(self._descriptor)) != self.state
+
+    def entry(self, name: bytes) -> Entry | None:
+        """The entry of this name, None where there is none; two of one name are refused."""
+        try:
+            found = list(self.directory.entries(name))
+        except ValueError as error:
+            raise self._error(str(error)) from error
+        if len(found) > 1:
+            raise self._error(f"it holds {len(found)} entries named {name.decode('ascii', 'replace')}")
+        return found[0] if found else None
+
+    def packed(self, entry: Entry, most: int) -> bytes:
+        """The packed bytes of an entry, at most ``most``."""
+        self._check(entry, most)
+        return self._read(self.data_offset(entry), entry.packed)
+
+    def data_offset(self, entry: Entry) -> int:
+        """Where an entry's packed bytes begin; the local header must be that of the same entry."""
+        header = self._read(entry.offset, LOCAL.size)
+        fields = LOCAL.unpack(header)
+        name_at = entry.offset + LOCAL.size
+        begin: int = name_at + fields[9] + fields[10]
+        if fields[0] != _LOCAL_MARK or begin + entry.packed > self.directory.offset:
+            raise self._error("it is damaged: an entry lies outside its place")
+        if self._read(name_at, fields[9]) != entry.name:
+            raise self._error("it is damaged: its directory and its entries disagree")
+        return begin
+
+    def read(self, offset: int, length: int) -> bytes:
+        """Bytes of the file as it stands."""
+        return self._read(offset, length)
+
+    def _check(self, entry: Entry, most: int) -> None:
+        name = entry.name.decode("utf-8", "replace")
+        if entry.flags & _ENCRYPTED:
+            raise self._error(f"its {name} is encrypted")
+        if entry.method not in (STORED, _DEFLATED):
+            raise self._error(f"its {name} is packed by method {entry.method}, which FreeCAD does not use")
+        if entry.packed > most:
+            raise self._error(f"its {name} is too large: {entry.packed} bytes packed, at most {most}")
+
+    def _regular_file(self) -> FileState:
+        status = os.fstat(self._descriptor)
+        if not stat.S_ISREG(status.st_mode):
+            kind = "a folder" if stat.S_ISDIR(status.st_mode) else "no regular file"
+            raise self._error(f"it is {kind}, not a FreeCAD document")
+        return FileState.of(status)
+
+    def _directory(self) -> Directory:
+        window = self._window
+        position = window.rfind(_END_MARK)
+        while position >= 0:
+            if position + END.size <= len(window):
+                fields = END.unpack_from(window, position)
+                if position + END.size + fields[7] <= len(window):
+                    return self._directory_at(self._window_at + position, fields)
+            position = window.rfind(_END_MARK, 0, position)
+        raise self._no_container()
+
+    def _directory_at(self, end: int, fields: tuple[int, ...]) -> Directory:
+        _, disk, first_disk, here, count, size, offset, _ = fields
+        if 0xFFFFFFFF in (size, offset) or count == 0xFFFF:
+            raise self._error("it is in the ZIP64 format, which FreeCAD does not write")
+        shift = end - size - offset
+        sane = not disk and not first_disk and here == count and shift >= 0
+        if not sane or count > self.limits.entries or size > self.limits.packed:
+            raise self._error("its zip directory is damaged or absurdly large")
+        raw = self._read(end - size, size)
+        return Directory(raw, count, end - size, shift, self._window[end - self._window_at :])
+
+    def _no_container(self) -> FcstdError:
+        if self._read(0, min(self.state.size, len(_LFS_MARK))) == _LFS_MARK:
+            return FcstdError(
+                self.path,
+                "it is a Git LFS pointer, not the file itself; fetch it with `git lfs pull`",
+                FindingCode.LFS_POINTER,
+            )
+        if self.state.size == 0:
+            return self._error("it is empty")
+        if self._read(0, min(4, self.state.size)) == _LOCAL_MARK:
+            return self._error("it is cut short: the end of its zip container is missing")
+        return self._error("it is no FreeCAD document (no zip container)")
+
+    def _read(self, offset: int, length: int) -> bytes:
+        begin = offset - self._window_at
+        if begin >= 0 and begin + length <= len(self._window):
+            return self._window[begin : begin + length]
+        if offset + length > self.state.size:  # also keeps a claimed length from being allocated
+            raise self._error("it is cut short")
+        try:
+            os.lseek(self._descriptor, offset, os.SEEK_SET)
+            data = os.read(self._descriptor, length)
+            while len(data) < length and (more := os.read(self._descriptor, length - len(data))):
+                data += more
+        except OSError as error:
+            raise self._error(f"it cannot be read: {_reason(error)}") from error
+        if len(data) < length:
+            raise self._error("it is cut short")
+        return data
+
+    def _error(self, reason: str) -> FcstdError:
+        return FcstdError(self.path, reason, state=self.state)
+
+
+def _reason(error: Exception) -> str:
+    return getattr(error, "strerror", None) or str(error)
+
+
+def _open(path: str) -> int:
+    # Without O_NONBLOCK, opening a named pipe waits until somebody writes to it.
+    flags = (
+        os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
+    )
+    try:
+        return os.open(path, flags)
+    except (FileNotFoundError, NotADirectoryError) as error:
+        raise FcstdError(path, "there is no such file", FindingCode.MISSING_FILE) from error
+    except (OSError, ValueError) as error:
+        raise FcstdError(path, f"it cannot be opened: {_reason(error)}") from error

@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""A document as FreeCAD's Python shows it, read from the file."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping
+from functools import cached_property
+from struct import Struct
+from typing import TYPE_CHECKING, Any, cast
+
+from silo.bom.document import LinkProblem
+from silo.bom.findings import FindingCode
+from silo.fcstd.container import ContainerFile, Directory, Entry, FileState
+from silo.fcstd.inflate import Inflater
+from silo.fcstd.locate import Found
+from silo.fcstd.objects import FcstdObject
+from silo.fcstd.problem import FcstdError
+from silo.fcstd.properties import Properties
+from silo.fcstd.typetree import ancestors
+from silo.fcstd.values import ABSENT, Ref, Vector
+from silo.fcstd.xmltext import XmlText
+
+if TYPE_CHECKING:
+    from silo.fcstd.library import Library
+
+# Objects of these types are read together with the rest of their file, for a walker looks at what they hold.
+_CONTAINERS = frozenset({"App::Part", "App::LinkGroup", "App::DocumentObjectGroup"})
+_SIZE = Struct("<I")
+_DOUBLES, _FLOATS = Struct("<3d"), Struct("<3f")
+
+
+class FcstdDocument:
+    """One FCStd file. ``FileName`` is absolute and without symlinks.
+
+    Document properties (``Label``, ``Uid``, ``Meta``, ``Comment``, own ones of FreeCAD >= 0.21) are
+    attributes.
+    """
+
+    FileName: str
+
+    def __init__(
+        self, library: Library, found: Found, xml: XmlText, directory: Directory, state: FileState
+    ) -> None:
+        self.FileName = found.real
+        self._library, self._found, self._xml = library, found, xml
+        self._directory, self.state = directory, state
+        self._table: Properties | None = None
+        self._objects: dict[str, FcstdObject] = {}
+        self._targets: dict[tuple[str, str], FcstdObject | LinkProblem] = {}
+        self.values: dict[bytes, Any] = {}
+
+    @cached_property
+    def Name(self) -> str:
+        """The internal name that FreeCAD would give: the file's, in ASCII letters, digits and ``_``."""
+        stem = os.path.splitext(os.path.basename(self.FileName))[0]
+        name = re.sub(r"[^A-Za-z0-9_]", "_", stem)
+        return f"_{name}" if name[:1].isdigit() else name or "Unnamed"
+
+    @cached_property
+    def ProgramVersion(self) -> str:
+        """The FreeCAD that wrote the file, such as ``1.0R39319 (Git)``."""
+        return self._xml.attribute("ProgramVersion")
+
+    @property
+    def Meta(self) -> Mapping[str, str]:
+        """Free texts by key, empty where the file has none."""
+        value = self.__dict__.get("_meta")
+        if value is None:
+            value = self._value("Meta")
+            value = self.__dict__["_meta"] = value if isinstance(value, dict) else {}
+        return cast("Mapping[str, str]", value)
+
+    @cached_property
+    def Objects(self) -> tuple[FcstdObject, ...]:
+        """All objects, in document order."""
+        self.complete()
+        return tuple(self._object(name, kind) for name, kind in self._xml.head.types.items())
+
+    @property
+    def PropertiesList(self) -> tuple[str, ...]:
+        """The names of the document's own properties, as far as the file holds them."""
+        return self.properties.names
+
+    def getObject(self, name: str) -> FcstdObject | None:
+        """The object of this ``Name`` (never a label), None where there is none."""
+        known = self._objects.get(name)
+        if known is None and (kind := self._xml.head.types.get(name)) is not None:
+            known = self._object(name, kind)
+        return known
+
+    def getPropertyByName(self, name: str) -> Any:
+        """A document property. AttributeError where there is none, or none with a plain value."""
+        value = self._value(name)
+        if value is ABSENT:
+            raise AttributeError(f"the document {self.FileName} has no readable property {name!r}")
+        return value
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        try:
+            value = self.getPropertyByName(name)
+        except AttributeError:
+            if name != "Label":
+                raise
+            value = os.path.splitext(os.path.basename(self.FileName))[0]
+        self.__dict__[name] = value
+        return value
+
+    def __repr__(self) -> str:
+        return f"<document {self.FileName}>"
+
+    # For the objects of this document and the session; a walker has no use for what follows.
+
+    def complete(self) -> None:
+        """Read the file to its end and check it. Raises DocumentError."""
+        self._xml.complete()
+
+    @cached_property
+    def folders(self) -> tuple[str, ...]:
+        """Where the paths of links begin: the folder as the file was opened, then the one without
+        symlinks."""
+        found = self._found
+        return tuple(dict.fromkeys((os.path.dirname(found.opened), os.path.dirname(found.real))))
+
+    def check(self, target: FcstdObject) -> None:
+        """Make sure that what a walker asks of a link's target can be read. Raises DocumentError."""
+        if not _CONTAINERS.isdisjoint(ancestors(target.TypeId)):
+            self._xml.complete()
+        _ = target.properties, self.properties
+
+    @property
+    def properties(self) -> Properties:
+        """The property table of the document itself."""
+        if self._table is None:
+            self._table = Properties(self._xml, self._xml.head.properties, "")
+        return self._table
+
+    def properties_of(self, obj: FcstdObject) -> Properties:
+        """The property table of an object of this document."""
+        span = self._xml.span(obj.Name)
+        if span is None:
+            raise self._xml.error(f"does not hold the data of the object {obj.Name!r}")
+        return Properties(self._xml, span, obj.TypeId)
+
+    def resolve(self, ref: Ref) -> FcstdObject | None:
+        """The object that a link means, None where it is unset or broken."""
+        if not ref.file and (local := self._objects.get(ref.name)) is not None:
+            return local
+        found = self._target(ref)
+        return found if isinstance(found, FcstdObject) else None
+
+    def problem_of(self, ref: Ref) -> LinkProblem | None:
+        """Why ``resolve`` gives None."""
+        found = self._target(ref)
+        return found if isinstance(found, LinkProblem) else None
+
+    def vectors(self, entry_name: str) -> tuple[Vector, ...]:
+        """A list of vectors from its side entry (``PropertyVectorList::RestoreDocFile``)."""
+        if not entry_name:
+            return ()
+        entry = self._entries.get(entry_name.encode())
+        if entry is None:
+            raise FcstdError(self.FileName, f"its {entry_name} is missing")
+        if entry.size <= _SIZE.size:  # an empty list; there is one for every link
+            return ()
+        data = self._side_entry(entry)
+        # Files of FileVersion 0 have single precision (src/App/PropertyGeo.cpp).
+        form = _DOUBLES if self._xml.attribute("FileVersion", "0") != "0" else _FLOATS
+        (count,) = _SIZE.unpack_from(data)
+        if len(data) != _SIZE.size + count * form.size:
+            raise FcstdError(self.FileName, f"its {entry_name} is damaged (its length is wrong)")
+        return tuple(Vector(*numbers) for numbers in form.iter_unpack(data[_SIZE.size :]))
+
+    @cached_property
+    def _entries(self) -> dict[bytes, Entry]:
+        try:
+            return {entry.name: entry for entry in self._directory.entries()}
+        except ValueError as error:
+            raise FcstdError(self.FileName, str(error)) from error
+
+    def _value(self, name: str) -> Any:
+        value = self.properties.value(name)
+        return value if isinstance(value, str | int | float | dict | tuple) else ABSENT
+
+    def _object(self, name: str, kind: str) -> FcstdObject:
+        known = self._objects.get(name)
+        if known is None:
+            known = self._objects[name] = FcstdObject(self, name, kind)
+        return known
+
+    def _target(self, ref: Ref) -> FcstdObject | LinkProblem:
+        key = (ref.file, ref.name)
+        known = self._targets.get(key)
+        if known is None:
+            known = self._targets[key] = self._find_target(ref)
+        return known
+
+    def _find_target(self, ref: Ref) -> FcstdObject | LinkProblem:
+        if not ref.name:
+            code = FindingCode.MISSING_OBJECT if ref.file else FindingCode.UNSET_LINK
+            return LinkProblem(code, ref.file)
+        if ref.file:
+            return self._library.follow(self, ref)
+        found = self.getObject(ref.name)
+        return found or LinkProblem(FindingCode.MISSING_OBJECT, "", ref.name)
+
+    def _side_entry(self, entry: Entry) -> bytes:
+        limits = self._xml.limits
+        with ContainerFile(self.FileName, limits) as container:
+            if container.state != self.state:
+                raise FcstdError(self.FileName, "it was changed while it was being read; read it again")
+            packed = container.packed(entry, limits.packed)
+            return Inflater(self.FileName, entry, packed, limits.side_entry, limits).rest()

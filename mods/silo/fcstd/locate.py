@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""From the path that a link records to a file on disk.
+
+FreeCAD records paths relative to the folder of the owning file as it was opened, always with ``/``, and joins
+them as text: ``..`` takes one name away, symlinks are not followed first (``src/App/PropertyLinks.cpp``,
+observed with FreeCAD 0.20). We do the same, and try the folder where the owning file really lies after that.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+import unicodedata
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from silo.bom.findings import FindingCode
+
+_URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+://")
+_LONGEST, _DEEPEST = 4096, 128
+_FOLDER_AT_MOST = 50_000
+
+
+class Found(NamedTuple):
+    """A file. ``opened`` is the path as FreeCAD would open it, ``real`` has no symlinks in it."""
+
+    opened: str
+    real: str
+    respelt: bool = False
+
+
+class NotFound(NamedTuple):
+    """Why there is no file to open."""
+
+    code: FindingCode
+    detail: str = ""
+
+
+@dataclass
+class Locator:
+    """Finds linked files, all below ``root`` where one is given; remembers folders for one session."""
+
+    root: str | None = None
+    _real_folders: dict[str, str] = field(default_factory=dict)
+    _listings: dict[str, dict[str, list[str]]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.root is not None:
+            self.root = os.path.realpath(self.root)
+
+    def real(self, path: str) -> str:
+        """``os.path.realpath``, with the folders remembered."""
+        return self._look(path)[0]
+
+    def _look(self, path: str) -> tuple[str, bool]:
+        """The path without symlinks, and whether anything is there."""
+        folder, name = os.path.split(path)
+        real_folder = self._real_folders.get(folder)
+        if real_folder is None:
+            real_folder = self._real_folders[folder] = os.path.realpath(folder)
+        candidate = os.path.join(real_folder, name)
+        try:
+            if not stat.S_ISLNK(os.lstat(candidate).st_mode):
+                return candidate, True
+        except (OSError, ValueError):
+            return candidate, False
+        real = os.path.realpath(candidate)
+        return real, os.path.lexists(real)
+
+    def inside(self, real_path: str) -> bool:
+        """True where a path without symlinks may be read."""
+        root = self.root
+        return root is None or real_path == root or real_path.startswith(os.path.join(root, ""))
+
+    def find(self, recorded: str, folders: tuple[str, ...]) -> Found | NotFound:
+        """The file that a link in a document of (one of) these folders means."""
+        if "://" in recorded and _URL.match(recorded):
+            return NotFound(FindingCode.MISSING_FILE, "it is a web address; only files are read")
+        if recorded.startswith(("//", "\\\\")):
+            # On Windows the mere look would send the user's credentials to that host.
+            return NotFound(FindingCode.OUTSIDE_ROOT, "it is on the network, by an absolute path")
+        if "\0" in recorded or len(recorded) > _LONGEST:
+            return NotFound(FindingCode.MISSING_FILE, "its path cannot be one")
+        outside = False
+        for path in _candidates(recorded, folders):
+            real, there = self._look(path)
+            if not self.inside(real):
+                outside = True
+            elif there:
+                return Found(path, real)
+        if outside:
+            return NotFound(FindingCode.OUTSIDE_ROOT)
+        if recorded.count("/") > _DEEPEST:
+            return NotFound(FindingCode.MISSING_FILE)
+        return self._respelt(recorded, folders)
+
+    def _respelt(self, recorded: str, folders: tuple[str, ...]) -> Found | NotFound:
+        """Written on Windows or macOS, where ``Part.FCStd`` opens ``part.FCStd``: taken if only one fits."""
+        for path in _candidates(recorded, folders):
+            matches = list(self._spellings(path))
+            if len(matches) > 1:
+                names = ", ".join(sorted(os.path.basename(match) for match in matches[:4]))
+                return NotFound(
+                    FindingCode.MISSING_FILE, f"several files differ from it in case only: {names}"
+                )
+            if matches and self.inside(real := self.real(matches[0])):
+                return Found(matches[0], real, respelt=True)
+        return NotFound(FindingCode.MISSING_FILE)
+
+    def _spellings(self, path: str) -> Iterator[str]:
+        folder, name = os.path.split(path)
+        if not name or folder == path:
+            return
+        if os.path.isdir(folder):
+            parents = [folder]
+        else:
+            parents = [p for p in self._spellings(folder) if os.path.isdir(p)][:2]
+        for parent in parents:
+            if self.inside(os.path.realpath(parent)):
+                for match in self._listing(parent).get(_folded(name), ()):
+                    yield os.path.join(parent, match)
+
+    def _listing(self, folder: str) -> dict[str, list[str]]:
+        known = self._listings.get(folder)
+        if known is None:
+            known = self._listings[folder] = {}
+            try:
+                with os.scandir(folder) as found:
+                    for _, item in zip(range(_FOLDER_AT_MOST), found, strict=False):
+                        known.setdefault(_folded(item.name), []).append(item.name)
+            except OSError:
+                pass  # a folder that cannot be listed shows nothing
+        return known
+
+
+def _folded(name: str) -> str:
+    return unicodedata.normalize("NFC", name).casefold()
+
+
+def _candidates(recorded: str, folders: tuple[str, ...]) -> Iterator[str]:
+    spellings = (recorded, recorded.replace("\\", "/")) if "\\" in recorded else (recorded,)
+    for spelling in spellings:
+        for folder in folders:
+            yield os.path.normpath(os.path.join(folder, spelling))

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Document.xml with one more item in the document's ``Meta`` map; every other byte of it stays.
+
+Where things are is asked of expat, so comments, other quotes and another order of attributes do no harm.
+"""
+
+from __future__ import annotations
+
+import re
+from xml.sax.saxutils import escape
+
+from silo.fcstd import careful
+from silo.fcstd.careful import Malformed, Node
+
+_MORE = {'"': "&quot;", "'": "&apos;", "\n": "&#10;", "\r": "&#13;", "\t": "&#9;"}
+_COUNT = re.compile(rb"""(<Properties\b[^<>]*?\sCount\s*=\s*["'])(\d+)(["'])""")
+
+
+def with_meta(text: bytes, key: str, value: str, depth_limit: int) -> bytes:
+    """The text with ``Meta[key] = value``. Raises ValueError where it cannot be edited (says why)."""
+    if careful.as_utf8(text) is not text:
+        raise Malformed("is not in UTF-8")
+    head, _ = careful.index_document(text, depth_limit)
+    if head.properties is None:
+        raise Malformed("has no document properties")
+    begin, end = head.properties
+    element = text[begin:end]
+    spans = careful.index_properties(element, depth_limit)
+    if "Meta" in spans:
+        first, last = spans["Meta"]
+        items = _items(careful.parse_value(element[first:last], depth_limit))
+        items[key] = value
+        element = element[:first] + _property(element[first:last], items) + element[last:]
+    else:
+        element = _with_property(element, {key: value})
+    return text[:begin] + element + text[end:]
+
+
+def _items(prop: Node) -> dict[str, str]:
+    maps = [child for child in prop.children if child.tag == "Map"]
+    items = (child.attributes for child in (maps[0].children if maps else ()) if child.tag == "Item")
+    return {item["key"]: item.get("value", "") for item in items if "key" in item}
+
+
+def _property(old: bytes, items: dict[str, str]) -> bytes:
+    """The property with other items; its own start tag is kept."""
+    start = _start_tag(old)
+    return start.rstrip(b"/> \t\r\n") + b">" + _map(items) + b"\n        </Property>"
+
+
+def _start_tag(element: bytes) -> bytes:
+    """The first tag; a ``>`` may stand inside its quotes."""
+    found = re.match(rb"""<(?:[^<>"']|"[^"]*"|'[^']*')*>""", element)
+    if found is None:
+        raise Malformed("has a property that cannot be edited")
+    return found[0]
+
+
+def _map(items: dict[str, str]) -> bytes:
+    # As FreeCAD lays it out (PropertyMap::Save); a std::map is written in the order of its keys' bytes.
+    lines = [f'\n            <Map count="{len(items)}">']
+    for key in sorted(items, key=str.encode):
+        lines.append(
+            f'\n                <Item key="{escape(key, _MORE)}" value="{escape(items[key], _MORE)}"/>'
+        )
+    return "".join((*lines, "\n            </Map>")).encode()
+
+
+def _with_property(element: bytes, items: dict[str, str]) -> bytes:
+    """The ``<Properties>`` element with a ``Meta`` at its end, and counted."""
+    start = _start_tag(element)
+    counted = _COUNT.sub(lambda m: m[1] + b"%d" % (int(m[2]) + 1) + m[3], start, count=1)
+    prop = (
+        b'    <Property name="Meta" type="App::PropertyMap">' + _map(items) + b"\n        </Property>\n    "
+    )
+    if start.endswith(b"/>"):
+        return counted[:-2].rstrip() + b">\n    " + prop + b"</Properties>"
+    close = element.rindex(b"</")
+    return counted + element[len(start) : close] + prop + element[close:]

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""A document object as FreeCAD's Python shows it, read from the file.
+
+Differences to a live object, on purpose: nothing is forwarded to a link's target, nothing can be written,
+lists are tuples, and a link without a target says why (``LinkProblem``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Any
+
+from silo.bom.document import LinkProblem as Problem
+from silo.fcstd.properties import Properties
+from silo.fcstd.typetree import ancestors
+from silo.fcstd.values import ABSENT, LocalList, Ref, RefList, SideEntry, Style
+
+if TYPE_CHECKING:
+    from silo.fcstd.document import FcstdDocument
+
+# Equal properties of a document are written in equal bytes (1000 links have one ElementCount), so values are
+# remembered by their bytes; long ones seldom repeat.
+_REMEMBER_AT_MOST = 1024
+
+
+class FcstdObject:
+    """One object of a document. Properties are attributes, under FreeCAD's names.
+
+    There is one ``FcstdObject`` per object of a document, so ``is``, ``==`` and ``hash`` tell objects apart.
+    Reading a property may raise DocumentError where the file turns out to be damaged.
+    """
+
+    Name: str
+    TypeId: str
+    Document: FcstdDocument
+    properties: Properties
+    """The table of what the file holds, for those that want to see more than values."""
+
+    def __init__(self, document: FcstdDocument, name: str, type_id: str) -> None:
+        self.Document = document
+        self.Name = name
+        self.TypeId = type_id
+        # A walker asks this most of all; so the set itself answers, in place of the method below.
+        self.__dict__["isDerivedFrom"] = ancestors(type_id).__contains__
+
+    def isDerivedFrom(self, type_name: str, /) -> bool:
+        """As FreeCAD: the type of the object itself, never of a link's target; False for unknown names."""
+        return type_name in ancestors(self.TypeId)
+
+    @property
+    def PropertiesList(self) -> tuple[str, ...]:
+        """The names of the properties that the file holds (FreeCAD lists its transient ones as well)."""
+        return self.properties.names
+
+    @property
+    def LinkProblem(self) -> Problem | None:
+        """Why ``LinkedObject`` is None; None where it is not, or where there is no such property."""
+        ref = self.properties.value("LinkedObject")
+        return self.Document.problem_of(ref) if isinstance(ref, Ref) else None
+
+    def getPropertyByName(self, name: str) -> Any:
+        """The value of a property. AttributeError where there is none, or none that is plain."""
+        if name not in self.properties.numbers:
+            raise AttributeError(f"{self.TypeId} {self.Name} has no property {name!r}")
+        return getattr(self, name)
+
+    def __getattr__(self, name: str) -> Any:
+        mine = self.__dict__
+        properties = mine.get("properties")
+        if properties is None:
+            self._load()
+            if name in mine:
+                return mine[name]
+            properties = self.properties
+        piece = properties.piece(name)
+        if piece is not None:
+            value = self._value(name, piece)
+        elif name == "Label":
+            value = self.Name
+        else:
+            raise AttributeError(name)
+        # The file does not change while it is open, so the next access need not come here.
+        mine[name] = value
+        return value
+
+    def _load(self) -> None:
+        mine = self.__dict__
+        properties = mine["properties"] = self.Document.properties_of(self)
+        known = self.Document.values
+        for name, piece in properties.kept.items():
+            if (value := known.get(piece, ABSENT)) is not ABSENT:
+                mine[name] = value
+
+    def __repr__(self) -> str:
+        return f"<{self.TypeId} {self.Name} of {self.Document.FileName}>"
+
+    def _value(self, name: str, piece: bytes) -> Any:
+        # A plain link has no elements, so no scales of elements; its entry need not be looked up.
+        if name == "ScaleList" and getattr(self, "ElementCount", None) == 0:
+            return ()
+        known = self.Document.values
+        if (value := known.get(piece, ABSENT)) is not ABSENT:
+            return value
+        value = self._resolved(self.properties.value(name))
+        if value is ABSENT:
+            raise AttributeError(f"{name}: {self.TypeId} {self.Name} has no such property with a plain value")
+        if len(piece) <= _REMEMBER_AT_MOST:
+            known[piece] = value
+        return value
+
+    def _resolved(self, value: Any) -> Any:
+        if isinstance(value, Ref):
+            return _with_subs(self.Document.resolve(value), value)
+        if isinstance(value, LocalList):
+            found = map(self.Document.getObject, value.names)
+            return tuple(target for target in found if target is not None)
+        if isinstance(value, RefList):
+            return tuple(self._members(value.refs))
+        if isinstance(value, SideEntry):
+            return self.Document.vectors(value.name)
+        return value
+
+    def _members(self, refs: Iterable[Ref]) -> Iterator[Any]:
+        for ref in refs:
+            if (target := self.Document.resolve(ref)) is not None:
+                yield _with_subs(target, ref)
+
+
+def _with_subs(target: FcstdObject | None, ref: Ref) -> Any:
+    if target is None or ref.style is Style.PLAIN:
+        return target
+    if ref.style is Style.MEMBER:
+        return (target, ref.subs)
+    if ref.style is Style.PAIR:
+        return (target, list(ref.subs))
+    if not ref.subs:
+        return target
+    return (target, ref.subs[0] if len(ref.subs) == 1 else list(ref.subs))

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The properties of one object, or of the document: the names at once, a value when it is asked for.
+
+The element is cut at every ``<Property name="``; one piece is then a property's name, type and value. FreeCAD
+writes the properties of equal objects in equal order, so the list of names seen last for a type is tried
+first.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+from silo.fcstd import careful
+from silo.fcstd.careful import Malformed, Node, Span
+from silo.fcstd.values import ABSENT, value_of
+from silo.fcstd.xmltext import XmlText
+
+_CUT = b'<Property name="'
+_CLOSING = b"</Property>"
+_COUNT = b'<Properties Count="'
+
+# A piece in FreeCAD's own form whose value is one element, empty or with empty elements in it; nearly all
+# that a BOM asks for. Nothing that expat would read in another way: no references, no white space to
+# normalise.
+_ATTRIBUTES = rb'((?: [\w:.-]+="[^"<&\r\n\t]*")*)'
+_CANONICAL = re.compile(
+    rb'([^"&]+)" type="([^"&]+)"[^<]*<(\w+)' + _ATTRIBUTES + rb"(?:/>|>\s*"
+    rb'((?:<\w+(?: [\w:.-]+="[^"<&\r\n\t]*")*/>\s*)*)</\3>)'
+    rb"\s*</Property>\s*(?:</Properties>\s*(?:</Object>)?)?\Z"
+)
+_CHILD = re.compile(r"<(\w+)([^<]*)/>")
+_ATTRIBUTE = re.compile(r' ([\w:.-]+)="([^"]*)"')
+
+# Kept when an element is cut; any other property is cut out again when somebody asks for it. The pieces of
+# all properties would be as much as the text itself.
+_KEPT = frozenset(
+    {
+        *("Base", "Count", "ElementCount", "ElementList", "Group", "Label", "LinkCopyOnChange"),
+        *("LinkCopyOnChangeSource", "LinkedObject", "Meta", "Scale", "ScaleList", "ScaleVector"),
+        *("SiloBomExclude", "SiloItemId", "SiloUUID", "Suppressed", "Type"),
+    }
+)
+
+
+class Shape(NamedTuple):
+    """A list of property names that many objects share. Piece 0 is what stands before the first property."""
+
+    names: tuple[str, ...]
+    prefixes: tuple[bytes, ...]
+    numbers: dict[str, int]
+    kept: tuple[tuple[str, int], ...]
+
+    @classmethod
+    def of(cls, names: Iterable[str]) -> Shape:
+        """The shape of these names, which must differ."""
+        listed = tuple(names)
+        numbers = {name: number for number, name in enumerate(listed, start=1)}
+        prefixes = (b"", *(f'{name}"'.encode() for name in listed))
+        return cls(listed, prefixes, numbers, tuple((n, numbers[n]) for n in listed if n in _KEPT))
+
+
+class Properties:
+    """The property table of one element of a document's XML. Reading may raise FcstdError."""
+
+    __slots__ = ("_careful", "_span", "_xml", "kept", "names", "numbers")
+
+    def __init__(self, xml: XmlText, span: Span | None, kind: str) -> None:
+        self._xml, self._span = xml, span or (0, 0)
+        self.names: tuple[str, ...] = ()
+        self.numbers: dict[str, int] = {}
+        self.kept: dict[str, bytes] = {}
+        self._careful = xml.is_careful
+        if span is not None:  # a foreign document may have no properties of its own
+            self._begin(kind)
+
+    def _begin(self, kind: str) -> None:
+        pieces = self._cut()
+        shape = None if self._careful else self._quick_shape(pieces, kind)
+        if shape is None:
+            self._careful = True
+            shape, pieces = self._careful_cut()
+        self.names, self.numbers = shape.names, shape.numbers
+        self.kept = {name: pieces[number] for name, number in shape.kept}
+
+    def piece(self, name: str) -> bytes | None:
+        """The bytes of a property, None where there is no such property. Equal bytes, equal value."""
+        piece = self.kept.get(name)
+        if piece is None and (number := self.numbers.get(name)) is not None:
+            piece = (self._careful_cut()[1] if self._careful else self._cut())[number]
+        return piece
+
+    def value(self, name: str) -> Any:
+        """The value, ABSENT where there is no such property or it has no plain value."""
+        piece = self.piece(name)
+        return ABSENT if piece is None else value_of(self._node(piece))
+
+    def _cut(self) -> list[bytes]:
+        begin, end = self._span
+        return self._xml.text[begin:end].split(_CUT)
+
+    def _quick_shape(self, pieces: list[bytes], kind: str) -> Shape | None:
+        count = len(pieces) - 1
+        before = pieces[0]
+        at = before.find(_COUNT) + len(_COUNT)
+        if at < len(_COUNT) or before[at : before.find(b'"', at)] != b"%d" % count:
+            return None
+        shapes = self._xml.shared.shapes
+        shape = shapes.get((kind, count))
+        if shape is None or not all(map(bytes.startswith, pieces, shape.prefixes)):
+            names = [piece.partition(b'"')[0] for piece in pieces[1:]]
+            if b"&" in b"".join(names) or len(set(names)) != count:
+                return None
+            shape = shapes[kind, count] = Shape.of(self._xml.decode(name) for name in names)
+        return shape
+
+    def _careful_cut(self) -> tuple[Shape, list[bytes]]:
+        begin, end = self._span
+        element = self._xml.text[begin:end].lstrip()
+        try:
+            spans = careful.index_properties(element, self._xml.limits.depth)
+        except Malformed as error:
+            raise self._xml.error(str(error)) from error
+        return Shape.of(spans), [b"", *(element[first:last] for first, last in spans.values())]
+
+    def _node(self, piece: bytes) -> Node:
+        if (found := _CANONICAL.match(piece)) is not None:
+            name, kind, tag, attributes, inner = (self._xml.decode(part or b"") for part in found.groups())
+            children = [Node(child, dict(_ATTRIBUTE.findall(own))) for child, own in _CHILD.findall(inner)]
+            value = Node(tag, dict(_ATTRIBUTE.findall(attributes)), children)
+            return Node("Property", {"name": name, "type": kind}, [value])
+        if not self._careful:
+            end = piece.find(_CLOSING)
+            piece = _CUT + (piece[: end + len(_CLOSING)] if end >= 0 else piece)
+        try:
+            return careful.parse_value(piece, self._xml.limits.depth)
+        except Malformed as error:
+            raise self._xml.error(str(error)) from error

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""A container with one entry packed anew, every other byte as it was (APPNOTE.TXT 4.3.7, 4.3.12, 4.3.16)."""
+
+from __future__ import annotations
+
+import zlib
+
+from silo.fcstd.container import CENTRAL, END, LOCAL, ContainerFile, Directory, Entry
+from silo.fcstd.problem import FcstdError
+
+_HAS_DESCRIPTOR = 0x8
+_DEFLATED = 8
+_LARGEST = 0xFFFFFFFF
+
+
+def replaced_entry(container: ContainerFile, entry: Entry, content: bytes) -> bytes:
+    """The bytes of the container with ``content`` in ``entry``.
+
+    Raises FcstdError where entries overlap, or the result were too large for a plain zip.
+    """
+    entries = _entries(container)
+    begin = entry.offset
+    # Up to the next entry: header, data, a data descriptor where there is one, and any padding.
+    end = min((e.offset for e in entries if e.offset > begin), default=container.directory.offset)
+    if end < container.data_offset(entry) + entry.packed:
+        raise FcstdError(container.path, "it is damaged: its entries overlap")
+    local, packed = _local(container, entry, content)
+    growth = len(local) - (end - begin)
+    before = container.read(0, begin)
+    after = container.read(end, container.directory.offset - end)
+    directory = _directory(container.directory, entries, entry, content, packed, growth)
+    tail = _end(container.directory, growth)
+    whole = b"".join((before, local, after, directory, tail))
+    if len(whole) > _LARGEST:
+        raise FcstdError(container.path, "it is too large for a plain zip container")
+    return whole
+
+
+def _entries(container: ContainerFile) -> list[Entry]:
+    try:
+        return list(container.directory.entries())
+    except ValueError as error:
+        raise FcstdError(container.path, str(error)) from error
+
+
+def _local(container: ContainerFile, entry: Entry, content: bytes) -> tuple[bytes, int]:
+    """Local header and data, and the packed length; times, name and extra field as they were."""
+    engine = zlib.compressobj(wbits=-zlib.MAX_WBITS)
+    data = engine.compress(content) + engine.flush()
+    header = list(LOCAL.unpack(container.read(entry.offset, LOCAL.size)))
+    names = container.read(entry.offset + LOCAL.size, header[9] + header[10])
+    header[2] &= ~_HAS_DESCRIPTOR
+    header[3] = _DEFLATED
+    header[6:9] = [zlib.crc32(content), len(data), len(content)]
+    return LOCAL.pack(*header) + names + data, len(data)
+
+
+def _directory(
+    directory: Directory, entries: list[Entry], changed: Entry, content: bytes, packed: int, growth: int
+) -> bytes:
+    raw = bytearray(directory.raw)
+    for entry in entries:
+        fields = list(CENTRAL.unpack_from(raw, entry.central))
+        if entry == changed:
+            fields[3] &= ~_HAS_DESCRIPTOR
+            fields[4] = _DEFLATED
+            fields[7:10] = [zlib.crc32(content), packed, len(content)]
+        elif entry.offset > changed.offset:
+            fields[16] += growth
+        CENTRAL.pack_into(raw, entry.central, *fields)
+    return bytes(raw)
+
+
+def _end(directory: Directory, growth: int) -> bytes:
+    fields = list(END.unpack_from(directory.tail))
+    fields[6] += growth
+    return END.pack(*fields) + directory.tail[END.size :]

@@ -1,0 +1,271 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Document.xml, unpacked and indexed only as far as somebody asks.
+
+In well-formed XML no ``<`` stands in an attribute value or in text, so in a text without ``<!`` and ``<?``
+every ``<`` begins a tag, and searching for tags is exact. FreeCAD writes such text (but for one comment at
+the top), always in one form. The quick way below accepts exactly that form, step by step, each object right
+behind the other; at the first thing that it does not expect it gives way to :mod:`silo.fcstd.careful`, where
+expat has the last word. A text that is read to its end has been counted, closed and checked against its
+checksum.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from silo.fcstd import careful
+from silo.fcstd.careful import Head, Malformed, Span
+from silo.fcstd.container import Entry
+from silo.fcstd.inflate import Inflater
+from silo.fcstd.limits import Limits
+from silo.fcstd.problem import FcstdError
+
+if TYPE_CHECKING:
+    from silo.fcstd.properties import Shape
+
+_ATTRIBUTES = rb'((?:\s+[\w:.-]+="[^"<]*")*)\s*'
+_HEAD = re.compile(
+    rb"<\?xml([^?<>]*)\?>\s*(?:<!--[^-]*(?:-[^-]+)*-->\s*)?<Document" + _ATTRIBUTES + rb">", re.DOTALL
+)
+_ATTRIBUTE = re.compile(rb'\s([\w:.-]+)="([^"&]*)"')
+_UTF8 = re.compile(rb"""encoding=["'](?:utf-8|us-ascii)["']""", re.IGNORECASE)
+_OBJECTS = re.compile(rb'<Objects Count="(\d{1,9})"' + _ATTRIBUTES + rb">")
+_OBJECT_TYPE = re.compile(rb'<Object type="([^"&]+)" name="([^"&]+)"')
+_OBJECT_DATA = re.compile(rb"</Objects>\s*<ObjectData" + _ATTRIBUTES + rb">")
+_OBJECT = re.compile(rb'\s*<Object name="([^"&]+)"' + _ATTRIBUTES + rb">")
+_TAIL = re.compile(rb"\s*</ObjectData>\s*</Document>\s*\Z")
+
+# The first step holds the head and the object of a small part; then bigger ones, since more was needed.
+_FIRST_STEP, _GROWTH, _HEAD_AT_MOST = 1 << 14, 4, 1 << 16
+
+
+class _Unexpected(Exception):
+    """The quick way met something that FreeCAD does not write."""
+
+
+class Shared:
+    """What the texts of one session share: lists of property names, and a bound on memory."""
+
+    def __init__(self, resident_limit: int) -> None:
+        self.shapes: dict[tuple[str, int], Shape] = {}
+        self._limit = resident_limit
+        self._resident: dict[XmlText, int] = {}
+        self._total = 0
+
+    def hold(self, text: XmlText, size: int) -> None:
+        """Count ``size`` bytes for a text; the texts that grew longest ago give theirs back for it."""
+        self._total += size - self._resident.pop(text, 0)
+        self._resident[text] = size
+        while self._total > self._limit and len(self._resident) > 1:
+            oldest = next(iter(self._resident))
+            self._total -= self._resident.pop(oldest)
+            oldest.release()
+
+
+class XmlText:
+    """The text of one Document.xml. All its methods may raise FcstdError."""
+
+    def __init__(self, path: str, entry: Entry, packed: bytes, limits: Limits, shared: Shared) -> None:
+        self.path, self.limits, self.shared = path, limits, shared
+        self._entry, self._packed = entry, packed
+        self._inflater: Inflater = self._new_inflater()
+        self._text: bytes | None = b""
+        self._known = 0
+        self._head: Head | None = None
+        self._data: dict[str, Span] = {}
+        self._position = 0
+        self._complete = False
+        self._failure: FcstdError | None = None
+        self.is_careful = False
+
+    @property
+    def text(self) -> bytes:
+        """What is unpacked so far; spans count from its begin."""
+        return self._text if self._text is not None else self._unpack_again()
+
+    def release(self) -> None:
+        """Give the memory back; the text is unpacked again when somebody asks."""
+        self._text = None
+
+    @property
+    def head(self) -> Head:
+        """Attributes, types of all objects, document properties."""
+        if self._head is None:
+            self._settle(self._find_head)
+        assert self._head is not None
+        return self._head
+
+    def attribute(self, name: str, default: str = "") -> str:
+        """An attribute of the ``<Document>`` element."""
+        head = self.head
+        if isinstance(head.attributes, bytes):
+            found = _ATTRIBUTE.findall(head.attributes)
+            head.attributes = {self.decode(key): self.decode(value) for key, value in found}
+        return head.attributes.get(name, default)
+
+    def span(self, name: str) -> Span | None:
+        """Where the data of an object of ``head.types`` stands."""
+        if (found := self._data.get(name)) is not None:
+            return found
+        if name not in self.head.types:
+            return None
+        self._settle(lambda: self._index_objects(name))
+        return self._data.get(name)
+
+    def complete(self) -> None:
+        """Read to the end, and check all that can be checked there."""
+        if not self._complete:
+            self._settle(self._index_objects)
+
+    def error(self, reason: str) -> FcstdError:
+        """An error about this text."""
+        return FcstdError(self.path, f"its Document.xml {reason}")
+
+    def decode(self, raw: bytes) -> str:
+        """UTF-8, or an error."""
+        try:
+            return raw.decode()
+        except UnicodeDecodeError as error:
+            raise self.error("is not in UTF-8") from error
+
+    def _settle(self, quick: Callable[[], None]) -> None:
+        """The quick way, else the careful one; what failed once fails again without being read again."""
+        if self._failure is not None:
+            raise FcstdError(self.path, self._failure.reason)
+        try:
+            try:
+                quick()
+            except _Unexpected:
+                self._read_carefully()
+        except FcstdError as error:
+            self._failure = error
+            raise
+
+    def _new_inflater(self) -> Inflater:
+        return Inflater(self.path, self._entry, self._packed, self.limits.document_xml, self.limits)
+
+    def _begin(self, whole: bool) -> bytes:
+        """The first step; all of a small text, since it costs no more than a part of it."""
+        self._inflater = self._new_inflater()
+        if whole or self._entry.size <= _FIRST_STEP * _GROWTH:
+            return self._hold(self._inflater.whole())
+        return self._hold(self._inflater.step(_FIRST_STEP))
+
+    def _extend(self) -> bytes:
+        """The text with one more step of it. Raises _Unexpected at the end."""
+        text = self.text
+        if self._inflater.finished:
+            raise _Unexpected
+        more = self._inflater.step(max(_FIRST_STEP, len(text) * (_GROWTH - 1)))
+        if self._head is not None:
+            _refuse_markup(text[-1:] + more, 0)
+        return self._hold(text + more)
+
+    def _hold(self, text: bytes) -> bytes:
+        self._text, self._known = text, len(text)
+        self.shared.hold(self, len(text))
+        return text
+
+    def _find_head(self, whole: bool = False) -> None:
+        text = self._begin(whole)
+        if (opening := _HEAD.match(text)) is None or not _UTF8.search(opening[1]) or b"&" in opening[2]:
+            raise _Unexpected
+        begins = opening.end()
+        while (end := text.find(b"</Objects>", begins)) < 0:
+            text = self._extend()
+        while (data := _OBJECT_DATA.match(text, end)) is None:
+            if len(text) > end + _HEAD_AT_MOST:
+                raise _Unexpected
+            text = self._extend()
+        _refuse_markup(text, begins)
+        at = text.find(b"<Objects", begins)
+        self._head = Head(opening[2], self._quick_types(text, at, end), _only_properties(text, begins, at))
+        self._position = data.end()
+
+    def _quick_types(self, text: bytes, begin: int, end: int) -> dict[str, str]:
+        opening = _OBJECTS.match(text, begin, end)
+        found = _OBJECT_TYPE.findall(text, begin, end)
+        if opening is None or not int(opening[1]) == len(found) == text.count(b"<Object ", begin, end):
+            raise _Unexpected
+        self._limit_objects(len(found))
+        kinds = {kind: self.decode(kind) for kind in {kind for kind, _ in found}}
+        types = {self.decode(name): kinds[kind] for kind, name in found}
+        if len(types) != len(found):
+            raise _Unexpected
+        return types
+
+    def _limit_objects(self, count: int) -> None:
+        if count > self.limits.objects:
+            raise self.error(f"lists {count} objects; at most {self.limits.objects} are read")
+
+    def _index_objects(self, until: str | None = None) -> None:
+        """Index the objects from where the last run stopped, to the one named or to the end."""
+        if self._head is None:
+            self._find_head(whole=until is None)
+        if self._complete:
+            return
+        text, data, position = self.text, self._data, self._position
+        match, closing = _OBJECT.match, b"</Object>"
+        while True:
+            opening = match(text, position)
+            end = text.find(closing, opening.end()) if opening else -1
+            if opening is not None and end >= 0:
+                name = self.decode(opening[1])
+                if name in data:
+                    raise _Unexpected
+                data[name] = position, end + 9
+                self._position = position = end + 9
+                if name == until:
+                    return
+            elif self._inflater.finished and _TAIL.match(text, position):
+                break
+            else:
+                text = self._extend()
+        if self._head is None or data.keys() != self._head.types.keys():
+            raise _Unexpected
+        self._complete = True
+
+    def _read_carefully(self) -> None:
+        text = self.text + self._inflater.rest()
+        try:
+            text = careful.as_utf8(text)
+            head, data = careful.index_document(text, self.limits.depth)
+        except Malformed as error:
+            raise self.error(str(error)) from error
+        self._limit_objects(len(head.types))
+        if lost := [name for name in head.types if name not in data]:
+            raise self.error(f"lists the object {lost[0]!r} but does not hold its data")
+        self._head, self._data = head, data
+        self._hold(text)
+        self._complete = self.is_careful = True
+
+    def _unpack_again(self) -> bytes:
+        self._inflater = self._new_inflater()
+        if self.is_careful:
+            text = careful.as_utf8(self._inflater.rest())
+        else:
+            text = b""
+            while len(text) < self._known:
+                text += self._inflater.step(self._known - len(text))
+        return self._hold(text)
+
+
+def _refuse_markup(text: bytes, start: int) -> None:
+    """Comments, CDATA, document types, processing instructions: not for the quick way."""
+    # One byte is looked for much faster than two, and FreeCAD's texts seldom have either.
+    if (text.find(b"!", start) >= 0 and text.find(b"<!", start) >= 0) or (
+        text.find(b"?", start) >= 0 and text.find(b"<?", start) >= 0
+    ):
+        raise _Unexpected
+
+
+def _only_properties(text: bytes, begin: int, end: int) -> Span | None:
+    start = text.find(b"<Properties", begin, end)
+    if start < 0:
+        raise _Unexpected
+    close = text.find(b"</Properties>", start, end)
+    if close < 0 or text.find(b"<Properties", start + 1, end) >= 0:
+        raise _Unexpected
+    return start, close + len(b"</Properties>")
