@@ -2,26 +2,34 @@
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
-STAMP := $(VENV)/.silo-mod-installed
+DEV := $(VENV)/.installed-dev
+SERVER := $(VENV)/.installed-server
 
 .PHONY: help demo test test-machine check setup docs clean
 
 help:
-	@echo "make demo   set up and sync a real assembly with the embedded server"
+	@echo "make demo   set up and sync a real assembly with the embedded server (DEMO=--keep leaves it running)"
 	@echo "make test   set up and run the tests"
 	@echo "make test-machine  the tests that need FreeCAD or Chromium on the machine"
 	@echo "make check  ruff, mypy, import directions"
 
-setup: $(STAMP)
+setup: $(DEV)
 
-$(STAMP): pyproject.toml
+$(VENV)/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "silo-mod needs Python 3.11 or newer, this is " + sys.version)'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --editable '.[dev]'
+
+# The demo needs the server only; the tests need everything.
+$(SERVER): pyproject.toml | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --editable '.[server]'
 	@touch $@
 
-demo: setup
-	$(BIN)/silo-mod demo
+$(DEV): pyproject.toml | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --editable '.[dev]'
+	@touch $(SERVER) $@
+
+demo: $(SERVER)
+	$(BIN)/silo-mod demo $(DEMO)
 
 test: setup
 	$(BIN)/python -m pytest -m "not freecad and not browser"

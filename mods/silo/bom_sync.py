@@ -14,8 +14,8 @@ server's rule too, so a faulty client cannot break it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, Protocol
 
@@ -89,6 +89,7 @@ class Outcome:
     plan: MergePlan | None = None
     result: MergeResult | None = None
     error: SiloError | None = None
+    names: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
 
     @property
     def assembly(self) -> BomEntry:
@@ -117,16 +118,27 @@ def resolve(extraction: Extraction, api: ItemLookup) -> Resolved:
     )
 
 
-def compare(resolved: Resolved, api: SyncApi) -> MergePlan:
-    """What a merge would do, against the server's lines as they are now."""
+def server_lines(resolved: Resolved, api: SyncApi) -> tuple[Mapping[str, Any], ...]:
+    """The server's lines of this assembly as they are now; none while it has no part number."""
     number = resolved.assembly.part_number
     if number is None:
-        return plan_merge(resolved.entries, ())
-    return plan_merge(resolved.entries, [_line(line) for line in api.get_bom(number)])
+        return ()
+    return tuple(line if isinstance(line, Mapping) else line.model_dump() for line in api.get_bom(number))
 
 
-def _line(line: Any) -> Mapping[str, Any]:
-    return line if isinstance(line, Mapping) else line.model_dump()
+def compare(resolved: Resolved, api: SyncApi) -> MergePlan:
+    """What a merge would do, against the server's lines as they are now."""
+    return plan_merge(resolved.entries, server_lines(resolved, api))
+
+
+def names_of(resolved: Resolved, lines: Iterable[Mapping[str, Any]] = ()) -> dict[str, str]:
+    """Part number → name, of all that was resolved and of the server's own lines; for showing."""
+    names = {
+        line["child_part_number"]: line.get("child_description") or line.get("child_name") or ""
+        for line in lines
+    }
+    known = walk_entries((resolved.assembly, *resolved.entries, *resolved.unresolved))
+    return names | {entry.part_number: entry.name or "" for entry in known if entry.part_number}
 
 
 def sync(
@@ -149,17 +161,19 @@ def sync(
     if number is None:
         return Outcome(Status.UNREGISTERED, resolved)
     try:
-        plan = compare(resolved, api)
+        lines = server_lines(resolved, api)
+        names = names_of(resolved, lines)
+        plan = plan_merge(resolved.entries, lines)
         if blocking(resolved) and not allow_missing:
-            return Outcome(Status.BLOCKED, resolved, plan)
+            return Outcome(Status.BLOCKED, resolved, plan, names=names)
         if dry_run:
-            return Outcome(Status.DRY_RUN, resolved, plan)
+            return Outcome(Status.DRY_RUN, resolved, plan, names=names)
         if not plan.writes:
-            return Outcome(Status.UNCHANGED, resolved, plan)
+            return Outcome(Status.UNCHANGED, resolved, plan, names=names)
         result = api.merge_bom(number, merge_request(resolved, sync_id, document))
     except SiloError as error:
         return Outcome(Status.FAILED, resolved, error=error)
-    return Outcome(Status.MERGED, resolved, plan, result)
+    return Outcome(Status.MERGED, resolved, plan, result, names=names)
 
 
 def merge_request(resolved: Resolved, sync_id: str, document: SourceDocument | None = None) -> MergeRequest:

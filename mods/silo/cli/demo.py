@@ -24,10 +24,10 @@ from silo.batch import source_document
 from silo.bom.errors import InputError, ServerFaultError
 from silo.bom.model import Extraction
 from silo.bom.report import base_of
+from silo.bom.resolve import consolidation_findings
 from silo.bom_sync import Outcome, Status, resolve, sync_tree
 from silo.cli import common, show
 from silo.cli.common import Commands
-from silo.cli.diff import names_of
 from silo.cli.register import proposals_for, register_all
 from silo.cli.serve import need_server_extra
 
@@ -148,7 +148,8 @@ class Demo:
         self.say(title)
         extraction = common.read_assembly(str(self.top))
         self.out.print(show.bom_tree(extraction))
-        self.out.print(show.findings_text(extraction.findings, base_of(extraction)))
+        findings = (*extraction.findings, *consolidation_findings(extraction.entries))
+        self.out.print(show.findings_text(findings, base_of(extraction)))
         return extraction
 
     def _register(self, extraction: Extraction) -> None:
@@ -169,13 +170,12 @@ class Demo:
         outcomes = list(
             sync_tree(whole, self.client, sync_id=lambda: str(uuid.uuid4()), describe=source_document)
         )
-        names = names_of(whole)
         for outcome in outcomes:
             self.out.print(show.outcome_text(outcome))
             if outcome.error is not None:
                 raise outcome.error
             if outcome.status is Status.MERGED and outcome.plan is not None:
-                self.out.print(show.diff_table(outcome.plan.diff, names))
+                self.out.print(show.diff_table(outcome.plan.diff, outcome.names))
         self._activity(outcomes, unregistered=len(whole.unresolved))
         return outcomes
 

@@ -4,11 +4,13 @@
 from __future__ import annotations
 
 import argparse
+from itertools import chain
 from typing import Any
 
-from silo.bom.identity import walk_entries
+from silo.bom.diff import diff_bom
+from silo.bom.model import BomDiff
 from silo.bom.report import base_of, diff_json, finding_json, relative
-from silo.bom_sync import Resolved, assemblies, blocking, compare, resolve
+from silo.bom_sync import Resolved, assemblies, blocking, names_of, resolve, server_lines
 from silo.cli import common
 from silo.cli.common import Commands
 
@@ -35,7 +37,8 @@ def run(args: argparse.Namespace) -> int:
     with common.client_of(args) as client:
         whole = resolve(extraction, client)
         chosen = list(assemblies(whole)) if args.recursive else [whole]
-        compared = [(one, compare(one, client).diff) for one in chosen]
+        lines = [server_lines(one, client) for one in chosen]
+    compared = [(one, diff_bom(one.entries, known)) for one, known in zip(chosen, lines, strict=True)]
     base = base_of(extraction)
     drifted = bool(whole.unresolved or whole.assembly.part_number is None) or any(
         diff.drifted or blocking(one) for one, diff in compared
@@ -45,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
         findings = [finding_json(f, base) for f in whole.findings]
         common.print_json({"drift": drifted, "assemblies": data, "findings": findings})
     else:
-        _show(whole, compared, base)
+        _show(whole, compared, names_of(whole, chain.from_iterable(lines)), base)
     return 1 if args.check and drifted else 0
 
 
@@ -59,17 +62,12 @@ def _head(one: Resolved, base: str) -> dict[str, Any]:
     }
 
 
-def names_of(resolved: Resolved) -> dict[str, str]:
-    """Part number → name, of everything resolved."""
-    known = walk_entries((resolved.assembly, *resolved.entries, *resolved.unresolved))
-    return {entry.part_number: entry.name or "" for entry in known if entry.part_number}
-
-
-def _show(whole: Resolved, compared: list[tuple[Resolved, Any]], base: str) -> None:
+def _show(
+    whole: Resolved, compared: list[tuple[Resolved, BomDiff]], names: dict[str, str], base: str
+) -> None:
     from silo.cli import show
 
     out = show.console()
-    names = names_of(whole)
     for one, diff in compared:
         head = one.assembly
         out.print(show.entry_text(head, base) if head.part_number else f"{head.label} (no part number yet)")

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from rich.console import Console, Group, RenderableType
 from rich.panel import Panel
@@ -98,7 +98,7 @@ def _quantity(value: float | None) -> str:
     return "?" if value is None else f"{value:g}"
 
 
-def diff_table(diff: BomDiff, names: dict[str, str]) -> RenderableType:
+def diff_table(diff: BomDiff, names: Mapping[str, str]) -> RenderableType:
     """CAD against server, one row per line that differs or is a person's own."""
     table = Table(box=None, pad_edge=False)
     for title, justify in (
@@ -134,8 +134,11 @@ def diff_table(diff: BomDiff, names: dict[str, str]) -> RenderableType:
         if line.part_number not in disputed:
             row("✎", "blue", line.part_number, _quantity(line.quantity), "manual line; not touched")
     if not table.row_count:
-        return Text(f"No differences: {len(diff.unchanged)} lines agree.", "green")
-    return Group(table, Text(f"{len(diff.unchanged)} lines unchanged.", "dim"))
+        return Text(f"No differences; lines that agree: {len(diff.unchanged)}.", "green")
+    if not diff.unchanged:
+        return table
+    lines = "line" if len(diff.unchanged) == 1 else "lines"
+    return Group(table, Text(f"{len(diff.unchanged)} {lines} unchanged.", "dim"))
 
 
 _STATUS = {

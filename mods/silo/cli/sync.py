@@ -8,12 +8,13 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from silo.batch import Options, TopResult, documents_in, result_json, sync_top
+from silo.batch import Options, TopResult, result_json, sync_top
 from silo.bom.errors import InputError, SiloError
 from silo.bom.model import Extraction
 from silo.bom_sync import Status
 from silo.cli import common
 from silo.cli.common import Commands
+from silo.files import documents_in
 
 
 def register(commands: Commands) -> None:
@@ -90,7 +91,6 @@ def _extractions(args: argparse.Namespace, tops: list[str]) -> Iterator[tuple[st
 
 def _show(result: TopResult) -> None:
     from silo.cli import show
-    from silo.cli.diff import names_of
 
     out = show.console()
     if result.error is not None:
@@ -100,10 +100,9 @@ def _show(result: TopResult) -> None:
         out.print(f"· {show.plain(result.top)}: {result.skipped}", style="dim", markup=False)
         return
     assert result.whole is not None  # neither an error nor skipped
-    names = names_of(result.whole)
     for outcome in result.outcomes:
         out.print(show.outcome_text(outcome))
         if outcome.plan is not None and outcome.status is not Status.UNCHANGED:
-            out.print(show.diff_table(outcome.plan.diff, names))
+            out.print(show.diff_table(outcome.plan.diff, outcome.names))
     if result.whole.findings:
         out.print(show.findings_text(result.whole.findings, result.base))
