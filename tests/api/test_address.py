@@ -30,7 +30,16 @@ def test_api_is_appended_only_where_the_address_has_no_path(written: str, api: s
 
 @pytest.mark.parametrize(
     "written",
-    ["", "silo.example.com", "ftp://host", "http://", "http://host:99999", "http://host?x=1", "http://ho st", "//x"],
+    [
+        "",
+        "silo.example.com",
+        "ftp://host",
+        "http://",
+        "http://host:99999",
+        "http://host?x=1",
+        "http://ho st",
+        "//x",
+    ],
 )
 def test_an_address_that_is_none_says_how_to_write_one(written: str) -> None:
     """Plain words and an example."""
@@ -60,7 +69,7 @@ def test_pages_of_other_servers_are_not_given() -> None:
     assert address.web("/items/A/bom") == "https://silo.example.com/items/A/bom"
     assert address.web("https://silo.example.com/items/A") == "https://silo.example.com/items/A"
     for foreign in ("https://evil.example/items", "//evil.example/x", "http://silo.example.com/x"):
-        with pytest.raises(InputError, match="not on silo.example.com"):
+        with pytest.raises(InputError, match=r"not on silo\.example\.com"):
             address.web(foreign)
 
 
@@ -83,7 +92,9 @@ def test_the_token_stays_with_its_server(sender: str, receiver: str, allowed: bo
 
 def test_this_computer_is_known() -> None:
     """No proxy is asked for loopback."""
-    assert [ServerAddress.parse(f"http://{h}").is_loopback for h in ("127.0.0.1", "localhost", "[::1]", "a")] == [
+    assert [
+        ServerAddress.parse(f"http://{h}").is_loopback for h in ("127.0.0.1", "localhost", "[::1]", "a")
+    ] == [
         True,
         True,
         True,

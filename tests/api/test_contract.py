@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""One contract for everything that answers like a Silo: the fake in memory, and the embedded server over HTTP."""
+"""One contract for all that answers like a Silo: the fake in memory, and the embedded server over HTTP."""
 
 from __future__ import annotations
 
@@ -55,9 +55,7 @@ def merge(silo: SiloApi, parent: str, **quantities: float) -> MergeResult:
 
 
 def request(sync_id: str | None = None, *, dry_run: bool = False, **quantities: float) -> MergeRequest:
-    entries = [
-        MergeEntry(child_part_number=pn.replace("_", "-"), quantity=q) for pn, q in quantities.items()
-    ]
+    entries = [MergeEntry(child_part_number=pn.replace("_", "-"), quantity=q) for pn, q in quantities.items()]
     return MergeRequest(entries=entries, sync_id=sync_id, dry_run=dry_run)
 
 

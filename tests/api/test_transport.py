@@ -147,15 +147,12 @@ def test_the_merge_request_is_the_one_of_the_spec(server: Any, client: SiloClien
     server.on(MERGE, {"status": "merged"})
     client.merge_bom("A01-0001", merge_request(None))
     assert server.seen[0].body.replace(b" ", b"") == (
-        b'{"source":"assembly","entries":'
-        b'[{"child_part_number":"F01-0001","quantity":2,"source":"assembly"}]}'
+        b'{"source":"assembly","entries":[{"child_part_number":"F01-0001","quantity":2,"source":"assembly"}]}'
     )
     assert server.seen[0].headers["Content-Type"] == "application/json"
 
 
-def test_read_only_is_told_at_once(
-    server: Any, client: SiloClient, answer: Any, pauses: list[float]
-) -> None:
+def test_read_only_is_told_at_once(server: Any, client: SiloClient, answer: Any, pauses: list[float]) -> None:
     """A person made it so; pausing here would help nobody."""
     server.on(MERGE, answer(503, {"error": "read_only", "message": "maintenance"}, {"Retry-After": "5"}))
     with pytest.raises(ReadOnlyError, match="maintenance"):
@@ -168,8 +165,10 @@ def test_the_servers_own_pause_is_kept(
     server: Any, client: SiloClient, answer: Any, pauses: list[float], form: str
 ) -> None:
     """Retry-After in both its forms."""
-    when = "7" if form == "seconds" else email.utils.format_datetime(
-        datetime.now(UTC) + timedelta(seconds=7.9), usegmt=True
+    when = (
+        "7"
+        if form == "seconds"
+        else email.utils.format_datetime(datetime.now(UTC) + timedelta(seconds=7.9), usegmt=True)
     )
     server.on(GET, answer(429, headers={"Retry-After": when}), ITEM)
     client.get_item("F01-0001")
@@ -239,7 +238,9 @@ def test_a_change_does_not_become_a_question(server: Any, client: SiloClient, an
         client.create_item("kindred-rd", "F01", "Bolt")
 
 
-def test_a_change_follows_within_the_server_with_its_body(server: Any, client: SiloClient, answer: Any) -> None:
+def test_a_change_follows_within_the_server_with_its_body(
+    server: Any, client: SiloClient, answer: Any
+) -> None:
     """308 keeps method and body."""
     server.on(MERGE, answer(308, headers={"Location": "/v2/merge"}))
     server.on("POST /v2/merge", {"status": "merged"})
@@ -262,7 +263,9 @@ def test_a_redirect_to_the_login_page_means_the_token(server: Any, client: SiloC
         client.get_item("F01-0001")
 
 
-def test_a_redirect_to_nowhere_is_an_error_in_plain_words(server: Any, client: SiloClient, answer: Any) -> None:
+def test_a_redirect_to_nowhere_is_an_error_in_plain_words(
+    server: Any, client: SiloClient, answer: Any
+) -> None:
     """Whatever stands in Location."""
     for location in ("ftp://x/", "http://[", "http://user:pw@h/", "javascript:alert(1)"):
         server.scripts.clear()

@@ -48,7 +48,8 @@ class Caller:
         cancelled: Cancel | None = None,
     ) -> Reply:
         """Send a model as JSON."""
-        content = as_json(body.model_dump(mode="json", by_alias=True, exclude_none=True))
+        # Not pydantic's own JSON, which writes NaN as null: what cannot be said is an error, no gap.
+        content = as_json(body.model_dump(by_alias=True, exclude_none=True))
         return self._transport.send(
             Call(
                 method,

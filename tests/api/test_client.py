@@ -1,0 +1,249 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What the client asks, and what it makes of other servers' answers."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+from uuid import uuid4
+
+import pytest
+
+from silo.api.client import SiloClient
+from silo.api.schemas import categories_of
+from silo.api.wire import MergeEntry, MergeRequest
+from silo.bom.errors import InputError, NotFoundError, RejectedError, RouteMissingError, UnreachableError
+
+UUIDS = [str(uuid4()) for _ in range(1000)]
+
+
+def item(uuid: str) -> dict[str, Any]:
+    return {"id": uuid, "part_number": f"P-{uuid[:8]}", "description": None}
+
+
+def route_missing(answer: Any) -> Any:
+    return answer(405, "Method Not Allowed", {"Content-Type": "text/plain"})
+
+
+def test_a_thousand_identities_cost_two_requests(server: Any, client: SiloClient) -> None:
+    """500 each; the answers are put together under the identities as given."""
+    server.on(
+        "POST /api/items/by-uuid",
+        {"items": [item(u) for u in UUIDS[:500]]},
+        {"items": [item(u) for u in UUIDS[500:900]]},
+    )
+    found = client.get_items_by_uuid([*UUIDS, *UUIDS])
+    assert list(found) == UUIDS[:900]
+    assert [len(seen.json()["uuids"]) for seen in server.seen] == [500, 500]
+
+
+def test_nothing_to_look_up_is_no_request(server: Any, client: SiloClient) -> None:
+    """Empty, and empty texts."""
+    assert client.get_items_by_uuid(["", ""]) == {}
+    assert server.seen == []
+
+
+def test_without_the_batch_a_bounded_pool_asks_and_remembers(
+    server: Any, client: SiloClient, answer: Any
+) -> None:
+    """Never one after another, never all at once; the missing route is asked for once only."""
+    together, most, now = threading.Barrier(8, timeout=20), 0, 0
+    lock = threading.Lock()
+
+    def enter() -> None:
+        nonlocal most, now
+        with lock:
+            now += 1
+            most = max(most, now)
+        # Eight have to be inside at one time, or this breaks: that they are asked together is proven.
+        together.wait()
+        with lock:
+            now -= 1
+
+    server.on("POST /api/items/by-uuid", route_missing(answer))
+    for uuid in UUIDS[:16]:
+        server.on(f"GET /api/items/by-uuid/{uuid}", answer(200, item(uuid), before=enter))
+    assert len(client.get_items_by_uuid(UUIDS[:16])) == 16
+    assert most == 8
+    client.get_items_by_uuid([str(uuid4())])
+    assert len(server.paths("POST")) == 1
+
+
+def test_one_malformed_identity_does_not_spoil_the_others(
+    server: Any, client: SiloClient, answer: Any
+) -> None:
+    """A server may refuse the whole batch for it; then they are asked one by one."""
+    server.on("POST /api/items/by-uuid", answer(400, {"error": "bad uuid"}))
+    server.on("GET /api/items/by-uuid/garbage", answer(400, {"error": "bad uuid"}))
+    server.on(f"GET /api/items/by-uuid/{UUIDS[0]}", item(UUIDS[0]))
+    assert list(client.get_items_by_uuid([UUIDS[0], "garbage"])) == [UUIDS[0]]
+
+
+def test_a_failed_look_up_is_an_error_not_an_unknown_item(
+    server: Any, client: SiloClient, answer: Any
+) -> None:
+    """Otherwise a broken network would read as "not registered"."""
+    server.on("POST /api/items/by-uuid", route_missing(answer))
+    server.on("*", answer(drop=True))
+    with pytest.raises(UnreachableError):
+        client.get_items_by_uuid(UUIDS[:20])
+
+
+@pytest.mark.parametrize("body", ["404 page not found\n", {"detail": "Not Found"}])
+def test_a_server_without_identities_is_told(server: Any, client: SiloClient, answer: Any, body: Any) -> None:
+    """A missing route must not read as "not registered" either."""
+    server.on("*", answer(404, body, {"Content-Type": "text/plain"} if isinstance(body, str) else {}))
+    with pytest.raises(RouteMissingError):
+        client.get_item_by_uuid(UUIDS[0])
+
+
+def test_a_web_page_404_counts_only_from_a_silo(server: Any, client: SiloClient, answer: Any) -> None:
+    """Some servers answer pages; whether it is a Silo at all is asked once."""
+    page = answer(404, "<html><title>404</title>", {"Content-Type": "text/html"})
+    server.on(f"GET /api/items/by-uuid/{UUIDS[0]}", page)
+    server.on(f"GET /api/items/by-uuid/{UUIDS[1]}", page)
+    server.on("GET /api/items", [])
+    assert client.get_item_by_uuid(UUIDS[0]) is None
+    assert client.get_item_by_uuid(UUIDS[1]) is None
+    assert server.paths().count("GET /api/items?limit=1") == 1
+
+
+def test_a_web_page_404_from_something_else_is_an_error(server: Any, client: SiloClient, answer: Any) -> None:
+    """A wrong address must not make everything unregistered."""
+    server.on("*", answer(404, "<html><title>404</title>", {"Content-Type": "text/html"}))
+    with pytest.raises(RouteMissingError, match="is this the address of a Silo server"):
+        client.get_item_by_uuid(UUIDS[0])
+
+
+MERGE = "POST /api/items/A01-0001/bom/merge"
+REQUEST = MergeRequest(entries=[MergeEntry(child_part_number="F01-0001", quantity=1)], sync_id="s")
+
+
+def test_a_missing_assembly_is_not_a_missing_route(server: Any, client: SiloClient, answer: Any) -> None:
+    """404 of the merge, 404 of the item: the assembly."""
+    server.on(MERGE, answer(404, {"error": "not_found"}))
+    server.on("GET /api/items/A01-0001", answer(404, {"error": "not_found"}))
+    with pytest.raises(NotFoundError, match="has no item A01-0001; register") as caught:
+        client.merge_bom("A01-0001", REQUEST)
+    assert not isinstance(caught.value, RouteMissingError)
+
+
+@pytest.mark.parametrize("status", [404, 405])
+def test_a_missing_route_is_not_a_missing_assembly(
+    server: Any, client: SiloClient, answer: Any, status: int
+) -> None:
+    """404 of the merge, but the item is there: an older server."""
+    server.on(MERGE, answer(status, {"error": "not_found"}))
+    server.on("GET /api/items/A01-0001", {"id": "u", "part_number": "A01-0001"})
+    with pytest.raises(RouteMissingError, match="not how to merge a BOM"):
+        client.merge_bom("A01-0001", REQUEST)
+
+
+def test_the_version_goes_along_as_a_tag(server: Any, client: SiloClient) -> None:
+    """If-Match, quoted once whatever was given; the BOM's version is read from ETag or body."""
+    server.on(MERGE, {"status": "merged"})
+    for version in (7, "7", '"7"'):
+        client.merge_bom("A01-0001", REQUEST, if_match=version)
+    assert [seen.headers["If-Match"] for seen in server.seen] == ['"7"'] * 3
+
+
+@pytest.mark.parametrize(
+    ("headers", "body", "version"),
+    [
+        ({"ETag": '"12"'}, [], "12"),
+        ({"ETag": 'W/"12"'}, [], "12"),
+        ({}, {"version": 12}, "12"),
+        ({}, [], None),
+    ],
+)
+def test_the_version_of_a_bom(
+    server: Any, client: SiloClient, answer: Any, headers: dict[str, str], body: Any, version: str | None
+) -> None:
+    """In either place, or none."""
+    server.on("GET /api/items/A/bom", answer(200, body, headers))
+    assert client.get_bom_version("A") == version
+
+
+def test_the_older_form_of_a_schema_is_asked_for_after_404(
+    server: Any, client: SiloClient, answer: Any
+) -> None:
+    """silo-contract §1.6: /form since February 2026, /properties before."""
+    server.on("GET /api/schemas/kindred-rd/form", answer(404, "404 page not found"))
+    server.on("GET /api/schemas/kindred-rd/properties", {"properties": []})
+    assert client.get_schema_form("kindred-rd", "F01") == {"properties": []}
+    assert server.paths() == [
+        "GET /api/schemas/kindred-rd/form?category=F01",
+        "GET /api/schemas/kindred-rd/properties?category=F01",
+    ]
+
+
+@pytest.mark.parametrize(
+    "schema",
+    [
+        {"categories": {"F01": "Screws", "A01": "Assemblies"}},
+        {"categories": [{"code": "F01", "name": "Screws"}, {"code": "A01", "description": "Assemblies"}]},
+        {
+            "segments": [
+                {"name": "serial"},
+                {"name": "category", "values": {"F01": "Screws", "A01": "Assemblies"}},
+            ]
+        },
+        {"segments": {"category": {"values": {"F01": {"label": "Screws"}, "A01": {"name": "Assemblies"}}}}},
+    ],
+)
+def test_categories_are_read_in_every_form(schema: dict[str, Any]) -> None:
+    """Code to text, in order."""
+    assert list(categories_of(schema).items()) == [("F01", "Screws"), ("A01", "Assemblies")]
+    assert categories_of({"segments": "odd", "categories": None}) == {}
+    assert categories_of({"categories": ["F01"]}) == {"F01": ""}
+
+
+def test_the_search_falls_back_to_the_list(server: Any, client: SiloClient, answer: Any) -> None:
+    """A server without /search takes "search" for a part number and has none."""
+    server.on("GET /api/items/search", answer(404, {"error": "not_found"}))
+    server.on("GET /api/items", {"items": [item(UUIDS[0])], "total": 1})
+    assert client.search_items("bolt & nut", limit=5)[0].id == UUIDS[0]
+    assert server.paths()[1] == "GET /api/items?limit=5&offset=0&search=bolt+%26+nut"
+
+
+def test_a_change_without_content_is_read_back(server: Any, client: SiloClient, answer: Any) -> None:
+    """204 after PUT."""
+    server.on("PUT /api/items/A", answer(204))
+    server.on("GET /api/items/B", {"id": "u", "part_number": "B"})
+    assert client.update_item("A", part_number="B").part_number == "B"
+
+
+def test_what_json_cannot_hold_is_not_sent(server: Any, client: SiloClient) -> None:
+    """NaN is no JSON, and a server would refuse or, worse, read it as something."""
+    for odd in (float("nan"), float("inf"), {1, 2}, object()):
+        with pytest.raises(InputError):
+            client.create_item("kindred-rd", "F01", "Bolt", properties={"mass": odd})
+    with pytest.raises(InputError, match="category"):
+        client.create_item("kindred-rd", "", "Bolt")
+    assert server.seen == []
+
+
+def test_a_part_number_stays_one_segment(server: Any, client: SiloClient) -> None:
+    """Whatever a number holds, it asks for that item and nothing else."""
+    server.on("*", [])
+    client.get_bom("A/../B 1")
+    assert server.paths() == ["GET /api/items/A%2F..%2FB%201/bom"]
+
+
+def test_a_server_that_is_not_ready_says_why(server: Any, client: SiloClient, answer: Any) -> None:
+    """503 with a mode is an answer; without one it is an absent server. Neither address is below /api."""
+    server.on("GET /ready", answer(503, {"status": "not ready", "mode": "degraded"}))
+    assert client.ready().mode == "degraded"
+    server.on("GET /health", answer(503, "<html>", {"Content-Type": "text/html"}))
+    with pytest.raises(UnreachableError):
+        client.health()
+
+
+def test_a_rejected_merge_lists_everything(server: Any, client: SiloClient, answer: Any) -> None:
+    """All bad entries at once."""
+    problems = [f"entries[{n}]: unknown" for n in range(30)]
+    server.on(MERGE, answer(400, {"error": "rejected", "message": "30 bad", "problems": problems}))
+    with pytest.raises(RejectedError) as caught:
+        client.merge_bom("A01-0001", REQUEST)
+    assert list(caught.value.problems) == problems
+    assert "entries[9]" in str(caught.value)

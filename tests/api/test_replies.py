@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Answers read as data or as errors, in every form that servers and proxies send."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from silo.api.failures import Where
+from silo.api.replies import Reply, complaint, error_of
+from silo.api.wire import BomLine, Item
+from silo.bom.errors import (
+    AuthError,
+    ConflictError,
+    CycleError,
+    ForbiddenError,
+    NotFoundError,
+    ReadOnlyError,
+    RejectedError,
+    RouteMissingError,
+    ServerFaultError,
+    SiloError,
+    UnreachableError,
+    VersionConflictError,
+)
+
+WHERE = Where("silo.example.com", "item F01-0001")
+
+
+def reply(status: int, body: Any, kind: str = "application/json", secret: str | None = None) -> Reply:
+    content = body if isinstance(body, bytes) else json.dumps(body).encode()
+    return Reply(status, content, WHERE, {"Content-Type": kind}, secret)
+
+
+@pytest.mark.parametrize(
+    ("body", "text"),
+    [
+        ({"error": "bad_request", "message": "quantity is missing"}, "quantity is missing"),
+        ({"error": "quantity is missing"}, "quantity is missing"),
+        ({"error": {"code": "x", "message": "quantity is missing"}}, "quantity is missing"),
+        ({"detail": "quantity is missing"}, "quantity is missing"),
+        ({"message": "quantity is missing"}, "quantity is missing"),
+        ("quantity is missing", "quantity is missing"),
+        (b"quantity is missing\n", "quantity is missing"),
+        (b"<html><title>400 Bad\n Request</title>", "400 Bad Request"),
+        (b"", "no reason given"),
+        ({}, "no reason given"),
+        (b"\xff\xfe", "\ufffd\ufffd"),
+        ([1, 2], "[1, 2]"),
+    ],
+)
+def test_error_bodies_of_every_form_are_read(body: Any, text: str) -> None:
+    """The real Silo's form is not known for sure; proxies have their own."""
+    error = error_of(reply(400, body))
+    assert isinstance(error, RejectedError)
+    assert str(error) == f"silo.example.com (item F01-0001): not accepted (400): {text}"
+
+
+@pytest.mark.parametrize(
+    ("status", "kind"),
+    [
+        (400, RejectedError),
+        (401, AuthError),
+        (403, ForbiddenError),
+        (404, NotFoundError),
+        (405, RouteMissingError),
+        (408, UnreachableError),
+        (409, ConflictError),
+        (410, NotFoundError),
+        (412, VersionConflictError),
+        (413, RejectedError),
+        (415, RejectedError),
+        (422, RejectedError),
+        (429, UnreachableError),
+        (500, ServerFaultError),
+        (501, RouteMissingError),
+        (502, UnreachableError),
+        (503, ReadOnlyError),
+        (504, UnreachableError),
+        (507, ServerFaultError),
+        (304, ServerFaultError),
+    ],
+)
+def test_each_status_is_one_error(status: int, kind: type[SiloError]) -> None:
+    """The tree of silo.bom.errors, exactly."""
+    assert type(error_of(reply(status, {"error": "code", "message": "text"}), writing=True)) is kind
+
+
+def test_503_is_read_only_only_for_a_change() -> None:
+    """A question that gets 503 met an absent server; so did a change that a proxy's page answers."""
+    assert type(error_of(reply(503, {"error": "x"}))) is UnreachableError
+    page = reply(503, b"<html><title>503</title>", "text/html")
+    assert type(error_of(page, writing=True)) is UnreachableError
+    busy = reply(503, {"error": "unavailable", "message": "the database is away"})
+    assert type(error_of(busy, writing=True)) is UnreachableError
+
+
+def test_all_problems_are_kept() -> None:
+    """Ours, and FastAPI's."""
+    ours = error_of(reply(400, {"error": "rejected", "message": "2 bad", "problems": ["a: bad", "b: bad"]}))
+    assert isinstance(ours, RejectedError)
+    assert ours.problems == ("a: bad", "b: bad")
+    detail = [{"loc": ["body", "entries", 0, "quantity"], "msg": "wanted a number"}]
+    theirs = error_of(reply(422, {"detail": detail}))
+    assert isinstance(theirs, RejectedError)
+    assert theirs.problems == ("entries.0.quantity: wanted a number",)
+
+
+def test_a_ring_keeps_its_way() -> None:
+    """409 with a path is a cycle."""
+    error = error_of(reply(409, {"error": "cycle", "message": "x", "path": ["A", "B", "A"]}))
+    assert isinstance(error, CycleError)
+    assert error.path == ("A", "B", "A")
+
+
+@pytest.mark.parametrize(
+    "body",
+    [b"404 page not found\n", {"detail": "Not Found"}, {"error": "no_route"}, b"<html>", "Not Found: GET /x"],
+)
+def test_a_missing_route_is_not_a_missing_item(body: Any) -> None:
+    """What routers say: Go's, FastAPI's, ours, and web servers' pages."""
+    assert isinstance(error_of(reply(404, body)), RouteMissingError)
+
+
+@pytest.mark.parametrize(
+    "body", [b"", {"error": "not_found"}, {"error": "not_found", "message": "Not Found"}]
+)
+def test_a_missing_item_is_not_a_missing_route(body: Any) -> None:
+    """What handlers say."""
+    assert type(error_of(reply(404, body))) is NotFoundError
+
+
+def test_texts_of_servers_are_made_harmless() -> None:
+    """No terminal codes, no turned writing direction, one line, bounded, and never our token."""
+    nasty = "\x1b[31mred\x1b[0m\r\nsecond \u202eline silo_secret " + "x" * 5000
+    text = complaint(reply(400, {"error": nasty}, secret="silo_secret")).text
+    assert text.startswith("[31mred [0m second line [token] xxx")
+    assert len(text) == 400
+
+
+@given(st.binary(max_size=300), st.integers(300, 599), st.booleans())
+def test_no_bytes_break_the_reading_of_an_error(content: bytes, status: int, writing: bool) -> None:
+    """Whatever comes, one of our errors comes out, in bounded text."""
+    for kind in ("application/json", "text/html", ""):
+        error = error_of(reply(status, content, kind), writing=writing)
+        assert isinstance(error, SiloError)
+        assert len(str(error)) < 600
+
+
+@pytest.mark.parametrize("depth", [100_000])
+@pytest.mark.parametrize("status", [200, 400])
+def test_absurd_nesting_is_an_error_not_a_crash(depth: int, status: int) -> None:
+    """A hostile answer."""
+    answer = reply(status, b"[" * depth)
+    if status == 400:
+        assert isinstance(error_of(answer), RejectedError)
+    else:
+        with pytest.raises(ServerFaultError):
+            answer.data()
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"{", b"\xff", b"nul", b"9" * 5000, b'{"id": 1}', b"[]", b'"text"', b"null"]
+)
+def test_what_is_no_item_is_a_server_fault(content: bytes) -> None:
+    """Plain words with the host."""
+    with pytest.raises(ServerFaultError, match=r"silo\.example\.com"):
+        reply(200, content).model(Item)
+
+
+def test_a_web_page_where_data_was_wanted_asks_for_the_address() -> None:
+    """A captive portal, or the address of something else."""
+    with pytest.raises(ServerFaultError, match=r"web page instead of data \(Hotel & WLAN\)"):
+        reply(200, b"<html><title>Hotel &amp; WLAN</title></html>", "text/html").model(Item)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        [{"child_part_number": "F01-0001", "quantity": 2}],
+        {"items": [{"child_part_number": "F01-0001", "quantity": "2"}]},
+        {"part_number": "A", "bom": [{"child_part_number": "F01-0001", "quantity": 2.0, "unit": None}]},
+        {"entries": [{"child_part_number": "F01-0001", "quantity": 2, "new_key": {}}]},
+    ],
+)
+def test_lists_are_read_bare_or_wrapped(body: Any) -> None:
+    """Unknown keys and nulls do no harm."""
+    (line,) = reply(200, body).models(BomLine, "items", "entries", "bom")
+    assert (line["child_part_number"], line["quantity"], line["source"]) == ("F01-0001", 2, "assembly")
+
+
+def test_an_empty_list_may_be_null() -> None:
+    """Go writes it so."""
+    assert reply(200, {"bom": None}).models(BomLine, "bom") == []
+    with pytest.raises(ServerFaultError, match="no list"):
+        reply(200, {"other": []}).models(BomLine, "bom")
