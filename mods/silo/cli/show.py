@@ -40,7 +40,7 @@ def plain(text: str) -> str:
 
 def entry_text(entry: BomEntry, base: str) -> Text:
     """One line of the tree."""
-    text = Text(f"{entry.quantity} × ", style="bold")
+    text = Text().append(f"{entry.quantity} × ", "bold")
     if entry.part_number:
         text.append(plain(entry.part_number), "cyan").append("  ").append(plain(entry.name or ""))
     else:
@@ -90,7 +90,7 @@ def findings_text(findings: Iterable[Finding], base: str = "") -> Group:
     lines = []
     for finding in sorted(findings, key=lambda f: order[f.severity]):
         mark, style = _MARK[finding.severity]
-        lines.append(Text(f"{mark} ", style).append(plain(shorten(finding.message, base)), ""))
+        lines.append(Text().append(f"{mark} ", style).append(plain(shorten(finding.message, base)), ""))
     return Group(*lines)
 
 
@@ -164,7 +164,7 @@ def outcome_text(outcome: Outcome) -> Text:
     mark, style, words = _STATUS[outcome.status]
     head = outcome.assembly
     who = " ".join(filter(None, (head.part_number, head.name))) or display_name(head)
-    text = Text(f"{mark} ", style).append(plain(who), "bold").append(f": {words}")
+    text = Text().append(f"{mark} ", style).append(plain(who), "bold").append(f": {words}")
     if outcome.error is not None:
         text.append(f": {plain(str(outcome.error))}")
     return text
