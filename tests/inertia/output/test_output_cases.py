@@ -1,0 +1,309 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Cases 16, 19, 41, 42, 43: what goes out reads back, loads, and is refused where no body can have it."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import xml.etree.ElementTree as ET
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import jsonschema_rs
+import numpy as np
+import pytest
+from rich.console import Console
+
+from silo.bom.errors import InputError
+from silo.inertia.bodies import box, cylinder, placement, shape_only
+from silo.inertia.core import MassProps, combine
+from silo.inertia.frames import ASSEMBLY_FRAME, origin_frame
+from silo.inertia.output.data import CSV_HEADER, report_csv, report_data, report_json
+from silo.inertia.output.snippets import SNIPPETS, snippets
+from silo.inertia.output.text import report_markdown, report_tables
+from silo.inertia.output.values import number, settled, writable
+from silo.inertia.report import LinkResult
+
+Fixture = Callable[..., Any]
+SCHEMA = Path(__file__).parents[3] / "docs" / "inertia-schema.json"
+BOM = (
+    "Item,Quantity,Material,Mass,Name\n1,1,steel,,plate\n2,3,,0.25 kg,rod\n"
+    "3,1,Unobtainium,,block\n4,1,,,pad\n5,1,,,glue\n"
+)
+
+
+@pytest.fixture(name="report")
+def _report(assemble: Fixture, compute: Fixture) -> Any:
+    """Two links with every kind of part, a link without mass, an unclaimed part."""
+    rod = cylinder("rod", 0.02, 0.3)
+    return compute(
+        assemble(
+            ("base/plate", box("plate", 0.1, 0.2, 0.01)),
+            ("base/rod1", rod, origin_frame((0.1, 0.2, 0.3), (0.4, 0.5, 0.6))),
+            ("arm/rod2", rod, origin_frame((1, 0, 0), (0, 1, 0))),
+            ("arm/rod3", rod, origin_frame((0, 1, 0), (1, 0, 0))),
+            ("arm/block", box("block", 0.05, 0.06, 0.07), placement((0, 0, 1))),
+            ("pad/pad", box("pad", 0.01, 0.01, 0.01)),
+            ("loose | part", box("loose | part", 0.01, 0.02, 0.03)),
+            source="arm.step",
+        ),
+        BOM,
+    )
+
+
+def real_links(report: Any) -> dict[str, MassProps]:
+    return writable(report.links.values())
+
+
+def from_snippet(kind: str, text: str) -> dict[str, MassProps]:
+    """What a consumer would read."""
+    found: dict[str, MassProps] = {}
+    for link in ET.fromstring(f"<all>{text}</all>"):  # noqa: S314 (our own text)
+        inertial = link.find("inertial")
+        assert inertial is not None
+        if kind == "mjcf":
+            com, mass = inertial.get("pos", ""), inertial.get("mass", "")
+            xx, yy, zz, xy, xz, yz = (float(v) for v in inertial.get("fullinertia", "").split())
+        elif kind == "urdf":
+            com, mass = inertial.find("origin").get("xyz"), inertial.find("mass").get("value")  # type: ignore[union-attr]
+            tensor = inertial.find("inertia")
+            xx, yy, zz, xy, xz, yz = (
+                float(tensor.get(k)) for k in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+            )  # type: ignore[union-attr,arg-type]
+        else:
+            com, mass = inertial.findtext("pose", ""), inertial.findtext("mass", "")
+            assert com.split()[3:] == ["0", "0", "0"]
+            tensor = inertial.find("inertia")
+            xx, yy, zz, xy, xz, yz = (
+                float(tensor.findtext(k)) for k in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+            )  # type: ignore[union-attr,arg-type]
+        rows = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
+        found[link.get("name", "")] = MassProps(float(mass), [float(v) for v in com.split()[:3]], rows)  # type: ignore[union-attr,arg-type]
+    return found
+
+
+@pytest.mark.parametrize("kind", SNIPPETS)
+def test_case_41_snippets_read_back(report: Any, kind: str) -> None:
+    """URDF, SDF and MJCF hold the numbers to 1e-9 and better, products with their sign and in their place."""
+    links = real_links(report)
+    read = from_snippet(kind, snippets(links, kind))
+    assert read.keys() == links.keys() == {"base", "arm"}
+    for name in links:
+        ours = report.links[name].props
+        assert read[name].mass == pytest.approx(ours.mass, rel=1e-12)
+        assert read[name].com == pytest.approx(ours.com, rel=1e-12, abs=1e-15)
+        assert np.abs(read[name].inertia - ours.inertia).max() <= 1e-12 * np.abs(ours.inertia).max()
+        assert read[name].check(tolerance=0.0) == ()
+        assert np.abs(ours.inertia[0, 1]) > 1e-6  # the products are there to be mixed up
+
+
+def mujoco_model(links: dict[str, MassProps]) -> Any:
+    mujoco = pytest.importorskip("mujoco")
+    bodies = snippets(links, "mjcf").replace("<inertial", "<freejoint/><inertial")
+    return mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{bodies}</worldbody></mujoco>")
+
+
+def test_case_42_mujoco_loads_every_link(report: Any) -> None:
+    """The strict consumer takes them, and has our principal moments."""
+    links = real_links(report)
+    model = mujoco_model(links)
+    for index, (name, props) in enumerate(links.items(), start=1):
+        assert model.body(index).name == name
+        assert model.body_mass[index] == pytest.approx(props.mass)
+        assert model.body_ipos[index] == pytest.approx(props.com)
+        assert sorted(model.body_inertia[index]) == pytest.approx(props.principal()[0], rel=1e-9)
+
+
+def test_case_42_mujoco_loads_our_urdf(report: Any) -> None:
+    """The same through the URDF that we write."""
+    from silo.inertia.output.urdf import fill_urdf
+
+    mujoco = pytest.importorskip("mujoco")
+    joint = '<joint name="j" type="continuous"><parent link="base"/><child link="arm"/></joint>'
+    root = '<link name="world"/><joint name="w" type="floating"><parent link="world"/>'
+    root += '<child link="base"/></joint>'
+    urdf = f'<robot name="r">{root}<link name="base"/><link name="arm"/>{joint}</robot>'
+    links = real_links(report)
+    model = mujoco.MjModel.from_xml_string(fill_urdf(urdf.encode(), links).data.decode())
+    masses = {model.body(i).name: model.body_mass[i] for i in range(model.nbody)}
+    for name, props in links.items():
+        assert masses[name] == pytest.approx(props.mass)
+
+
+def link(props: MassProps, name: str = "arm") -> LinkResult:
+    return LinkResult(name, props, ASSEMBLY_FRAME, (), props.check())
+
+
+BAD = [
+    np.diag([1.0, 1.0, 2.1]),
+    np.diag([1.0, 1.0, 2.0 * (1 + 1e-6)]),
+    np.diag([0.02] * 3) + 0.015 * np.array([[0, 1, 0], [1, 0, 0], [0, 0, 0.0]]),
+    np.diag([-1.0, 2.0, 2.0]),
+    np.zeros((3, 3)),
+]
+
+
+@pytest.mark.parametrize("tensor", BAD)
+def test_wrong_tensors_are_refused_by_us_first(tensor: np.ndarray) -> None:
+    """What MuJoCo refuses on a moving link never gets that far; the message names the link."""
+    mujoco = pytest.importorskip("mujoco")
+    props = MassProps(1.0, [0, 0, 0], tensor)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="arm has"):
+        writable([link(props)])
+    with pytest.raises(ValueError, match=r"inertia|mjMINVAL"):
+        mujoco_model({"arm": props})
+    assert mujoco.__version__
+
+
+def test_all_bad_links_are_named_at_once() -> None:
+    """Not the first one only."""
+    bad = MassProps(1.0, [0, 0, 0], BAD[0])  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"elbow has .*; wrist has"):
+        writable([link(bad, "elbow"), link(bad, "wrist")])
+
+
+def test_case_16_flat_plate_survives_printing() -> None:
+    """a + b = c in any orientation: after rounding MuJoCo still takes it, and the numbers hardly move."""
+    rng = np.random.default_rng(7)
+    for _ in range(50):
+        a, b = rng.uniform(1e-9, 1e-3, 2)
+        turn = origin_frame((0, 0, 0), rng.uniform(-3, 3, 3))
+        plate = MassProps(0.01, [0, 0, 0], np.diag([a, b, a + b])).transform(turn)  # type: ignore[arg-type]
+        out = settled(plate)
+        assert out.check(tolerance=0.0) == ()
+        assert np.abs(out.inertia - plate.inertia).max() <= 1e-12 * (a + b)
+        mujoco_model({"plate": out})
+
+
+def test_tiny_parts_keep_their_digits() -> None:
+    """5e-9 kg m² on 0.2 g: printing with %g would lose them."""
+    tensor = np.diag([5.123456789012e-9, 5.2e-9, 6e-9])
+    read = from_snippet("urdf", snippets({"x": MassProps(2e-4, [0, 0, 0], tensor)}, "urdf"))  # type: ignore[arg-type]
+    assert read["x"].inertia[0, 0] == pytest.approx(5.123456789012e-9, rel=1e-14)
+
+
+def test_case_19_a_link_without_mass_is_left_out_and_told(report: Any, codes: Fixture) -> None:
+    """No simulator takes a moving link of no mass; it gets no <inertial>, and a warning."""
+    assert "pad" not in real_links(report)
+    assert [w.code for w in report.warnings if w.link_name == "pad" and not w.part_name] == ["zero_mass_link"]
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(-0.0, "0"), (0.1, "0.1"), (0.1 + 0.2, "0.3"), (1e-300, "1e-300")]
+)
+def test_numbers(value: float, text: str) -> None:
+    """Fifteen digits: no noise of the last bit, no minus zero."""
+    assert number(value) == text
+
+
+def test_case_43_json_fits_its_schema(report: Any) -> None:
+    """The documented schema holds, for a full report and an empty one."""
+    from silo.inertia.report import InertiaReport
+
+    schema = json.loads(SCHEMA.read_text("utf-8"))
+    validator = jsonschema_rs.validator_for(schema)
+    for one in (report, InertiaReport()):
+        data = json.loads(report_json(one))
+        assert list(validator.iter_errors(data)) == []
+        assert data == report_data(one)
+    data = json.loads(report_json(report))
+    data["links"][0]["parts"][0]["source"] = "a feeling"
+    assert not validator.is_valid(data)
+
+
+def test_schema_knows_every_code_of_the_program() -> None:
+    """Enumerations of schema and program are the same."""
+    from silo.inertia.codes import Decided, Rule, Source
+    from silo.inertia.core import TensorProblem
+
+    schema = json.loads(SCHEMA.read_text("utf-8"))["$defs"]
+    part = schema["part"]["properties"]
+    assert part["source"]["enum"] == [str(s) for s in Source]
+    assert part["rule"]["enum"] == [str(r) for r in Rule]
+    assert part["decided_by"]["enum"] == [str(d) for d in Decided]
+    assert set(schema["link"]["properties"]["problems"]["items"]["enum"]) == {str(t) for t in TensorProblem}
+
+
+def test_case_43_order_is_stable_and_warnings_complete(report: Any) -> None:
+    """Links as placed, parts as placed, and each warning with a code and a sentence."""
+    data = report_data(report)
+    assert [one["name"] for one in data["links"]] == ["base", "arm", "pad"]
+    assert [p["name"] for p in data["links"][1]["parts"]] == ["rod", "block"]
+    assert data["links"][1]["parts"][0]["paths"] == ["arm/rod2", "arm/rod3"]
+    assert [p["name"] for p in data["unclaimed"]] == ["loose | part"]
+    assert report_data(report) == data
+    for warning in data["warnings"]:
+        assert warning["code"]
+        assert warning["message"]
+        assert warning["link"] or warning["part"]
+    told = {(w["link"], w["part"], w["code"]) for w in data["warnings"]}
+    assert {
+        ("arm", "block", "unknown_material"),
+        ("pad", "pad", "no_mass_no_material"),
+        ("", "glue", "row_unused"),
+        ("", "loose | part", "unclaimed"),
+    } <= told
+
+
+def test_part_masses_of_the_json_sum_up(report: Any) -> None:
+    """mass × quantity over the parts is the link's mass."""
+    for one in report_data(report)["links"]:
+        assert sum(p["mass"] * p["quantity"] for p in one["parts"]) == pytest.approx(one["mass"])
+        assert sum(p["total_mass"] for p in one["parts"]) == pytest.approx(one["mass"])
+
+
+def test_csv_has_one_row_per_link_and_part(report: Any) -> None:
+    """Readable by any spreadsheet, complete, and safe from formulae."""
+    rows = list(csv.reader(io.StringIO(report_csv(report))))
+    assert tuple(rows[0]) == CSV_HEADER
+    assert [row[:2] for row in rows[1:]] == [
+        ["base", "plate"], ["base", "rod"], ["arm", "rod"], ["arm", "block"], ["pad", "pad"],
+        ["", "loose | part"],
+    ]  # fmt: skip
+    assert float(rows[2][4]) == 0.25
+
+
+@pytest.mark.parametrize("name", ["=1+1", "@SUM(A1)", "+7", "-3 bracket"])
+def test_csv_does_not_run_part_names(assemble: Fixture, compute: Fixture, name: str) -> None:
+    """A spreadsheet must not take a part's name for a formula."""
+    report = compute(assemble(("l/x", box(name, 0.1, 0.1, 0.1))), None)
+    assert list(csv.reader(io.StringIO(report_csv(report))))[1][1] == "'" + name
+
+
+def test_markdown_and_table_hold_the_essentials(report: Any) -> None:
+    """Links, sources, rules, materials, warnings; names are text and not markup."""
+    text = report_markdown(report, "picture.png")
+    assert "![" in text
+    assert "loose \\| part" in text
+    assert "BOM mass" in text
+    assert "assembly frame" in text
+    assert "`unknown_material`" in text
+    console = Console(width=200, record=True, file=io.StringIO())
+    console.print(report_tables(report))
+    shown = console.export_text()
+    assert "whole assembly" in shown
+    assert "(no link)" in shown
+    assert "Unobtainium" in shown
+
+
+def test_names_do_not_steer_the_terminal(assemble: Fixture, compute: Fixture) -> None:
+    """Control characters and rich markup in a part's name are shown as text, on one line."""
+    report = compute(assemble(("l/x", box("a\x1b[31m[red]b[/red]\nc", 0.1, 0.1, 0.1))), None)
+    out = io.StringIO()
+    Console(width=200, file=out).print(report_tables(report))
+    assert "\x1b" not in out.getvalue()
+    assert "[31m[red]b[/red] c" in out.getvalue()
+
+
+def test_point_masses_of_one_link_make_a_body(assemble: Fixture, compute: Fixture) -> None:
+    """Several points have an inertia together, which passes where it is a real one."""
+    x = shape_only("x")
+    spots = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
+    asm = assemble(*((f"l/x{i}", x, placement(spot)) for i, spot in enumerate(spots)))
+    report = compute(asm, "Name,Material,Mass\nx,,0.500 kg\n")
+    assert combine([MassProps(0.5, spot, np.zeros((3, 3))) for spot in spots]).inertia == pytest.approx(  # type: ignore[arg-type]
+        report.links["l"].props.inertia
+    )
+    assert real_links(report)["l"].mass == 2.0

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""URDF files: only the inertials change, frames follow the joints, hostile files are plain errors."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from silo.bom.errors import InputError
+from silo.inertia.core import MassProps
+from silo.inertia.output.urdf import fill_urdf, urdf_frames, write_urdf
+
+PROPS = MassProps(1.5, [0.1, 0.2, 0.3], np.diag([0.01, 0.02, 0.025]))  # type: ignore[arg-type]
+
+ROBOT = b"""<?xml version='1.0' encoding="utf-8"?>
+<!-- a comment > with <link name="fake"/> in it -->
+<robot name='r'   xmlns:xacro="http://www.ros.org/wiki/xacro">
+\t<link name="empty"/>
+  <link  name='old' >
+     <visual><geometry><box size="1 1 1"/></geometry></visual>
+     <inertial> <mass value="9"/> <!-- guessed --> </inertial>
+     <collision/>
+  </link>
+  <link name="a &gt; b"><visual/></link>
+  <link name="bare">
+  </link>
+  <gazebo reference="old"><link name="empty"/></gazebo>
+  <joint name="j1" type="revolute">
+    <origin xyz="1 2 3" rpy="0 0 1.5707963267948966"/>
+    <parent link="empty"/><child link="old"/>
+  </joint>
+  <joint name="j2" type="fixed"><parent link="old"/><child link="bare"/><origin xyz="1 0 0"/></joint>
+</robot>
+<!-- the end: \xc3\xa9 -->
+"""
+
+
+def inertial_spans(data: bytes) -> bytes:
+    """The file with its inertials cut out, and without the space around them."""
+    import re
+
+    return re.sub(rb"\s*<inertial>.*?</inertial>\s*", b"", data, flags=re.DOTALL)
+
+
+def test_existing_and_missing_inertials_are_filled() -> None:
+    """Every named link has exactly one, with our numbers; others keep what they had."""
+    filled = fill_urdf(ROBOT, {"empty": PROPS, "old": PROPS, "a > b": PROPS, "bare": PROPS, "ghost": PROPS})
+    assert filled.written == ("empty", "old", "a > b", "bare")
+    assert filled.absent == ("ghost",)
+    assert filled.untouched == ()
+    for link in ET.fromstring(filled.data).findall("link"):  # noqa: S314 (our own text)
+        (inertial,) = link.findall("inertial")
+        assert inertial.find("mass").get("value") == "1.5"  # type: ignore[union-attr]
+        assert inertial.find("origin").get("xyz") == "0.1 0.2 0.3"  # type: ignore[union-attr]
+
+
+def test_the_rest_of_the_file_stays_byte_for_byte() -> None:
+    """Quotes, comments, tabs, declaration: a diff shows the inertials only."""
+    filled = fill_urdf(ROBOT, {"old": PROPS})
+    assert inertial_spans(filled.data) == inertial_spans(ROBOT)
+    before, after = ROBOT.split(b"<inertial>")[0], ROBOT.split(b"</inertial>")[1]
+    assert filled.data.startswith(before)
+    assert filled.data.endswith(after)
+    assert filled.untouched == ("empty", "a > b", "bare")
+
+
+def test_filling_twice_changes_nothing_more() -> None:
+    """The second run writes the same file."""
+    links = {"empty": PROPS, "old": PROPS, "bare": PROPS}
+    once = fill_urdf(ROBOT, links).data
+    assert fill_urdf(once, links).data == once
+
+
+def test_line_ends_of_the_file_are_kept() -> None:
+    """A file of Windows stays one."""
+    data = fill_urdf(ROBOT.replace(b"\n", b"\r\n"), {"empty": PROPS, "bare": PROPS}).data
+    assert data.count(b"\n") == data.count(b"\r\n")
+
+
+def test_written_in_place_and_elsewhere(tmp_path: Path) -> None:
+    """Atomically, with the file's mode; a target of its own leaves the source alone."""
+    path = tmp_path / "robot.urdf"
+    path.write_bytes(ROBOT)
+    path.chmod(0o640)
+    write_urdf(path, {"old": PROPS}, tmp_path / "out.urdf")
+    assert path.read_bytes() == ROBOT
+    write_urdf(path, {"old": PROPS})
+    assert path.read_bytes() == (tmp_path / "out.urdf").read_bytes() != ROBOT
+    assert path.stat().st_mode & 0o777 == 0o640
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["out.urdf", "robot.urdf"]
+
+
+def test_frames_follow_the_joints() -> None:
+    """Origins chain from the root, all joints at zero; a missing rpy is none."""
+    frames = urdf_frames(ROBOT)
+    assert frames["empty"] == pytest.approx(np.eye(4))
+    assert frames["old"] @ [1, 0, 0, 1] == pytest.approx([1, 3, 3, 1])
+    assert frames["bare"][:3, 3] == pytest.approx([1, 3, 3])
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b"", "no XML"),
+        (b"<robot><link name='a'></robot>", "no XML"),
+        (b"<sdf><link name='a'/></sdf>", "wanted a URDF"),
+        (b"<!DOCTYPE robot [<!ENTITY a 'b'>]><robot>&a;</robot>", "DOCTYPE"),
+        ("<robot/>".encode("utf-16"), "UTF-16"),
+    ],
+)
+def test_files_that_are_no_urdf(data: bytes, words: str) -> None:
+    """One plain sentence each."""
+    with pytest.raises(InputError, match=words):
+        fill_urdf(data, {"a": PROPS}, "x.urdf")
+
+
+def test_joints_that_are_no_tree() -> None:
+    """A ring, two parents, origins that xacro has not computed yet."""
+
+    def joint(parent: str, child: str, origin: str = "") -> str:
+        return (
+            f'<joint name="{parent}{child}"><parent link="{parent}"/><child link="{child}"/>{origin}</joint>'
+        )
+
+    links = '<link name="a"/><link name="b"/>'
+    with pytest.raises(InputError, match="ring"):
+        urdf_frames(f"<robot>{links}{joint('a', 'b')}{joint('b', 'a')}</robot>".encode())
+    with pytest.raises(InputError, match="two parents"):
+        urdf_frames(f"<robot>{links}{joint('a', 'b')}{joint('c', 'b')}</robot>".encode())
+    xacro = joint("a", "b", '<origin xyz="${x} 0 0"/>')
+    with pytest.raises(InputError, match="xacro"):
+        urdf_frames(f"<robot>{links}{xacro}</robot>".encode())
+
+
+def test_a_missing_file(tmp_path: Path) -> None:
+    """With its path."""
+    with pytest.raises(InputError, match=r"none\.urdf"):
+        write_urdf(tmp_path / "none.urdf", {})

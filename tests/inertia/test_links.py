@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Which part belongs to which link, and in which frame its numbers are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from silo.bom.errors import ConfigError, InputError
+from silo.inertia.bodies import box
+from silo.inertia.frames import FrameChoice, origin_frame
+from silo.inertia.links import claim, link_map, matches, read_link_map
+from silo.inertia.model import Instance
+
+Fixture = Callable[..., Any]
+PART = box("p", 0.1, 0.1, 0.1)
+
+
+def instance(path: str, products: str = "") -> Instance:
+    names = tuple(path.split("/"))
+    return Instance(names, tuple(products.split("/")) if products else names, "p")
+
+
+@pytest.mark.parametrize(
+    ("pattern", "path", "hit"),
+    [
+        ("arm", "arm/bolt", True),
+        ("arm", "forearm/bolt", False),
+        ("arm/bolt", "arm/bolt", True),
+        ("bolt", "arm/bolt", False),
+        ("**/bolt", "arm/joint/bolt", True),
+        ("**/bolt", "bolt", True),
+        ("arm/**", "arm/joint/bolt", True),
+        ("arm/**", "arm2/joint", False),
+        ("arm*", "arm2/joint", True),
+        ("arm/*/bolt", "arm/joint/bolt", True),
+        ("arm/*/bolt", "arm/a/b/bolt", False),
+        ("*", "anything/at/all", True),
+        ("bolt (1)", "bolt (1)", True),
+        ("a.b", "axb", False),
+        ("bolt_?", "bolt_1", True),
+        ("bolt_?", "bolt_10", False),
+        ("1/4 bolt", "1/4 bolt", True),
+    ],
+)
+def test_patterns(pattern: str, path: str, hit: bool) -> None:
+    """``*`` within a level, ``**`` across, all below a matched sub-assembly; the rest is literal."""
+    assert matches(pattern, instance(path)) is hit
+
+
+def test_product_patterns() -> None:
+    """Instance names of SolidWorks are NAUO1 and so on; products have the real names."""
+    placed = instance("NAUO1/NAUO7", "upper arm/M4 bolt")
+    assert matches("product:upper arm", placed)
+    assert matches("product:M4*", placed)
+    assert not matches("upper arm", placed)
+
+
+def test_default_links_are_first_level_sub_assemblies(assemble: Fixture) -> None:
+    """Parts beside them are unclaimed, and listed."""
+    asm = assemble(("base/a", PART), ("plate", PART), ("arm/b", PART), ("base/c", PART))
+    claims = claim(asm)
+    assert claims.members == {"base": (0, 3), "arm": (2,)}
+    assert claims.unclaimed == (1,)
+
+
+def test_without_sub_assemblies_all_is_one_link(assemble: Fixture) -> None:
+    """A flat file is one link, named after it."""
+    assert claim(assemble(("a", PART), ("b", PART), name="gripper")).members == {"gripper": (0, 1)}
+
+
+def test_unclaimed_parts_are_in_no_link_but_in_the_total(
+    assemble: Fixture, compute: Fixture, codes: Fixture
+) -> None:
+    """Their mass is told, with one warning per product."""
+    asm = assemble(("base/a", PART), ("plate", PART))
+    report = compute(asm, "Name,Material,Mass\np,steel,\n")
+    assert report.links["base"].props.mass == pytest.approx(7.85)
+    assert report.total.mass == pytest.approx(15.7)
+    assert [part.total_mass for part in report.unclaimed] == [pytest.approx(7.85)]
+    assert codes(report) == ["unclaimed"]
+    assert "7.85 kg" in report.warnings[0].message
+
+
+def test_loose_parts_can_be_given_a_link(assemble: Fixture, compute: Fixture, codes: Fixture) -> None:
+    """The user's word for what lies beside the sub-assemblies."""
+    asm = assemble(("arm/a", PART), ("plate", PART))
+    report = compute(asm, "Name,Material,Mass\np,steel,\n", loose_link="base_link")
+    assert report.links["base_link"].props.mass == pytest.approx(7.85)
+    assert report.unclaimed == ()
+    assert codes(report) == []
+
+
+def test_map_claims_in_order_and_tells_overlaps(assemble: Fixture, compute: Fixture, codes: Fixture) -> None:
+    """The first link has it; the second is told; a pattern without effect as well."""
+    asm = assemble(("base/a", PART), ("arm/b", PART))
+    links = link_map({"links": {"base": ["base", "arm/b"], "arm": ["arm/**", "wrist"], "empty": ["nothing"]}})
+    report = compute(asm, "Name,Material,Mass\np,steel,\n", links=links)
+    assert report.links["base"].props.mass == pytest.approx(15.7)
+    assert report.links["arm"].props.mass == 0
+    found = {(w.link_name, str(w.code)) for w in report.warnings}
+    assert found == {
+        ("arm", "claimed_twice"),
+        ("arm", "pattern_unused"),
+        ("arm", "zero_mass_link"),
+        ("empty", "pattern_unused"),
+        ("empty", "zero_mass_link"),
+    }
+
+
+def test_map_from_yaml(tmp_path: Path, assemble: Fixture, compute: Fixture) -> None:
+    """The documented form, with frames."""
+    path = tmp_path / "links.yaml"
+    path.write_text(
+        "links:\n  base: base\n  arm:\n    parts: ['arm/**']\n"
+        "    origin: {xyz: [1, 0, 0], rpy: [0, 0, 1.5707963267948966]}\n",
+        "utf-8",
+    )
+    asm = assemble(("base/a", PART), ("arm/b", PART, origin_frame((1, 2, 0), (0, 0, 0))))
+    report = compute(asm, None, links=read_link_map(path))
+    assert report.links["arm"].props.com == pytest.approx([2, 0, 0])
+    assert report.links["arm"].frame.description == "origin in the link map"
+    assert report.links["base"].frame.description == "assembly frame"
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (None, "wanted “links:”"),
+        ({"links": {}}, "wanted “links:”"),
+        (
+            {"links": {"a": 3, "b": {"parts": ["x"], "colour": 1}}},
+            "a: wanted a list.*b: unknown key “colour”",
+        ),
+        ({"links": {"a": {"parts": ["x"], "frame": "f", "origin": {}}}}, "both a frame and an origin"),
+        ({"links": {"a": {"parts": ["x"], "origin": {"xyz": [1, 2]}}}}, "origin: wanted"),
+        ({"links": {"a": {"parts": ["x"], "origin": {"xyz": "far"}}}}, "origin: wanted"),
+    ],
+)
+def test_bad_maps_name_all_problems(data: Any, words: str) -> None:
+    """All problems of the file at once."""
+    with pytest.raises(ConfigError, match=words):
+        link_map(data)
+
+
+def test_map_files_that_cannot_be_read(tmp_path: Path) -> None:
+    """Absent, or no YAML."""
+    bad = tmp_path / "bad.yaml"
+    bad.write_text("links: [a: {", "utf-8")
+    with pytest.raises(ConfigError, match="no YAML"):
+        read_link_map(bad)
+    with pytest.raises(ConfigError, match="cannot be read"):
+        read_link_map(tmp_path / "none.yaml")
+
+
+def test_frame_of_a_sub_assembly(assemble: Fixture, compute: Fixture) -> None:
+    """``frame: arm`` gives the link's numbers in the placed sub-assembly's own axes."""
+    frame = origin_frame((0, 0, 2), (np.pi / 2, 0, 0))
+    asm = assemble(("arm/b", box("b", 0.1, 0.2, 0.3), frame), frames={("arm",): frame})
+    links = link_map({"links": {"arm": {"parts": ["arm"], "frame": "arm"}}})
+    report = compute(asm, "Name,Material,Mass\nb,steel,\n", links=links)
+    own = compute(asm, "Name,Material,Mass\nb,steel,\n", frame=FrameChoice.OWN)
+    for found in (report.links["arm"], own.links["arm"]):
+        assert found.props.com == pytest.approx([0, 0, 0], abs=1e-12)
+        assert found.props.inertia == pytest.approx(np.diag(np.diag(found.props.inertia)), abs=1e-15)
+        assert found.props.inertia[0, 0] == pytest.approx(7850 * 0.006 * (0.04 + 0.09) / 12)
+
+
+def test_a_frame_that_is_not_there_is_an_error(assemble: Fixture) -> None:
+    """With the link and the name."""
+    links = link_map({"links": {"arm": {"parts": ["arm"], "frame": "wrist"}}})
+    with pytest.raises(ConfigError, match="arm: there is no placed sub-assembly or part “wrist”"):
+        claim(assemble(("arm/b", PART)), links)
+
+
+def test_a_mirrored_frame_is_refused(assemble: Fixture, compute: Fixture) -> None:
+    """A left-handed link frame exists in no simulator."""
+    asm = assemble(("arm/b", PART), frames={("arm",): np.diag([-1.0, 1, 1, 1])})
+    with pytest.raises(InputError, match="mirrored"):
+        compute(asm, None, frame=FrameChoice.OWN)
