@@ -191,6 +191,8 @@ class EventListener:
                 self._forget_mark(stop)
             except SiloError as error:
                 reason = str(error)
+            if stop.is_set():
+                return None
             # Only what was really received counts as success: a server that greets and drops us is not up.
             failures = 1 if heard.anything else failures + 1
             pause = self._backoff.pause(failures, self._chance())

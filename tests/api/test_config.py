@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Which server and which token: options, environment, file; and a private file."""
+
+from __future__ import annotations
+
+import logging
+import os
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from silo.api.config import config_path, load_config, resolve_server, save_config
+from silo.bom.errors import ConfigError
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "deep" / "config.toml"
+
+
+def test_without_a_server_the_message_says_how_to_get_one(path: Path) -> None:
+    """The first thing that a new user sees."""
+    with pytest.raises(ConfigError) as caught:
+        resolve_server(env={}, path=path)
+    for hint in ("silo-mod serve", "SILO_API_URL", "SILO_API_TOKEN", "--server", str(path)):
+        assert hint in str(caught.value)
+
+
+def test_options_win_over_the_environment_and_that_over_the_file(path: Path) -> None:
+    """Each may be given alone; blanks count as nothing."""
+    save_config("http://file", "silo_file", path=path)
+    env = {"SILO_API_URL": "http://env", "SILO_API_TOKEN": " silo_env "}
+    assert resolve_server("http://option", "silo_option", env=env, path=path).url == "http://option"
+    from_env = resolve_server(" ", None, env=env, path=path)
+    assert (from_env.url, from_env.token) == ("http://env", "silo_env")
+    assert (from_env.url_from, from_env.token_from) == ("SILO_API_URL", "SILO_API_TOKEN")
+    from_file = resolve_server(env={}, path=path)
+    assert (from_file.url, from_file.token, from_file.token_from) == ("http://file", "silo_file", str(path))
+
+
+def test_the_files_token_is_for_the_files_server_only(path: Path) -> None:
+    """`--server http://elsewhere` must not hand our token to elsewhere."""
+    save_config("https://silo.example.com", "silo_file", path=path)
+    assert resolve_server("https://other.example.com", env={}, path=path).token is None
+    assert resolve_server("https://silo.example.com:443/api", env={}, path=path).token == "silo_file"
+
+
+def test_the_token_is_not_in_the_repr(path: Path) -> None:
+    """Settings end up in logs."""
+    assert "silo_x" not in repr(resolve_server("http://h", "silo_x", env={}, path=path))
+
+
+@pytest.mark.parametrize(
+    ("text", "value"), [("0", False), ("No", False), ("off", False), ("1", True), ("TRUE", True), ("", True)]
+)
+def test_the_check_of_certificates_is_read(path: Path, text: str, value: bool) -> None:
+    """SILO_SSL_VERIFY as people write it."""
+    env = {"SILO_API_URL": "https://h", "SILO_SSL_VERIFY": text}
+    assert resolve_server(env=env, path=path).verify is value
+
+
+def test_the_check_may_name_a_file_that_exists(path: Path, tmp_path: Path) -> None:
+    """A typo must not silently turn into "no check", nor into a riddle later."""
+    authorities = tmp_path / "ca.pem"
+    authorities.write_text("x")
+    assert resolve_server("https://h", verify=str(authorities), env={}, path=path).verify == str(authorities)
+    with pytest.raises(ConfigError, match=r"ca2\.pem is no file"):
+        resolve_server("https://h", env={"SILO_SSL_VERIFY": str(tmp_path / "ca2.pem")}, path=path)
+    save_config("https://h", verify=False, path=path)
+    assert resolve_server(env={}, path=path).verify is False
+
+
+@pytest.mark.skipif(os.name != "posix", reason="file modes are POSIX")
+def test_the_file_is_private(path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """Mode 0600 from the first byte, in a folder of its own; an open one is warned about."""
+    save_config("http://h", "silo_x", path=path)
+    assert path.stat().st_mode & 0o777 == 0o600
+    assert path.parent.stat().st_mode & 0o777 == 0o700
+    path.chmod(0o644)
+    with caplog.at_level(logging.WARNING):
+        load_config(path)
+    assert "chmod 600" in caplog.text
+    save_config("http://h", "silo_x", path=path)
+    assert path.stat().st_mode & 0o777 == 0o600
+
+
+def test_the_rest_of_the_file_stays(path: Path) -> None:
+    """Other settings are not ours to drop; a token that is not given any more is."""
+    path.parent.mkdir()
+    path.write_text(
+        'title = "x"\n[server]\nurl = "http://a"\ntoken = "t"\nproxy = "p"\n[other.deep]\nn = [1, 2]\n'
+    )
+    path.chmod(0o600)
+    save_config("http://b", path=path)
+    assert load_config(path) == {
+        "title": "x",
+        "server": {"url": "http://b", "proxy": "p", "verify": True},
+        "other": {"deep": {"n": [1, 2]}},
+    }
+    assert not [p for p in path.parent.iterdir() if p != path]
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("[server\n", "cannot be read"),
+        ("server = 5", r"wanted a table \[server\]"),
+        ("[server]\nurl = 5", r"server\.url wants a text"),
+        ("[server]\nurl = 'http://h'\ntoken = true", r"server\.token wants a text"),
+        ("\udcff", "cannot be read"),
+    ],
+)
+def test_a_broken_file_is_told_with_its_name(path: Path, text: str, told: str) -> None:
+    """Which file, what is wrong."""
+    path.parent.mkdir()
+    path.write_bytes(text.encode("utf-8", "surrogateescape"))
+    path.chmod(0o600)
+    with pytest.raises(ConfigError, match=told) as caught:
+        resolve_server(env={}, path=path)
+    assert str(path) in str(caught.value)
+
+
+def test_nonsense_is_not_saved(path: Path) -> None:
+    """An address is checked before it is written."""
+    with pytest.raises(ConfigError):
+        save_config("not an address", path=path)
+    assert not path.exists()
+
+
+def test_the_path_follows_the_platform(tmp_path: Path) -> None:
+    """XDG_CONFIG_HOME where it is set."""
+    if os.name == "posix" and os.uname().sysname == "Linux":
+        env = {"XDG_CONFIG_HOME": str(tmp_path)}
+        assert config_path(env) == tmp_path / "silo-mod" / "config.toml"
+        assert config_path({"HOME": "/home/designer"}) == Path("/home/designer/.config/silo-mod/config.toml")
+
+
+texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
+values = st.recursive(
+    st.one_of(texts, st.integers(-(2**63), 2**63 - 1), st.booleans(), st.floats(allow_nan=False)),
+    lambda inner: st.one_of(st.lists(inner, max_size=3), st.dictionaries(texts, inner, max_size=3)),
+    max_leaves=8,
+)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.dictionaries(texts, values, max_size=4), texts)
+def test_any_settings_survive_being_saved_with(tmp_path: Path, others: dict[str, Any], token: str) -> None:
+    """Whatever TOML can hold is written back as it was."""
+    from silo.api.config import _toml
+
+    config = {**others, "server": {"url": "http://h", "token": token}}
+    assert tomllib.loads(_toml(config)) == config

@@ -1,0 +1,325 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The live connection: over real HTTP, through losses, restarts and refusals."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from silo.api.client import SiloClient
+from silo.api.events import Backoff, Connection, ConnectionState, EventListener, ServerEvent
+from silo.api.fake import FakeSilo
+from silo.bom.errors import AuthError, ServerFaultError, UnreachableError
+
+EVENTS = "GET /api/events"
+SSE = {"Content-Type": "text/event-stream; charset=utf-8"}
+
+
+def frame(marker: int | str | None, name: str = "item.updated", data: str = '{"part_number": "A"}') -> bytes:
+    head = f"id: {marker}\n" if marker is not None else ""
+    return f"{head}event: {name}\ndata: {data}\n\n".encode()
+
+
+class Watch:
+    """A listener with everything that it said, in one queue; pauses end at once and are noted."""
+
+    def __init__(self, api: Any, **options: Any) -> None:
+        self.said: queue.Queue[ServerEvent | ConnectionState] = queue.Queue()
+        self.pauses: list[float] = []
+        options.setdefault("chance", lambda: 0.0)
+        options.setdefault("wait", self._wait)
+        self.listener = EventListener(api, self.said.put, self.said.put, **options)
+
+    def _wait(self, wake: threading.Event, seconds: float) -> None:
+        self.pauses.append(seconds)
+
+    def __enter__(self) -> Watch:
+        self.listener.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.listener.stop()
+
+    def event(self) -> ServerEvent:
+        """The next event."""
+        while True:
+            said = self.said.get(timeout=20)
+            if isinstance(said, ServerEvent):
+                return said
+
+    def state(self, kind: Connection) -> ConnectionState:
+        """The next change to this state."""
+        while True:
+            said = self.said.get(timeout=20)
+            if isinstance(said, ConnectionState) and said.kind is kind:
+                return said
+
+
+@pytest.fixture
+def stream(server: Any, answer: Any) -> Callable[..., Any]:
+    """Makes scripted event streams; ``stay`` keeps one open until the server ends."""
+    server.on("GET /ready", {"mode": "normal"})
+
+    def make(*frames: bytes, stay: bool = False) -> Any:
+        def chunks() -> Iterator[bytes]:
+            yield b": hello\n\n"
+            yield from frames
+            if stay:
+                server.ending.wait()
+
+        return answer(200, headers=SSE, chunks=chunks())
+
+    return make
+
+
+def test_events_come_and_the_connection_is_told(
+    server: Any, client: SiloClient, stream: Callable[..., Any]
+) -> None:
+    """Connecting, online, events; heartbeats are not passed on."""
+    server.on(EVENTS, stream(frame(1), frame(None, "heartbeat", "{}"), frame(2, "bom.merged"), stay=True))
+    with Watch(client) as watch:
+        watch.state(Connection.CONNECTING)
+        watch.state(Connection.ONLINE)
+        assert [(e.id, e.type) for e in (watch.event(), watch.event())] == [
+            ("1", "item.updated"),
+            ("2", "bom_merge"),
+        ]
+        assert watch.listener.last_event_id == "2"
+    sent = server.seen[0].headers
+    assert (sent["Accept"], sent["Authorization"], sent["Last-Event-ID"]) == (
+        "text/event-stream",
+        "Bearer silo_secret",
+        None,
+    )
+
+
+def test_after_a_loss_it_goes_on_where_it_stopped(
+    server: Any, client: SiloClient, stream: Callable[..., Any], answer: Any
+) -> None:
+    """Cut off, refused twice, then replayed from the mark: nothing lost, nothing twice."""
+    server.on(
+        EVENTS,
+        stream(frame(7)),
+        answer(drop=True),
+        answer(502),
+        stream(frame(7), frame(8), frame(9), stay=True),
+    )
+    with Watch(client) as watch:
+        assert [watch.event().id for _ in range(3)] == ["7", "8", "9"]
+    asked = [seen.headers["Last-Event-ID"] for seen in server.seen if seen.path == "/api/events"]
+    assert asked == [None, "7", "7", "7"]
+    assert watch.pauses == [1.0, 2.0, 4.0]
+
+
+def test_a_server_that_counts_anew_gives_a_reset_first(
+    server: Any, client: SiloClient, stream: Callable[..., Any]
+) -> None:
+    """What happened around its restart was never replayed: read again, then go on from the new count."""
+    server.on(EVENTS, stream(frame(500)), stream(frame(3), frame(4)), stream(stay=True))
+    with Watch(client) as watch:
+        said = [watch.event() for _ in range(4)]
+        assert [(e.id, e.type) for e in said] == [
+            ("500", "item.updated"),
+            ("3", "reset"),
+            ("3", "item.updated"),
+            ("4", "item.updated"),
+        ]
+        watch.state(Connection.OFFLINE)
+        watch.state(Connection.ONLINE)
+    assert server.seen[-2].headers["Last-Event-ID"] == "4"
+
+
+def test_the_servers_own_reset_moves_the_mark_back(
+    server: Any, client: SiloClient, stream: Callable[..., Any]
+) -> None:
+    """Away for longer than its log goes back; one reset, not two."""
+    server.on(EVENTS, stream(frame(500)), stream(frame(2, "reset", "{}"), frame(3), stay=True))
+    with Watch(client) as watch:
+        assert [(e.id, e.type) for e in (watch.event(), watch.event(), watch.event())] == [
+            ("500", "item.updated"),
+            ("2", "reset"),
+            ("3", "item.updated"),
+        ]
+
+
+def test_a_mark_without_an_event_counts(server: Any, client: SiloClient, stream: Callable[..., Any]) -> None:
+    """The server says where we are before anything happens, so that a loss then loses nothing."""
+    server.on(EVENTS, stream(b"id: 41\n\n"), stream(frame(42), stay=True))
+    with Watch(client) as watch:
+        assert watch.event().id == "42"
+    assert server.seen[2].headers["Last-Event-ID"] == "41"
+
+
+def test_a_mark_that_the_server_refuses_is_given_up(
+    server: Any, client: SiloClient, stream: Callable[..., Any], answer: Any
+) -> None:
+    """Another server's id; the gap is told."""
+    server.on(EVENTS, answer(400, {"error": "no number"}), stream(frame(1), stay=True))
+    with Watch(client, last_event_id="abc") as watch:
+        assert [watch.event().type, watch.event().id] == ["reset", "1"]
+    assert server.seen[1].headers["Last-Event-ID"] is None
+
+
+@pytest.mark.parametrize("status", [401, 403])
+def test_a_token_that_is_refused_is_not_tried_again(
+    server: Any, client: SiloClient, stream: Callable[..., Any], answer: Any, status: int
+) -> None:
+    """The end, until a person acts; then start() begins anew."""
+    server.on(EVENTS, answer(status, {"error": "x"}), stream(frame(1), stay=True))
+    with Watch(client) as watch:
+        assert "token" in watch.state(Connection.REFUSED).message
+        watch.listener._thread.join(20)  # type: ignore[union-attr]
+        assert (watch.pauses, len(server.seen)) == ([], 1)
+        watch.listener.start()
+        assert watch.event().id == "1"
+
+
+def test_a_server_without_events_is_not_asked_again(server: Any, client: SiloClient, answer: Any) -> None:
+    """An older server."""
+    server.on(EVENTS, answer(404, "404 page not found"))
+    with Watch(client) as watch:
+        watch.state(Connection.UNSUPPORTED)
+    assert len(server.seen) == 1
+
+
+def test_a_stream_that_falls_silent_is_dead(server: Any, stream: Callable[..., Any]) -> None:
+    """No byte for the time of three heartbeats: the line is cut somewhere without anybody having said so."""
+    server.on(EVENTS, stream(frame(1), stay=True))
+    with SiloClient(server.url, silence=0.1) as client, Watch(client) as watch:
+        watch.event()
+        assert "silent for 0.1 s" in watch.state(Connection.OFFLINE).message
+
+
+def test_modes_are_told_on_connecting_and_when_they_change(
+    server: Any, client: SiloClient, stream: Callable[..., Any]
+) -> None:
+    """/ready first, server.state then."""
+    server.scripts["GET /ready"].clear()
+    server.on("GET /ready", {"mode": "degraded"})
+    states = [
+        frame(n, "server.state", f'{{"mode": "{m}"}}') for n, m in enumerate(("read-only", "normal"), 1)
+    ]
+    server.on(EVENTS, stream(*states, stay=True))
+    with Watch(client) as watch:
+        for kind in (Connection.CONNECTING, Connection.DEGRADED, Connection.READ_ONLY, Connection.ONLINE):
+            watch.state(kind)
+
+
+def test_a_web_page_is_no_event_stream(server: Any, client: SiloClient, answer: Any) -> None:
+    """A captive portal must not look like a silent server."""
+    server.on(EVENTS, answer(200, "<html>hi</html>", {"Content-Type": "text/html"}))
+    with pytest.raises(ServerFaultError, match="no event stream"):
+        client.open_events()
+
+
+def test_stop_wakes_a_waiting_stream_and_nothing_comes_after_it(
+    server: Any, client: SiloClient, stream: Callable[..., Any]
+) -> None:
+    """The reader sits in the network; stop() ends it and its thread."""
+    server.on(EVENTS, stream(frame(1), stay=True))
+    with Watch(client) as watch:
+        watch.event()
+        thread = watch.listener._thread
+        watch.listener.stop(timeout=20)
+        assert thread is not None
+        assert not thread.is_alive()
+        assert watch.listener.state.kind is Connection.STOPPED
+        assert watch.said.empty()
+
+
+def test_stop_ends_a_pause(client: SiloClient, server: Any, answer: Any) -> None:
+    """A pause of a minute is not waited for."""
+    server.on(EVENTS, answer(502))
+    with Watch(client, backoff=Backoff(first=600, longest=600), wait=threading.Event.wait) as watch:
+        assert watch.state(Connection.OFFLINE).retry_in == 600
+        watch.listener.stop(timeout=20)
+        assert not watch.listener._thread.is_alive()  # type: ignore[union-attr]
+
+
+def test_a_person_can_end_a_pause(
+    client: SiloClient, server: Any, answer: Any, stream: Callable[..., Any]
+) -> None:
+    """The "try now" button."""
+    server.on(EVENTS, answer(502), stream(frame(1), stay=True))
+    with Watch(client, backoff=Backoff(first=600, longest=600), wait=threading.Event.wait) as watch:
+        watch.state(Connection.OFFLINE)
+        watch.listener.retry_now()
+        assert watch.event().id == "1"
+
+
+def test_stop_from_within_a_callback_does_not_lock_up() -> None:
+    """A pane that closes itself on an event."""
+    silo, done = FakeSilo(), threading.Event()
+
+    def on_event(event: ServerEvent) -> None:
+        listener.stop()
+        done.set()
+
+    ready = threading.Event()
+    listener = EventListener(silo, on_event, lambda s: ready.set() if s.kind is Connection.ONLINE else None)
+    listener.start()
+    assert ready.wait(20)
+    silo.create_item("kindred-rd", "F01", "Bolt")
+    silo.create_item("kindred-rd", "F01", "Nut")
+    assert done.wait(20)
+
+
+def test_an_error_in_a_callback_costs_only_that_call(caplog: pytest.LogCaptureFixture) -> None:
+    """It is logged; the next event comes."""
+    silo, seen, ready = FakeSilo(), queue.Queue[ServerEvent](), threading.Event()
+
+    def on_event(event: ServerEvent) -> None:
+        seen.put(event)
+        if event.id == "1":
+            raise RuntimeError("a mistake in a pane")
+
+    listener = EventListener(silo, on_event, lambda s: ready.set() if s.kind is Connection.ONLINE else None)
+    listener.start()
+    assert ready.wait(20)
+    for name in ("Bolt", "Nut"):
+        silo.create_item("kindred-rd", "F01", name)
+    assert [seen.get(timeout=20).id, seen.get(timeout=20).id] == ["1", "2"]
+    listener.stop()
+    assert "a mistake in a pane" in caplog.text
+
+
+def test_starting_twice_is_one_connection(
+    server: Any, client: SiloClient, stream: Callable[..., Any]
+) -> None:
+    """start() while it runs does nothing."""
+    server.on(EVENTS, stream(frame(1), stay=True))
+    with Watch(client) as watch:
+        watch.event()
+        watch.listener.start()
+    assert server.paths().count("GET /api/events") == 1
+
+
+def test_pauses_grow_to_their_limit_and_are_spread_by_chance() -> None:
+    """A thousand clients do not come back in one moment."""
+    backoff = Backoff(first=1, factor=2, longest=60)
+    assert [backoff.pause(n, 0.0) for n in (1, 2, 3, 7, 100_000)] == [1, 2, 4, 60, 60]
+    assert backoff.pause(100, 0.999) == pytest.approx(30, rel=0.01)
+
+
+def test_a_state_reads_as_a_sentence() -> None:
+    """For a terminal and a log."""
+    state = ConnectionState(Connection.OFFLINE, "nothing answers at host", 4.2)
+    assert str(state) == "offline: nothing answers at host; next try in 4 s"
+    assert str(ConnectionState(Connection.ONLINE)) == "online"
+
+
+def test_events_of_one_connection_can_be_iterated(
+    server: Any, client: SiloClient, stream: Callable[..., Any], answer: Any
+) -> None:
+    """The simple form: until the server ends it; errors as everywhere."""
+    server.on(EVENTS, stream(frame(5), frame(None, "heartbeat", "{}")), answer(401), answer(drop=True))
+    assert [event.type for event in client.events("4")] == ["item.updated", "heartbeat"]
+    assert server.seen[0].headers["Last-Event-ID"] == "4"
+    with pytest.raises(AuthError):
+        list(client.events())
+    with pytest.raises(UnreachableError):
+        list(client.events())
