@@ -7,19 +7,18 @@ Markdown in :mod:`silo.batch_report`.
 
 from __future__ import annotations
 
-import hashlib
 import os
 import uuid
 from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from silo.api.wire import SourceDocument
-from silo.bom.errors import DocumentError, SiloError
+from silo.bom.errors import SiloError
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.report import base_of, diff_json, entry_json, finding_json, relative
 from silo.bom_sync import Outcome, Resolved, Status, SyncApi, blocking, resolve, sync, sync_tree
+from silo.files import sha256_of
 
 _FINE = (Status.MERGED, Status.UNCHANGED, Status.DRY_RUN)
 
@@ -100,33 +99,9 @@ def _new_id() -> str:
     return str(uuid.uuid4())
 
 
-# --- files ----------------------------------------------------------------------------------------------
-
-
-def documents_in(tops: Iterable[str]) -> list[str]:
-    """The files that are meant: a folder stands for all FCStd files below it, backups left out."""
-    found: list[str] = []
-    for top in tops:
-        path = Path(top)
-        if path.is_dir():
-            found += sorted(str(p) for p in path.rglob("*") if p.suffix.lower() == ".fcstd" and p.is_file())
-        else:
-            found.append(top)
-    return list(dict.fromkeys(found))
-
-
 def source_document(entry: BomEntry) -> SourceDocument:
     """Which file, with which content, an assembly's BOM was taken from."""
     return SourceDocument(file=os.path.basename(entry.doc_path), sha256=sha256_of(entry.doc_path))
-
-
-def sha256_of(path: str) -> str:
-    """The hash of a file's content."""
-    try:
-        with open(path, "rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError as error:
-        raise DocumentError(path, error.strerror or str(error)) from error
 
 
 # --- for machines ---------------------------------------------------------------------------------------

@@ -151,6 +151,14 @@ def open_fully(path: str) -> Any:
             raise DocumentError(path, f"FreeCAD cannot open it: {problem}") from problem
 
 
+def close_all() -> None:
+    """Close every document without saving; for batches, never with a person at work."""
+    for name in list(FreeCAD.listDocuments()):
+        # Closing one document may close others that only it had loaded.
+        if name in FreeCAD.listDocuments():
+            FreeCAD.closeDocument(name)
+
+
 def save(doc: Any) -> None:
     """Save a document to its file; :class:`DocumentError` unless the file really was written."""
     path = doc.FileName

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""FreeCAD files on disk: which are meant, and their content's hash. Standard library only."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+from pathlib import Path
+
+from silo.bom.errors import DocumentError
+
+
+def documents_in(tops: Iterable[str]) -> list[str]:
+    """The files that are meant: a folder stands for all FCStd files below it, backups left out."""
+    found: list[str] = []
+    for top in tops:
+        path = Path(top)
+        if path.is_dir():
+            found += sorted(str(p) for p in path.rglob("*") if p.suffix.lower() == ".fcstd" and p.is_file())
+        else:
+            found.append(top)
+    return list(dict.fromkeys(found))
+
+
+def sha256_of(path: str) -> str:
+    """The hash of a file's content, in hexadecimal."""
+    try:
+        with open(path, "rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise DocumentError(path, error.strerror or str(error)) from error

@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The batch that runs inside ``freecadcmd``: many files, each on its own, results through files.
+
+Started with its arguments in the environment (FreeCAD would open anything else on its command line)::
+
+    SILO_ARGS='{"tops": ["vault"], "recursive": true, "report": "sync.md"}' \\
+        freecadcmd -c 'import runpy; runpy.run_path(".../headless.py", run_name="__main__")' </dev/null
+
+``SILO_ARGS`` is a JSON object; docs/headless.md tells its keys. With ``lines`` the BOMs are only read, and
+written there one JSON object per line as they are finished: that is how ``silo-mod … --via freecad`` asks.
+Otherwise they are synced with the server of ``SILO_API_URL`` and ``SILO_API_TOKEN`` (or the configuration).
+
+Exit codes: 0 done, 1 something was left undone, 2 bad arguments, 3 the server cannot be used.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO
+
+if __name__ == "__main__":
+    # Run by path: this very copy of the package is meant, also where an installed add-on was loaded at start.
+    for _name in [name for name in sys.modules if name == "silo" or name.startswith("silo.")]:
+        del sys.modules[_name]
+    sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from silo.bom.errors import ConfigError, InputError, SiloError
+from silo.files import documents_in
+
+if TYPE_CHECKING:
+    from silo.batch import TopResult
+    from silo.bom.model import Extraction
+
+OK, UNDONE, BAD_INPUT, REMOTE = 0, 1, 2, 3
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """What ``SILO_ARGS`` asks for. Paths may be relative to the folder in which freecadcmd was started."""
+
+    tops: tuple[str, ...]
+    assembly: str | None = None
+    lines: str | None = None
+    json: str | None = None
+    report: str | None = None
+    recursive: bool = False
+    dry_run: bool = False
+    allow_missing: bool = False
+
+    @classmethod
+    def from_text(cls, text: str | None) -> Job:
+        """Raises InputError that names what is wrong."""
+        try:
+            data = json.loads(text or "")
+        except ValueError as error:
+            raise InputError(f"SILO_ARGS must be a JSON object such as {_EXAMPLE}; it is {text!r}") from error
+        if not isinstance(data, dict):
+            raise InputError(f"SILO_ARGS must be a JSON object such as {_EXAMPLE}; it is {text!r}")
+        if unknown := sorted(set(data) - {f.name for f in fields(cls)}):
+            raise InputError(f"SILO_ARGS has unknown keys: {', '.join(unknown)}")
+        tops = data.get("tops")
+        if not isinstance(tops, list) or not tops or not all(isinstance(top, str) and top for top in tops):
+            raise InputError('SILO_ARGS: "tops" must be a list of files and folders, and not an empty one')
+        for field in fields(cls)[1:]:
+            wanted = bool if field.default is False else str
+            if field.name in data and not isinstance(data[field.name], wanted):
+                kind = "true or false" if wanted is bool else "a text"
+                raise InputError(f'SILO_ARGS: "{field.name}" must be {kind}, got {data[field.name]!r}')
+        return cls(**{**data, "tops": tuple(tops)})
+
+
+_EXAMPLE = '{"tops": ["TopAssembly.FCStd"]}'
+
+
+def main(env: Mapping[str, str] = os.environ) -> int:
+    """Do the job that the environment describes; the exit code."""
+    try:
+        job = Job.from_text(env.get("SILO_ARGS"))
+        if job.lines is not None:
+            with open(job.lines, "a", encoding="utf-8") as out:
+                return _write_lines(job, out)
+        return _sync(job)
+    except ConfigError as error:
+        return _tell(error, REMOTE)
+    except (SiloError, OSError) as error:
+        return _tell(error, BAD_INPUT)
+
+
+def _tell(error: Exception, code: int) -> int:
+    from silo.workbench import host
+
+    host.error(f"Silo: {error}")
+    return code
+
+
+def _extractions(tops: list[str], assembly: str | None) -> Iterator[tuple[str, Extraction | SiloError]]:
+    from silo.workbench import host, live
+
+    for top in tops:
+        try:
+            yield top, live.read_checked(top, assembly)
+        except SiloError as error:
+            yield top, error
+        # The next file starts from nothing: no half loaded parts of this one, and no memory held.
+        host.close_all()
+
+
+def _write_lines(job: Job, out: TextIO) -> int:
+    """One line when a file is begun and one when it is done, so that a reader knows where FreeCAD died."""
+    from silo.bom.snapshot import to_plain
+
+    fine = True
+    tops = documents_in(job.tops)
+    found = _extractions(tops, job.assembly)
+    for top in tops:
+        _line(out, {"begun": top})
+        _, result = next(found)
+        if isinstance(result, SiloError):
+            fine = False
+            _line(out, {"top": top, "error": error_json(result)})
+        else:
+            _line(out, {"top": top, "extraction": to_plain(result)})
+    return OK if fine else UNDONE
+
+
+def _line(out: TextIO, data: Mapping[str, Any]) -> None:
+    out.write(json.dumps(data) + "\n")
+    out.flush()
+
+
+def error_json(error: SiloError) -> dict[str, str]:
+    """An error for the other side; a document's error keeps path and reason apart."""
+    path, reason = getattr(error, "path", None), getattr(error, "reason", None)
+    data = {"code": error.code, "message": str(error)}
+    return {**data, "path": path, "reason": reason} if isinstance(path, str) and reason else data
+
+
+def _sync(job: Job) -> int:
+    try:
+        client = _client()
+    except ImportError as error:
+        return _without_server(job, error)
+    from silo.batch import Options, sync_top
+    from silo.workbench import host
+
+    tops = documents_in(job.tops)
+    options = Options(
+        recursive=job.recursive,
+        allow_missing=job.allow_missing,
+        dry_run=job.dry_run,
+        skip_parts=any(os.path.isdir(top) for top in job.tops),
+    )
+    results: list[TopResult] = []
+    with client:
+        for number, (top, found) in enumerate(_extractions(tops, job.assembly), start=1):
+            results.append(sync_top(top, found, client, options))
+            host.message(f"Silo: [{number}/{len(tops)}] {_in_words(results[-1])}")
+    _write_reports(job, results)
+    return OK if all(result.fine for result in results) else UNDONE
+
+
+def _client() -> Any:
+    from silo.api.client import SiloClient
+    from silo.api.config import resolve_server
+
+    where = resolve_server(None, None)
+    return SiloClient(where.url, where.token, verify=where.verify)
+
+
+def _without_server(job: Job, error: ImportError) -> int:
+    """The packages for a server are not there: write the BOMs, which need none, and say what to do."""
+    from silo.bom.report import bom_json
+
+    told = ConfigError(
+        f"FreeCAD's Python has no package {error.name!r}, so nothing was synced. Install requests, pydantic "
+        "and sseclient-py for it, or run `silo-mod sync --via freecad`, which needs none of them there"
+    )
+    if job.json is not None:
+        results = [
+            {"top": top, "error": error_json(found)}
+            if isinstance(found, SiloError)
+            else {"top": top, "bom": bom_json(found)}
+            for top, found in _extractions(documents_in(job.tops), job.assembly)
+        ]
+        _write_json(job.json, {"results": results})
+        told = ConfigError(f"{told}. The BOMs themselves were written to {job.json}")
+    return _tell(told, REMOTE)
+
+
+def _write_json(path: str, data: Any) -> None:
+    Path(path).write_text(json.dumps(data, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def _in_words(result: TopResult) -> str:
+    if result.error is not None:
+        return f"{result.top}: {result.error}"
+    words = ", ".join(
+        f"{outcome.assembly.part_number or outcome.assembly.label} {outcome.status.value}"
+        for outcome in result.outcomes
+    )
+    return f"{result.top}: {result.skipped or words}"
+
+
+def _write_reports(job: Job, results: list[TopResult]) -> None:
+    from silo.batch import result_json
+    from silo.batch_report import markdown
+
+    if job.json is not None:
+        _write_json(job.json, {"results": [result_json(result) for result in results]})
+    if job.report is not None:
+        Path(job.report).write_text(markdown(results), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
