@@ -2,9 +2,9 @@
 # FreeCAD runs this at start where it has a window; see Init.py for what is possible here.
 import sys
 
-if sys.version_info < (3, 11):
+if sys.version_info < (3, 11):  # noqa: UP036  # the one file that an older Python must understand
     FreeCAD.Console.PrintError(
-        "Silo needs a FreeCAD with Python 3.11 or newer; this one has %d.%d.\n" % sys.version_info[:2]
+        "Silo needs a FreeCAD with Python 3.11 or newer; this one has {}.{}.\n".format(*sys.version_info)
     )
 else:
     from silo.workbench.start import start

@@ -38,6 +38,7 @@ class Do(StrEnum):
     DECIDE = "decide"  # same part or new part?
     RETRY = "retry"  # send what waits in the outbox
     DISCARD = "discard"  # drop what waits in the outbox
+    STOP = "stop"  # end what a worker is doing
     SETTINGS = "settings"  # open the preferences
 
 
@@ -72,6 +73,8 @@ class Entry:
         a later entry with the same key takes the place of this one.
     rank
         but only if it knows at least as much: our own sync (1) is not replaced by the server's event (0).
+    also
+        the key of another entry that this one includes, such as the upload of the file.
     badges
         the counts, each with its tone: ``+1 added``, ``~1 qty changed``, ``⚠1 unreferenced``.
     """
@@ -85,6 +88,7 @@ class Entry:
     lines: tuple[Line, ...] = ()
     actions: tuple[Action, ...] = ()
     rank: int = 0
+    also: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "title", plain(self.title))
@@ -115,10 +119,10 @@ class Activity:
 
     def add(self, entry: Entry) -> Activity:
         """With one more entry. One with the same key and a higher rank stays as it is."""
-        before = self.get(entry.key)
-        if before is not None and before.rank > entry.rank:
+        if any(e.rank > entry.rank and entry.key in (e.key, e.also) for e in self.entries):
             return self
-        rest = tuple(e for e in self.entries if e.key != entry.key)
+        mine = {entry.key, entry.also} - {""}
+        rest = tuple(e for e in self.entries if e.key not in mine)
         place = next((i for i, e in enumerate(rest) if e.when <= entry.when), len(rest))
         return replace(self, entries=(*rest[:place], entry, *rest[place:])[: self.most])
 

@@ -1,28 +1,104 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The add-on while FreeCAD runs: what the commands ask for, and the dock. Work is done elsewhere."""
+"""The add-on while FreeCAD runs: what the commands and the pane's buttons ask for. Work is done elsewhere."""
 
 from __future__ import annotations
 
-from typing import Any
+import traceback
+from typing import TYPE_CHECKING, Any
 
-from silo.workbench import host
+from silo.workbench import host, qt
+from silo.workbench.activity import Action, Do
 from silo.workbench.pane import ActivityDock
 from silo.workbench.prefs import PreferencePage
-from silo.workbench.settings import GROUP, Preferences
+from silo.workbench.session import Session, Shown, Told
+from silo.workbench.settings import GROUP, Preferences, read_known
+from silo.workbench.tokens import Keyring
+from silo.workbench.words import plain, translate
+
+if TYPE_CHECKING:
+    from silo.workbench.commit_flow import CommitFlow
+    from silo.workbench.sending import Sent
 
 # FreeCAD's window comes first; a server is not talked to before it stands.
 BEGIN_AFTER_MS = 1500
+# What waits is looked at this often; each thing has its own, growing pause besides.
+TICK_MS = 20_000
+# Events may come by the hundred: the pane is drawn at most this often.
+DRAW_MS = 60
 
 
 class AddOn:
-    """One per FreeCAD."""
+    """One per FreeCAD. Made at start, so everything that costs time is made when it is first needed."""
 
     def __init__(self) -> None:
         self.preferences = Preferences(host.parameters(GROUP))
-        self.dock = ActivityDock(host.main_window())
+        self.dock = ActivityDock(host.main_window(), self.act)
+        self.relay = qt.Relay(self._bug)
+        self._session: Session | None = None
+        self._commits: CommitFlow | None = None
+        self._drawn: Shown | None = None
+        self._timer: Any = None
+
+    # -- the session ------------------------------------------------------------------------------------
 
     def begin(self) -> None:
         """Go on once the window stands."""
+        qt.later(BEGIN_AFTER_MS, self._begin)
+
+    def _begin(self) -> None:
+        self.session.begin(live=self.preferences.flag("LiveActivity"))
+        self._timer = qt.QtCore.QTimer()
+        self._timer.timeout.connect(self.session.tick)
+        self._timer.start(TICK_MS)
+        qt.QtCore.QCoreApplication.instance().aboutToQuit.connect(self.session.close)
+
+    @property
+    def session(self) -> Session:
+        """The session; made when first needed."""
+        if self._session is None:
+            self._session = Session(
+                self.relay.post,
+                read_known(self.preferences),
+                Keyring(),
+                told=Told(shown=self._shown, console=host.warning, sent=self._sent, bug=self._bug),
+            )
+        return self._session
+
+    @property
+    def commits(self) -> CommitFlow:
+        """The commit flow; made when first needed."""
+        if self._commits is None:
+            from silo.workbench.commit_flow import CommitFlow
+
+            self._commits = CommitFlow(self.session, self.preferences)
+        return self._commits
+
+    def settings_changed(self) -> None:
+        """The preference page was saved."""
+        host.save_parameters()
+        self.session.settings_changed(
+            read_known(self.preferences), live=self.preferences.flag("LiveActivity")
+        )
+
+    def _shown(self, shown: Shown) -> None:
+        waits = self._drawn is None
+        self._drawn = shown
+        if waits:
+            qt.later(DRAW_MS, self._draw)
+
+    def _draw(self) -> None:
+        shown, self._drawn = self._drawn, None
+        if shown is not None:
+            self.dock.update_shown(shown)
+
+    def _sent(self, sent: Sent) -> None:
+        """A commit of this FreeCAD arrived."""
+
+    def _bug(self, error: BaseException) -> None:
+        host.error(plain(f"[Silo] unexpected problem: {type(error).__name__}: {error}", 500))
+        host.log("".join(traceback.format_exception(error)))
+
+    # -- commands ---------------------------------------------------------------------------------------
 
     def has_document(self) -> bool:
         """True where there is something to commit."""
@@ -41,6 +117,11 @@ class AddOn:
 
     def commit(self) -> None:
         """Commit the active document."""
+        doc = host.active_document()
+        if doc is None:
+            return
+        self.dock.show_and_raise()
+        self.commits.start(doc)
 
     def preview(self) -> None:
         """Compare the active assembly with the server."""
@@ -55,3 +136,39 @@ class AddOn:
     def show_settings(self) -> None:
         """Open the preferences."""
         host.show_preferences("Silo", 0)
+
+    # -- the pane's buttons -----------------------------------------------------------------------------
+
+    def act(self, action: Action) -> None:
+        """Do what a button of the pane asks for."""
+        if action.do is Do.VIEW:
+            self.open_page(action.target)
+        elif action.do is Do.SHOW:
+            self.show_objects(action.document, action.objects)
+        elif action.do is Do.RETRY:
+            if action.target:
+                self.session.retry(action.target)
+            else:
+                self.session.retry_all()
+        elif action.do is Do.DISCARD:
+            self.session.discard(action.target)
+        elif action.do is Do.STOP:
+            self.session.cancel()
+        elif action.do is Do.SETTINGS:
+            self.show_settings()
+
+    def open_page(self, url: str) -> None:
+        """Open a page of the server; where no browser opens, the address is on the clipboard."""
+        if not qt.open_url(url):
+            qt.copy(url)
+            host.message(
+                translate("Silo", "[Silo] No browser could be opened; the address was copied: ") + url
+            )
+
+    def show_objects(self, path: str, names: tuple[str, ...]) -> None:
+        """Select objects of a document in the 3D view and the tree."""
+        doc = host.find_document(path)
+        if doc is None:
+            host.warning(translate("Silo", "[Silo] This document is not open: ") + plain(path))
+        elif not host.select(doc, names):
+            host.warning(translate("Silo", "[Silo] These objects are not in the document any more."))
