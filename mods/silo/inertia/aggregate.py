@@ -86,6 +86,7 @@ def _parts(assembly: Assembly, placed: Placed, indices: Iterable[int], link: str
             paths=tuple(assembly.instances[index].name for index in members),
             mass=mass,
             volume=volume,
+            com=tuple(product.com_m.tolist()),
             source=decision.source,
             rule=decision.rule,
             decided_by=decision.decided,
@@ -96,7 +97,7 @@ def _parts(assembly: Assembly, placed: Placed, indices: Iterable[int], link: str
             else (mass / volume if volume > 0 else None),
             density_source=decision.density_source,
             quantum=decision.quantum_kg,
-            part_number=product.part_number or "",
+            part_number=decision.part_number or product.part_number or "",
             lines=decision.lines,
             warnings=tuple(PartWarning(link, product.name, note.message, note.code) for note in notes),
         )

@@ -41,10 +41,14 @@ class Options:
         [kg/m^3] of parts that the BOM does not have, and of unknown materials.
     step_density
         use the density of the geometry file before the default and before zero (a tier of its own).
+    unknown_is_zero
+        without a BOM, a part whose file states no density counts as 0 kg instead of the default density:
+        for FreeCAD documents, which are their own BOM.
     """
 
     default_density: float = 1000.0
     step_density: bool = False
+    unknown_is_zero: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +70,7 @@ class Decision:
     material: str | None = None
     material_name: str | None = None
     density_source: str = ""
+    part_number: str = ""
     lines: tuple[int, ...] = ()
     notes: tuple[Note, ...] = ()
 
@@ -101,6 +106,7 @@ class MassRule:
             rule=match.rule,
             decided=match.decided,
             material=row.material,
+            part_number=row.part_number,
             lines=tuple(r.line for r in match.bundle.rows),
             notes=(Note(MassCode.AMBIGUOUS, match.doubt),) if match.doubt else (),
         )
@@ -208,6 +214,11 @@ class MassRule:
             words = f"{message}; the density in the file ({stated:g} kg/m³) was used"
             notes = [Note(MassCode.NOT_IN_BOM, words)] if self.has_bom else []
             return self._from_file(base, prototype, tuple(notes))
+        if not self.has_bom and self.options.unknown_is_zero:
+            words = "The document assigns no material with a density: counted as 0 kg"
+            return _with(
+                base, source=Source.ZERO, mass_kg=0.0, notes=(Note(MassCode.NO_MASS_NO_MATERIAL, words),)
+            )
         if stated is not None:
             message += f", though the file states {stated:g} kg/m³"
         density = self.options.default_density

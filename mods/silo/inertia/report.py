@@ -33,8 +33,8 @@ class PartResult:
 
     mass, total_mass
         of one piece and of all [kg].
-    volume
-        of one piece [m^3].
+    volume, com
+        of one piece [m^3]; its centre of mass in the part's own axes [m].
     paths
         instance paths of the pieces, ``/`` between levels.
     material, material_name
@@ -43,6 +43,8 @@ class PartResult:
         [kg/m^3] that was used, or that the given mass amounts to; None without a volume.
     quantum
         the BOM mass is ``mass`` ± this [kg]; 0 where the mass is no rounded figure.
+    part_number
+        by the BOM, else by the geometry file; "" where neither has one.
     lines
         BOM lines it came from.
     """
@@ -51,6 +53,7 @@ class PartResult:
     paths: tuple[str, ...]
     mass: float
     volume: float
+    com: tuple[float, float, float]
     source: Source
     rule: Rule
     decided_by: Decided

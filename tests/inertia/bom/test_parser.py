@@ -351,3 +351,43 @@ def test_no_cells_are_lost(rows: list[tuple[str, str, str]]) -> None:
         unmatched
         or accounted >= len([r for r in named if any(c.isprintable() and c.strip() for c in r)]) - repeated
     )
+
+
+def test_the_servers_real_export_is_read() -> None:
+    """What silo_server writes as CSV comes back: names like formulae, structure, exact masses."""
+    exports = pytest.importorskip("silo_server.services.exports")
+    rows = [
+        {
+            "Item": "1",
+            "Level": 1,
+            "Part number": "A01-0002",
+            "Name": "Gearbox",
+            "Quantity": 2.0,
+            "Unit": "ea",
+        },
+        {
+            "Item": "1.1",
+            "Level": 2,
+            "Part number": "F01-0001",
+            "Name": "=Bolt",
+            "Quantity": 4.0,
+            "Mass": "0.3 kg",
+        },
+        {
+            "Item": "2",
+            "Level": 1,
+            "Part number": "F01-0002",
+            "Name": "Lid, red",
+            "Quantity": 1.0,
+            "Material": "PLA",
+        },
+    ]
+    table = BOMParser().parse_bytes(exports.to_csv(rows))
+    assert [(r.name, r.part_number, r.quantity, r.level) for r in table.rows] == [
+        ("Gearbox", "A01-0002", 2, 1),
+        ("=Bolt", "F01-0001", 4, 2),
+        ("Lid, red", "F01-0002", 1, 1),
+    ]
+    assert (table["=Bolt"].mass_kg, table["=Bolt"].quantum_kg) == (pytest.approx(0.3), 0)
+    assert table["Lid, red"].material == "PLA"
+    assert table.warnings == ()

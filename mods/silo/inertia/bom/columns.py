@@ -82,20 +82,32 @@ _ROLE_OF: dict[str, tuple[Role, int]] = {
 
 @dataclass(frozen=True, slots=True)
 class Columns:
-    """Where each role is (column index), and the unit that the mass column's header states."""
+    """Where each role is (column index), and the unit that the mass column's header states.
+
+    exact
+        masses are written in full (Silo's own export does so): a short one was not rounded.
+    """
 
     at: Mapping[Role, int]
     mass_unit: str | None = None
+    exact: bool = False
 
     def cell(self, row: Sequence[str], role: Role) -> str:
-        """The row's cell for a role; "" where there is no such column or the row is too short."""
+        """The row's cell for a role; "" where there is no such column or the row is too short.
+
+        An apostrophe that keeps a spreadsheet from running the cell as a formula is no part of it.
+        """
         index = self.at.get(role)
-        return row[index].strip() if index is not None and index < len(row) else ""
+        text = row[index].strip() if index is not None and index < len(row) else ""
+        return text[1:] if re.match(r"'[=+\-@]", text) else text
 
     @property
     def usable(self) -> bool:
         """True where rows can be told apart: by name, part number or description."""
         return bool({Role.NAME, Role.PART_NUMBER, Role.DESCRIPTION} & self.at.keys())
+
+
+_SILOS_OWN = {"part number", "total quantity", "unreferenced since"}
 
 
 def find_columns(header: Sequence[str], given: Mapping[str, str] | None = None) -> Columns:
@@ -120,7 +132,8 @@ def find_columns(header: Sequence[str], given: Mapping[str, str] | None = None) 
         if rank < best.get(role, len(_ROLE_OF)):
             at[role], best[role] = index, rank
     mass_at = at.get(Role.MASS, at.get(Role.TOTAL_MASS))
-    return Columns(at, None if mass_at is None else _unit_of(header[mass_at]))
+    exact = {normal(cell) for cell in header} >= _SILOS_OWN
+    return Columns(at, None if mass_at is None else _unit_of(header[mass_at]), exact)
 
 
 def _given_roles(given: Mapping[str, str]) -> dict[Role, str]:

@@ -184,6 +184,8 @@ class _Masses:
 
         "0.3 kg" beside "0.009 kg" was shown with three decimals as well, so that it is ± 0.0005 kg.
         """
+        if self._sheet.columns.exact:
+            return [replace(row, quantum_kg=0.0) for row in rows]
         if self._role is Role.TOTAL_MASS:
             return list(rows)
         finest: dict[str, float] = {}

@@ -59,7 +59,9 @@ def read_here(path: Path, options: ReadOptions, report: Report) -> Reading:
         from silo.inertia.geometry.brep import read_brep
 
         return read_brep(path, options, report)
-    raise NotImplementedError(kind)
+    from silo.inertia.geometry.freecad import read_freecad
+
+    return read_freecad(path, options, report)
 
 
 def _reporter(path: Path, options: ReadOptions) -> Report:

@@ -115,6 +115,7 @@ class _Walk:
         self._prefix = prefix
         self._products = products
         self._owners = _owners(reader, products)
+        self._known: dict[str, ProductFacts | None] = {}
         self._file = StepFile(path, unit=_unit(reader))
         self._fallback = clean(path.stem) or "part"
 
@@ -194,6 +195,13 @@ class _Walk:
         return Child(name, self._key(target), matrix)
 
     def _facts(self, label: Any) -> ProductFacts | None:
+        # Asked once for every use of a product, and slow to answer.
+        key = occt.entry(label)
+        if key not in self._known:
+            self._known[key] = self._found(label)
+        return self._known[key]
+
+    def _found(self, label: Any) -> ProductFacts | None:
         shape = self._tool.GetShape_s(label)
         if shape is None or shape.IsNull():
             return None

@@ -1,0 +1,314 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What ``silo-mod inertia`` and ``silo-mod mass`` share: options, reading with progress, results, push."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from silo.bom.errors import ConfigError, InputError
+from silo.cli import common
+
+if TYPE_CHECKING:
+    from silo.inertia.bom import BOMParser
+    from silo.inertia.geometry import ReadOptions
+    from silo.inertia.materials import MaterialTable
+    from silo.inertia.model import Assembly
+    from silo.inertia.push import PushPlan
+    from silo.inertia.report import InertiaReport
+
+REPORTS = (".json", ".csv", ".md")
+PIPE_WIDTH = 160
+"""Columns of a table that goes to a file or another program."""
+
+
+def add_geometry_options(parser: argparse.ArgumentParser) -> None:
+    """How files are read."""
+    group = parser.add_argument_group("geometry")
+    group.add_argument(
+        "--mesh-unit", metavar="UNIT", help="length unit of meshes that state none (mm, cm, m, in)"
+    )
+    group.add_argument(
+        "--timeout", type=float, default=600.0, metavar="S", help="give up reading after S seconds"
+    )
+    group.add_argument(
+        "--no-siblings", action="store_true", help="do not look for the files of split assemblies"
+    )
+    group.add_argument(
+        "--no-cache", action="store_true", help="read afresh, and keep nothing for the next time"
+    )
+
+
+def add_material_options(parser: argparse.ArgumentParser) -> None:
+    """Where densities come from."""
+    group = parser.add_argument_group("materials")
+    group.add_argument(
+        "--materials", action="append", default=[], metavar="FILE", help="your own densities (.csv or .toml)"
+    )
+    group.add_argument(
+        "--no-freecad-materials", action="store_true", help="do not look into an installed FreeCAD's cards"
+    )
+
+
+def add_bom_options(parser: argparse.ArgumentParser) -> None:
+    """How the BOM is read, where what is found out from it is wrong."""
+    group = parser.add_argument_group("BOM")
+    group.add_argument("--bom", metavar="BOM.csv", help="BOM export with names, and masses or materials")
+    group.add_argument(
+        "--column",
+        action="append",
+        default=[],
+        metavar="ROLE=HEADER",
+        help="a renamed column; roles: name, part_number, description, material, mass, total_mass, "
+        "quantity, item, level",
+    )
+    group.add_argument("--encoding", help="of the BOM, for example cp1252")
+    group.add_argument("--delimiter", help="of the BOM, one character")
+    group.add_argument("--decimal", choices=(".", ","), help="decimal mark of the BOM")
+    group.add_argument("--mass-unit", metavar="UNIT", help="of masses without one (kg, g, lb, …)")
+
+
+def add_result_options(parser: argparse.ArgumentParser) -> None:
+    """Where results go, and when a warning is a failure."""
+    group = parser.add_argument_group("results")
+    group.add_argument(
+        "--report",
+        action="append",
+        default=[],
+        metavar="OUT",
+        help="write a report: .json, .csv or .md, by suffix; may be repeated",
+    )
+    group.add_argument(
+        "--preview",
+        action="append",
+        default=[],
+        metavar="OUT",
+        help="draw the links with centres of mass and inertia ellipsoids: .glb or .png; may be repeated",
+    )
+    common.add_json_option(parser)
+    group.add_argument("--strict", action="store_true", help="exit 1 where there is any warning")
+    group.add_argument(
+        "--allow", action="append", default=[], metavar="CODE", help="with --strict: this warning is fine"
+    )
+
+
+def add_push_options(parser: argparse.ArgumentParser) -> None:
+    """Back to Silo."""
+    group = parser.add_argument_group("back to Silo")
+    group.add_argument(
+        "--push", action="store_true", help="write mass, volume and centre of mass into the items' properties"
+    )
+    group.add_argument("--dry-run", action="store_true", help="with --push: only show what would be written")
+    group.add_argument("--item", metavar="NUMBER", help="with --push: part number of the whole assembly")
+    common.add_server_options(parser)
+
+
+def need_inertia_extra() -> None:
+    """One plain sentence where the extra is not installed."""
+    missing = [name for name in ("numpy", "OCP", "trimesh", "rapidfuzz", "yaml") if find_spec(name) is None]
+    if missing:
+        raise ConfigError(
+            f"mass and inertia need the packages of the extra “inertia” ({', '.join(missing)} not found); "
+            "install them with: pip install 'silo-mod[inertia]'"
+        )
+
+
+def bom_parser(args: argparse.Namespace) -> BOMParser:
+    """The parser by the user's options."""
+    from silo.inertia.bom import BOMParser
+
+    columns: dict[str, str] = {}
+    for text in args.column:
+        role, equals, header = text.partition("=")
+        if not equals:
+            raise InputError(f"--column wants ROLE=HEADER, for example mass=Gewicht; got “{text}”")
+        columns[role.strip()] = header.strip()
+    delimiter = "\t" if args.delimiter in ("\\t", "tab") else args.delimiter
+    return BOMParser(
+        columns=columns,
+        encoding=args.encoding,
+        delimiter=delimiter,
+        decimal=args.decimal,
+        mass_unit=args.mass_unit,
+    )
+
+
+def material_table(args: argparse.Namespace) -> MaterialTable:
+    """The table by the user's options."""
+    from silo.inertia.materials import load_materials
+
+    return load_materials(args.materials, freecad=not args.no_freecad_materials)
+
+
+def check_targets(args: argparse.Namespace) -> None:
+    """Bad names of output files are told before minutes of reading, not after."""
+    bad = [name for name in args.report if Path(name).suffix.lower() not in REPORTS]
+    if bad:
+        raise InputError(f"--report writes {', '.join(REPORTS)}; got {', '.join(bad)}")
+    bad = [name for name in args.preview if Path(name).suffix.lower() not in (".glb", ".png")]
+    if bad:
+        raise InputError(f"--preview writes .glb and .png; got {', '.join(bad)}")
+    for name in (*args.report, *args.preview):
+        if not Path(name).absolute().parent.is_dir():
+            raise InputError(f"{name}: there is no folder {Path(name).parent}")
+
+
+def read(path: str, args: argparse.Namespace, **more: Any) -> Assembly:
+    """The geometry, with progress on a terminal; Ctrl-C stops it at once."""
+    from dataclasses import replace
+
+    from silo.inertia.calculator import read_geometry
+    from silo.inertia.geometry import ReadOptions
+
+    options: ReadOptions = ReadOptions(
+        mesh_unit=args.mesh_unit,
+        timeout_s=args.timeout,
+        siblings=not args.no_siblings,
+        cache=not args.no_cache,
+        **more,
+    )
+    with _progress(Path(path).name) as told:
+        return read_geometry(path, replace(options, progress=told))
+
+
+@contextmanager
+def _progress(name: str) -> Iterator[Any]:
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    bar = Progress(
+        TextColumn("{task.fields[file]}: {task.description}"),
+        BarColumn(),
+        TextColumn("{task.completed}/{task.total}"),
+        TimeElapsedColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    )
+    with bar:
+        task = bar.add_task("reading", total=None, file=name)
+
+        def told(progress: Any) -> None:
+            bar.update(
+                task, description=progress.stage, completed=progress.done, total=progress.total or None
+            )
+
+        yield told
+
+
+def show(args: argparse.Namespace, report: InertiaReport, assembly: Assembly) -> None:
+    """Print the report and write every file that was asked for."""
+    _write_files(args, report, assembly)
+    if args.json:
+        from silo.inertia.output.data import report_json
+
+        sys.stdout.write(report_json(report))
+        return
+    from silo.inertia.output.text import report_tables
+
+    console().print(report_tables(report))
+
+
+def console() -> Any:
+    """The terminal; wide where the output is a file or a pipe."""
+    from rich.console import Console
+
+    return Console(highlight=False, width=None if sys.stdout.isatty() else PIPE_WIDTH)
+
+
+def _write_files(args: argparse.Namespace, report: InertiaReport, assembly: Assembly) -> None:
+    for name in args.preview:
+        from silo.inertia.output.picture import write_preview
+
+        write_preview(report, assembly, Path(name))
+    picture = next((Path(name) for name in args.preview if name.lower().endswith(".png")), None)
+    for name in args.report:
+        _write(Path(name), _report_text(Path(name), report, picture))
+
+
+def _report_text(path: Path, report: InertiaReport, picture: Path | None) -> str:
+    from silo.inertia.output.data import report_csv, report_json
+    from silo.inertia.output.text import report_markdown
+
+    suffix = path.suffix.lower()
+    if suffix == ".json":
+        return report_json(report)
+    if suffix == ".csv":
+        return report_csv(report)
+    link = None
+    if picture is not None:
+        same = picture.absolute().parent == path.absolute().parent
+        link = picture.name if same else picture.absolute().as_posix()
+    return report_markdown(report, link)
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        with path.open("w", encoding="utf-8", newline="") as file:
+            file.write(text)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
+
+
+def verdict(args: argparse.Namespace, report: InertiaReport) -> int:
+    """The exit code: with --strict, 1 where a warning is not allowed."""
+    if not args.strict:
+        return 0
+    left = [w for w in report.warnings if str(w.code) not in args.allow]
+    if left:
+        codes = sorted({str(w.code) for w in left})
+        print(f"silo-mod: --strict: {len(left)} warnings ({', '.join(codes)})", file=sys.stderr)
+    return 1 if left else 0
+
+
+def push_report(
+    args: argparse.Namespace, report: InertiaReport, part_numbers: Mapping[str, str] | None = None
+) -> int:
+    """Write the masses to the server, or show the plan; 1 where an item is unknown there."""
+    from silo.inertia.push import plan_push, push
+
+    plan = plan_push(report, part_numbers, args.item)
+    if args.dry_run:
+        _tell_plan(plan)
+        return 0
+    with common.client_of(args) as client:
+        done = push(client, plan)
+    _say(f"Silo: {len(done.written)} items written, {len(done.unchanged)} had these numbers already.")
+    if done.unknown:
+        _say(f"Unknown to the server: {', '.join(done.unknown)}")
+    _tell_skipped(plan)
+    return 1 if done.unknown else 0
+
+
+def _tell_plan(plan: PushPlan) -> None:
+    from silo.inertia.push import describe
+
+    _say(f"Would write {len(plan.items)} items ({plan.comment}):")
+    for item in plan.items:
+        _say(f"  {describe(item)}")
+    _tell_skipped(plan)
+
+
+def _tell_skipped(plan: PushPlan) -> None:
+    for skipped in plan.skipped:
+        _say(f"Not written: {skipped.name}: {skipped.reason}")
+
+
+def _say(text: str) -> None:
+    # Standard output may be JSON; what a push did is for people.
+    from silo.cli.show import plain
+
+    print(plain(text), file=sys.stderr)
+
+
+def names_of(values: Sequence[str], limit: int = 8) -> str:
+    """Some names, and how many more."""
+    more = f" and {len(values) - limit} more" if len(values) > limit else ""
+    return ", ".join(values[:limit]) + more

@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Masses back to Silo: plan first, then do. One new revision per item whose numbers changed.
+
+Only numbers that somebody vouched for go out: a BOM mass, a material's density, the file's own density when
+it was asked for. A default density or a zero is a gap in the data, and is listed as such.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from silo.bom.errors import NotFoundError
+from silo.inertia.codes import Source
+from silo.inertia.output.values import number
+from silo.inertia.report import InertiaReport, PartResult
+
+VOUCHED = (Source.BOM_MASS, Source.MATERIAL, Source.STEP_DENSITY)
+
+
+class ItemLike(Protocol):
+    """An item of the server."""
+
+    @property
+    def part_number(self) -> str: ...
+    @property
+    def properties(self) -> Mapping[str, Any]: ...
+
+
+class Items(Protocol):
+    """What a push needs of a server; :class:`silo.api.client.SiloClient` has it."""
+
+    def get_item(self, part_number: str, /) -> ItemLike: ...
+    def update_item(self, part_number: str, /, **changes: Any) -> ItemLike: ...
+
+
+@dataclass(frozen=True)
+class PushItem:
+    """New properties of one item: ``mass_kg`` [kg], ``volume_m3`` [m^3], ``com_m`` (x, y, z) [m]."""
+
+    part_number: str
+    name: str
+    properties: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Skipped:
+    """A part that is not pushed, and why, in words."""
+
+    name: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class PushPlan:
+    """What would be written. ``comment`` goes with each new revision."""
+
+    items: tuple[PushItem, ...]
+    skipped: tuple[Skipped, ...] = ()
+    comment: str = ""
+
+
+@dataclass(frozen=True)
+class Pushed:
+    """What was done: part numbers by outcome."""
+
+    written: tuple[str, ...] = ()
+    unchanged: tuple[str, ...] = ()
+    unknown: tuple[str, ...] = ()
+    plan: PushPlan = field(default_factory=lambda: PushPlan(()))
+
+
+def plan_push(
+    report: InertiaReport, part_numbers: Mapping[str, str] | None = None, top: str | None = None
+) -> PushPlan:
+    """What a report says of each item. Pure.
+
+    part_numbers
+        part name → number, where neither BOM nor geometry file has it (a FreeCAD document's identities).
+    top
+        part number of the whole assembly; its mass and centre are pushed as well, where no part is a gap.
+    """
+    known = part_numbers or {}
+    by_number: dict[str, list[PartResult]] = defaultdict(list)
+    skipped: dict[Skipped, None] = {}
+    gaps = 0
+    for _, part in report.parts():
+        gap = _gap(part)
+        gaps += gap is not None
+        part_number = part.part_number or known.get(part.name, "")
+        if gap is not None or not part_number:
+            skipped[Skipped(part.name, gap or "it has no part number")] = None
+            continue
+        by_number[part_number].append(part)
+    items: list[PushItem] = []
+    for part_number, parts in by_number.items():
+        values = {tuple(_properties(part).items()) for part in parts}
+        if len(values) > 1:
+            reason = f"{len(values)} different shapes or masses have the part number {part_number}"
+            skipped[Skipped(parts[0].name, reason)] = None
+            continue
+        items.append(PushItem(part_number, parts[0].name, _json(_properties(parts[0]))))
+    if top is not None:
+        _plan_top(report, top, gaps, items, skipped)
+    return PushPlan(tuple(items), tuple(skipped), _comment(report))
+
+
+def push(items: Items, plan: PushPlan, told: Callable[[str], None] = lambda part_number: None) -> Pushed:
+    """Write a plan. Other properties of an item stay; an item that has the numbers already is left alone."""
+    written, unchanged, unknown = [], [], []
+    for wanted in plan.items:
+        told(wanted.part_number)
+        try:
+            item = items.get_item(wanted.part_number)
+        except NotFoundError:
+            unknown.append(wanted.part_number)
+            continue
+        # The server replaces properties as a whole, so that what others wrote goes along.
+        merged = {**item.properties, **wanted.properties}
+        if merged == dict(item.properties):
+            unchanged.append(wanted.part_number)
+            continue
+        items.update_item(wanted.part_number, properties=merged, comment=plan.comment)
+        written.append(wanted.part_number)
+    return Pushed(tuple(written), tuple(unchanged), tuple(unknown), plan)
+
+
+def _gap(part: PartResult) -> str | None:
+    if part.source is Source.SUB_ASSEMBLY_MASS:
+        return "its mass is a share of its sub-assembly's, not its own"
+    if part.source not in VOUCHED:
+        return "neither BOM nor material gives its mass"
+    if part.mass <= 0:
+        return "its mass is zero"
+    return None
+
+
+def _plan_top(
+    report: InertiaReport, top: str, gaps: int, items: list[PushItem], skipped: dict[Skipped, None]
+) -> None:
+    total = report.total
+    if total is None or total.mass <= 0 or gaps:
+        skipped[Skipped(report.assembly, f"{gaps} of its parts have no mass that can be vouched for")] = None
+        return
+    com = [_rounded(value) for value in total.com]
+    items.append(PushItem(top, report.assembly, {"mass_kg": _rounded(total.mass), "com_m": com}))
+
+
+def _properties(part: PartResult) -> dict[str, Any]:
+    found: dict[str, Any] = {"mass_kg": _rounded(part.mass)}
+    if part.volume > 0:
+        found["volume_m3"] = _rounded(part.volume)
+        found["com_m"] = tuple(_rounded(value) for value in part.com)
+    return found
+
+
+def _json(properties: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: list(value) if isinstance(value, tuple) else value for key, value in properties.items()}
+
+
+def _rounded(value: float) -> float:
+    # Twelve digits: a second run on another machine must not make a revision of the last bit.
+    return float(f"{value + 0.0:.12g}") if abs(value) > 1e-15 else 0.0
+
+
+def _comment(report: InertiaReport) -> str:
+    source = report.source.replace("\\", "/").rpartition("/")[2] or report.assembly
+    bom = report.bom.replace("\\", "/").rpartition("/")[2]
+    return f"Mass properties from {source}" + (f" and {bom}" if bom else "")
+
+
+def describe(item: PushItem) -> str:
+    """One line for people."""
+    volume = item.properties.get("volume_m3")
+    text = f"{item.part_number}  {item.name}: {number(item.properties['mass_kg'])} kg"
+    return text + (f", {volume * 1e6:.6g} cm³" if volume else "")

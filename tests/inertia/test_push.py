@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Masses back to Silo: what is vouched for, once, without touching what others wrote."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import pytest
+
+from silo.bom.errors import NotFoundError
+from silo.inertia.bodies import box
+from silo.inertia.massrule import Options
+from silo.inertia.push import describe, plan_push, push
+
+Fixture = Callable[..., Any]
+HEAD = "Part number,Quantity,Material,Mass,Name\n"
+
+
+@dataclass
+class StoredItem:
+    part_number: str
+    properties: Mapping[str, Any]
+
+
+@dataclass
+class MemoryItems:
+    """A server in a dictionary; counts revisions."""
+
+    items: dict[str, StoredItem]
+    revisions: list[tuple[str, str]] = field(default_factory=list)
+
+    def get_item(self, part_number: str, /) -> StoredItem:
+        if part_number not in self.items:
+            raise NotFoundError(f"no item {part_number}")
+        return self.items[part_number]
+
+    def update_item(self, part_number: str, /, **changes: Any) -> StoredItem:
+        self.revisions.append((part_number, changes["comment"]))
+        self.items[part_number] = StoredItem(part_number, changes["properties"])
+        return self.items[part_number]
+
+
+@pytest.fixture(name="report")
+def _report(assemble: Fixture, compute: Fixture) -> Any:
+    """A BOM mass, a material, a gap, a part without number."""
+    return compute(
+        assemble(
+            ("l/plate", box("plate", 0.1, 0.2, 0.01)),
+            ("l/bolt1", box("bolt", 0.01, 0.01, 0.01)),
+            ("l/bolt2", box("bolt", 0.01, 0.01, 0.01)),
+            ("l/gap", box("gap", 0.01, 0.01, 0.01)),
+            ("l/nameless", box("nameless", 0.01, 0.01, 0.01)),
+            source="models/arm.step",
+        ),
+        HEAD + "F01-0001,1,steel,,plate\nF01-0002,2,,0.0080 kg,bolt\nF01-0003,1,,,gap\n,1,steel,,nameless\n",
+    )
+
+
+def test_plan_holds_what_is_vouched_for(report: Any) -> None:
+    """Per piece, in SI, with the reasons for all that is left out."""
+    plan = plan_push(report)
+    assert {item.part_number: item.properties for item in plan.items} == {
+        "F01-0001": {"mass_kg": 1.57, "volume_m3": 0.0002, "com_m": [0, 0, 0]},
+        "F01-0002": {"mass_kg": 0.008, "volume_m3": 1e-6, "com_m": [0, 0, 0]},
+    }
+    assert [(s.name, s.reason) for s in plan.skipped] == [
+        ("gap", "neither BOM nor material gives its mass"),
+        ("nameless", "it has no part number"),
+    ]
+    assert plan.comment == "Mass properties from arm.step and bom.csv"
+    assert describe(plan.items[1]) == "F01-0002  bolt: 0.008 kg, 1 cm³"
+
+
+def test_push_keeps_other_properties_and_runs_once(report: Any) -> None:
+    """A new revision where the numbers changed; the second run makes none."""
+    items = MemoryItems({"F01-0001": StoredItem("F01-0001", {"finish": "painted", "mass_kg": 9})})
+    done = push(items, plan_push(report))
+    assert (done.written, done.unknown) == (("F01-0001",), ("F01-0002",))
+    assert items.items["F01-0001"].properties["finish"] == "painted"
+    assert items.items["F01-0001"].properties["mass_kg"] == 1.57
+    again = push(items, plan_push(report))
+    assert (again.written, again.unchanged) == ((), ("F01-0001",))
+    assert items.revisions == [("F01-0001", "Mass properties from arm.step and bom.csv")]
+
+
+def test_identities_of_the_document_give_numbers(report: Any) -> None:
+    """Where neither BOM nor geometry file has a number."""
+    plan = plan_push(report, {"nameless": "F01-0009"})
+    assert "F01-0009" in {item.part_number for item in plan.items}
+
+
+def test_one_number_with_two_masses_is_skipped(assemble: Fixture, compute: Fixture) -> None:
+    """It cannot be both."""
+    a, b = box("a", 0.1, 0.1, 0.1, part_number="P"), box("b", 0.1, 0.1, 0.2, part_number="P")
+    report = compute(assemble(("l/a", a), ("l/b", b)), "Name,Material,Mass\na,steel,\nb,steel,\n")
+    plan = plan_push(report)
+    assert plan.items == ()
+    assert "2 different shapes or masses have the part number P" in plan.skipped[0].reason
+
+
+def test_the_whole_assembly_only_without_gaps(assemble: Fixture, compute: Fixture, report: Any) -> None:
+    """A total with a hole in it is no mass of the assembly."""
+    assert [s.name for s in plan_push(report, top="A01-0001").skipped][-1] == "asm"
+    whole = compute(assemble(("l/a", box("a", 0.1, 0.1, 0.1))), HEAD + "P-1,1,steel,,a\n")
+    item = plan_push(whole, top="A01-0001").items[-1]
+    assert (item.part_number, item.properties["mass_kg"]) == ("A01-0001", 7.85)
+
+
+def test_default_densities_and_shares_stay_here(assemble: Fixture, compute: Fixture) -> None:
+    """A guess does not become a fact by being uploaded."""
+    part = box("a", 0.1, 0.1, 0.1, part_number="P")
+    assert plan_push(compute(assemble(("l/a", part)), None)).items == ()
+    zero = compute(assemble(("l/a", part)), None, options=Options(unknown_is_zero=True))
+    assert plan_push(zero).items == ()
+    motor = assemble(("l/motor/a", part))
+    shared = compute(motor, "Name,Material,Mass\nmotor,,2.000 kg\n")
+    assert "share" in plan_push(shared).skipped[0].reason
