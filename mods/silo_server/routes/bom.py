@@ -6,7 +6,6 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 import anyio.to_thread
-import pydantic_core
 from fastapi import APIRouter, Query, Request
 from starlette.responses import Response
 
@@ -25,12 +24,12 @@ from silo_server.routes.context import (
     raw_json,
 )
 from silo_server.routes.models import ExpandedLineOut, LineChangeBody, LineOut, NewLineBody
+from silo_server.routes.render import render_expanded
 from silo_server.services import edits, rollup, tree
 from silo_server.services.items import get_item
 from silo_server.services.lines import line_to_wire, lines_of
 from silo_server.services.merge import MergeOutcome, merge_bom, preview_merge
 from silo_server.services.merge_request import MergeOrder, read_merge_order
-from silo_server.services.tree import Occurrence
 from silo_server.values import Actor, number
 
 router = APIRouter(prefix="/api/items/{part_number}/bom", tags=["bom"])
@@ -232,18 +231,6 @@ def line_changes(body: LineChangeBody) -> dict[str, Any]:
     if "metadata" in changes:
         changes["metadata"] = changes["metadata"] or {}
     return changes
-
-
-def render_expanded(rows: list[Occurrence]) -> bytes:
-    """The rows as JSON text. A line is written once however often its assembly is used."""
-    written: dict[str, bytes] = {}
-    parts: list[bytes] = []
-    for line, parent, depth, total in rows:
-        text = written.get(line.id)
-        if text is None:
-            text = written[line.id] = pydantic_core.to_json(line_to_wire(line, parent))[:-1]
-        parts.append(b'%b,"depth":%d,"total_quantity":%b}' % (text, depth, repr(number(total)).encode()))
-    return b"[" + b",".join(parts) + b"]"
 
 
 def _merge(

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 from sqlalchemy import Select, select
@@ -54,7 +55,6 @@ def select_lines() -> Select[*tuple[Any, ...]]:
 
 def to_line(row: Any) -> Line:
     """A frozen line from a row of :func:`select_lines`; by position, which is what makes it quick."""
-    refs, metadata = row[15], row[23]
     return Line(
         row[0],
         row[1],
@@ -67,21 +67,42 @@ def to_line(row: Any) -> Line:
         row[8],
         row[9],
         row[10] is not None,
-        LineState(
-            row[11],
-            row[12],
-            row[13],
-            row[14],
-            () if refs == "[]" else tuple(json.loads(refs)),
-            row[16],
-            row[17],
-            row[18],
-            row[19],
-            bool(row[20]),
-            row[21],
-            row[22],
-            {} if metadata == "{}" else json.loads(metadata),
-        ),
+        _state(*row[11:]),
+    )
+
+
+# Most lines of a BOM are in one of a few states (so many pieces, from the assembly, nothing noted); a frozen
+# value can be shared, and making one costs ten times as much as finding it.
+@lru_cache(maxsize=16384)
+def _state(
+    quantity: float,
+    source: str,
+    rel_type: str,
+    unit: str | None,
+    reference_designators: str,
+    find_number: str | None,
+    notes: str | None,
+    child_revision: int | None,
+    unreferenced_since: str | None,
+    override: bool,
+    cad_quantity: float | None,
+    reason: str | None,
+    metadata: str,
+) -> LineState:
+    return LineState(
+        quantity,
+        source,
+        rel_type,
+        unit,
+        tuple(json.loads(reference_designators)),
+        find_number,
+        notes,
+        child_revision,
+        unreferenced_since,
+        bool(override),
+        cad_quantity,
+        reason,
+        json.loads(metadata),
     )
 
 
@@ -160,30 +181,50 @@ def state_columns(state: LineState) -> dict[str, Any]:
 
 def line_to_wire(line: Line, parent_part_number: str) -> dict[str, Any]:
     """A line as ``GET …/bom`` tells it: the contract's keys, and ours for overrides and newer revisions."""
-    state = line.state
-    pinned = state.child_revision
     return {
         "id": line.id,
         "parent_part_number": parent_part_number,
+        **child_to_wire(line),
+        **line_state_to_wire(line.state),
+        **revisions_to_wire(line),
+    }
+
+
+def child_to_wire(line: Line) -> dict[str, Any]:
+    """What a line says of its child."""
+    return {
         "child_part_number": line.child_part_number,
         "child_id": line.child_uuid,
         "child_name": line.child_name,
         "child_description": line.child_description,
         "child_item_type": line.child_item_type,
+        "child_archived": line.child_archived,
+    }
+
+
+def line_state_to_wire(state: LineState) -> dict[str, Any]:
+    """What a line says of itself."""
+    return {
         "rel_type": state.rel_type,
         "quantity": number(state.quantity),
         "unit": state.unit,
         "reference_designators": list(state.reference_designators),
         "find_number": state.find_number,
         "notes": state.notes,
-        "child_revision": pinned,
-        "effective_revision": pinned if pinned is not None else line.child_current_revision,
-        "newer_revision_exists": pinned is not None and pinned < line.child_current_revision,
-        "child_archived": line.child_archived,
+        "child_revision": state.child_revision,
         "source": state.source,
         "unreferenced_since": wire(state.unreferenced_since),
         "override": state.override,
         "cad_quantity": number(state.cad_quantity),
         "reason": state.reason,
         "metadata": dict(state.metadata),
+    }
+
+
+def revisions_to_wire(line: Line) -> dict[str, Any]:
+    """Which revision of the child is meant, and whether there is a newer one."""
+    pinned, newest = line.state.child_revision, line.child_current_revision
+    return {
+        "effective_revision": pinned if pinned is not None else newest,
+        "newer_revision_exists": pinned is not None and pinned < newest,
     }

@@ -76,7 +76,7 @@ def load_graph(tx: Tx, root: Item) -> Graph:
         .order_by(bom_lines.c.parent_id, bom_lines.c.position)
     )
     lines: dict[int, list[Line]] = {}
-    for row in tx.conn.execute(query):
+    for row in tx.conn.execute(query).all():
         lines.setdefault(row[1], []).append(to_line(row))
     return Graph(root, lines)
 
