@@ -62,11 +62,14 @@ def run_freecad(
     *,
     command: str | None = None,
     timeout_s: float = TIMEOUT_S,
+    env: Mapping[str, str] | None = None,
 ) -> Iterator[tuple[str, Extraction | SiloError]]:
     """Read each file in FreeCAD; results in order, as they come.
 
     timeout_s
         for one file, FreeCAD's start included.
+    env
+        set in FreeCAD's environment beside our own, such as ``FREECAD_USER_HOME``.
 
     A file that FreeCAD cannot read, dies of or hangs on gives its error, and the rest goes on. ConfigError
     where there is no FreeCAD, or where it does not start.
@@ -75,7 +78,7 @@ def run_freecad(
     rest = [os.path.abspath(top) for top in tops]
     told = dict(zip(rest, tops, strict=True))
     while rest:
-        with _Run(freecadcmd, rest, assembly, timeout_s) as run:
+        with _Run(freecadcmd, rest, assembly, timeout_s, env or {}) as run:
             for line in run.lines():
                 path = rest.pop(0)
                 yield told[path], _result(line)
@@ -102,6 +105,7 @@ class _Run:
     tops: list[str]
     assembly: str | None
     timeout_s: float
+    env: Mapping[str, str]
     begun: bool = False
     timed_out: bool = False
     _folder: tempfile.TemporaryDirectory[str] = field(
@@ -122,6 +126,7 @@ class _Run:
         job = {"tops": self.tops, "assembly": self.assembly, "lines": str(self._results)}
         env = {
             **os.environ,
+            **self.env,
             "SILO_SCRIPT": str(HEADLESS),
             "SILO_ARGS": json.dumps({key: value for key, value in job.items() if value is not None}),
         }

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Corpora: all cases as one FreeCAD built them, in a folder or packed into one archive.
+
+One archive per FreeCAD keeps hundreds of small files, links between folders and names that not every file
+system takes out of the repository's tree.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import stat
+import subprocess
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from freecad_cases.machines import FreeCAD
+from freecad_cases.truth import TRUTH, Truth
+
+BUILD = Path(__file__).with_name("build.py")
+DATA = Path(__file__).resolve().parents[2] / "data"
+ARCHIVES = DATA / "freecad"
+_CODE = 'import os, runpy; runpy.run_path(os.environ["SILO_SCRIPT"], run_name="__main__")'
+_MANIFEST = "built.json"
+# Zip cannot tell times before 1980; every entry has the same, so that equal content gives equal archives.
+_TIME = (1980, 1, 1, 0, 0, 0)
+
+
+@dataclass(frozen=True)
+class Corpus:
+    """The cases of one builder. ``built`` holds ``<style>/<case>``."""
+
+    folder: Path
+    version: tuple[int, ...]
+    built: tuple[str, ...]
+
+    def base(self, key: str) -> Path:
+        """The folder of a case."""
+        return self.folder / key
+
+    def top(self, key: str) -> Path:
+        """The file of a case that is read."""
+        return self.base(key) / truth_of(key).top
+
+
+def truth_of(key: str) -> Truth:
+    return TRUTH[key.partition("/")[2]]
+
+
+def load(folder: Path) -> Corpus:
+    """A corpus from its folder."""
+    told = json.loads((folder / _MANIFEST).read_text())
+    # Links have been resolved in the answers, so the folder has to be told likewise.
+    return Corpus(folder.resolve(), tuple(told["freecad"]), tuple(told["built"]))
+
+
+def run_script(
+    freecad: FreeCAD, script: Path, profile: Path, env: Mapping[str, str], timeout_s: float = 300
+) -> str:
+    """Run a Python script inside a FreeCAD without a window; its output. CalledProcessError if it fails."""
+    profile.mkdir(parents=True, exist_ok=True)
+    done = subprocess.run(
+        [freecad.command, "-c", _CODE],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        errors="replace",
+        cwd=profile,
+        env={**os.environ, "SILO_SCRIPT": str(script), "FREECAD_USER_HOME": str(profile), **env},
+        timeout=timeout_s,
+        check=False,
+    )
+    if done.returncode != 0:
+        raise AssertionError(f"{script.name} failed in FreeCAD {freecad.short}:\n{done.stdout[-4000:]}")
+    return done.stdout
+
+
+def build(freecad: FreeCAD, folder: Path) -> Corpus:
+    """Have a FreeCAD build all the cases that it can."""
+    folder.mkdir(parents=True)
+    run_script(freecad, BUILD, folder.parent / f"profile-{freecad.short}", {"SILO_CASES_OUT": str(folder)})
+    return load(folder)
+
+
+def pack(folder: Path, archive: Path) -> None:
+    """Pack a corpus; symlinks stay symlinks."""
+    with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as out:
+        for path in sorted(folder.rglob("*")):
+            if not path.is_symlink() and path.is_dir():
+                continue
+            info = zipfile.ZipInfo(path.relative_to(folder).as_posix(), _TIME)
+            info.compress_type = zipfile.ZIP_DEFLATED
+            info.external_attr = (path.lstat().st_mode & 0xFFFF) << 16
+            out.writestr(info, os.readlink(path) if path.is_symlink() else path.read_bytes())
+
+
+def unpack(archive: Path, folder: Path) -> Corpus:
+    """Unpack a corpus that :func:`pack` made."""
+    with zipfile.ZipFile(archive) as packed:
+        for info in packed.infolist():
+            path = folder / info.filename
+            path.parent.mkdir(parents=True, exist_ok=True)
+            if stat.S_ISLNK(info.external_attr >> 16):
+                path.symlink_to(packed.read(info).decode(), target_is_directory=True)
+            else:
+                path.write_bytes(packed.read(info))
+    return load(folder)
+
+
+def packed_keys(archive: Path) -> tuple[str, ...]:
+    """What an archive holds, without unpacking it."""
+    with zipfile.ZipFile(archive) as packed:
+        return tuple(json.loads(packed.read(_MANIFEST))["built"])

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The FreeCADs of this machine, as ``scripts/freecad-roots.sh --list`` tells them."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parents[3]
+ROOTS = REPOSITORY / "scripts" / "freecad-roots.sh"
+
+# What the add-on must work in; the last part of a version does not matter.
+WANTED = ("0.20", "1.0", "1.1")
+
+
+@dataclass(frozen=True)
+class FreeCAD:
+    """One FreeCAD.
+
+    dependencies
+        folder with requests and its like for this FreeCAD's Python; may be absent.
+    """
+
+    name: str
+    version: tuple[int, ...]
+    python: str
+    command: str
+    dependencies: Path
+
+    @property
+    def short(self) -> str:
+        return ".".join(str(part) for part in self.version[:2])
+
+    def sibling(self, program: str) -> str:
+        """Another program of the same FreeCAD: ``freecad``, ``xvfb-run``."""
+        beside = Path(self.command).parent / program
+        return str(beside) if beside.exists() else program
+
+
+@cache
+def freecads() -> Mapping[str, FreeCAD]:
+    """By version ("1.0"). Empty where there is none at all."""
+    if os.name != "posix":
+        return {}
+    told = subprocess.run([ROOTS, "--list"], capture_output=True, text=True, timeout=60, check=False)
+    found = {}
+    for line in told.stdout.splitlines():
+        name, version, python, command, dependencies = line.split("\t")
+        parts = tuple(int(part) for part in version.split(".") if part.isdigit())
+        one = FreeCAD(name, parts, python, command, Path(dependencies))
+        found.setdefault(one.short, one)
+    return found
+
+
+def need(version: str) -> FreeCAD:
+    """The FreeCAD of this version; skips loudly without it, and fails where the machine was to have it."""
+    found = freecads().get(version)
+    if found is None:
+        reason = (
+            f"no FreeCAD {version} on this machine; scripts/freecad-roots.sh builds it (as root on Debian)"
+        )
+        if os.environ.get("SILO_REQUIRE_FREECAD") == "1":
+            pytest.fail(reason)
+        pytest.skip(reason)
+    return found

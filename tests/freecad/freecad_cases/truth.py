@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What each case must give, written by hand: never computed by the code under test.
+
+``bom``: component → quantity per one parent, or (quantity, what it contains). A component is ``file#object``,
+the file relative to the case's folder. ``findings``: code → where. ``uuids``: where there are some.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+CONTROL = Path(__file__).resolve().parents[2] / "data" / "control"
+
+UUID_1 = "11111111-2222-4333-8444-555555555555"
+UUID_2 = "22222222-3333-4444-8555-666666666666"
+UUID_3 = "33333333-4444-4555-8666-777777777777"
+
+BOLT, PLATE, WASHER = "bolt.FCStd#Bolt", "plate.FCStd#Plate", "washer.FCStd#Washer"
+SUB = "sub.FCStd#Sub"
+SUB_CONTENT = {BOLT: 2, PLATE: 1}
+
+
+@dataclass(frozen=True)
+class Truth:
+    """The expected answer for one case.
+
+    consolidated
+        components that several single links stand for.
+    top
+        the file that is read.
+    live
+        what live FreeCAD answers where it knows, by its nature, other things than the file tells.
+    live_0_20
+        the same for FreeCAD 0.20 only.
+    """
+
+    bom: Mapping[str, Any]
+    findings: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    consolidated: frozenset[str] = frozenset()
+    uuids: Mapping[str, str] = field(default_factory=dict)
+    top: str = "top.FCStd"
+    live: Truth | None = None
+    live_0_20: Truth | None = None
+
+    def for_live(self, version: tuple[int, ...]) -> Truth:
+        """What a FreeCAD of this version must answer."""
+        if self.live_0_20 is not None and version < (0, 21):
+            return self.live_0_20
+        return self.live or self
+
+
+def _is(
+    bom: Mapping[str, Any],
+    *,
+    consolidated: tuple[str, ...] = (),
+    uuids: Mapping[str, str] | None = None,
+    top: str = "top.FCStd",
+    live: Truth | None = None,
+    live_0_20: Truth | None = None,
+    **findings: tuple[str, ...],
+) -> Truth:
+    return Truth(bom, findings, frozenset(consolidated), uuids or {}, top, live, live_0_20)
+
+
+def _control() -> dict[str, Truth]:
+    """The control cases, from the file that is published with them."""
+    cases = json.loads((CONTROL / "expected.json").read_text(encoding="utf-8"))
+    consolidated = {
+        "T01_flat": ("PA.FCStd#PA",),
+        "T03_sub_assembly_twice": ("S1.FCStd#S1", "PA.FCStd#PA"),
+        "T04_same_part_on_two_levels": ("PA.FCStd#PA",),
+        "T05_one_mirrored": ("PA.FCStd#PA",),
+        "T06_one_hidden": ("PA.FCStd#PA",),
+        "T07_assembly_link": ("PA.FCStd#PA",),
+        "T10_link_to_a_link": ("PA.FCStd#PA",),
+    }
+    return {
+        name: Truth(
+            {key: tuple(value) if isinstance(value, list) else value for key, value in one["bom"].items()},
+            {code: tuple(where) for code, where in one.get("findings", {}).items()},
+            frozenset(consolidated.get(name, ())),
+        )
+        for name, one in cases.items()
+    }
+
+
+TRUTH: dict[str, Truth] = {
+    **_control(),
+    # --- counting ---------------------------------------------------------------------------------------
+    "plain_link": _is({BOLT: 1}),
+    "same_part_three_times": _is({BOLT: 3}, consolidated=(BOLT,)),
+    "array_shown_one_hidden": _is({BOLT: 4}),
+    "array_counted_one_hidden": _is({BOLT: 4}),
+    "array_one_deleted": _is({BOLT: 3}),
+    "array_of_one": _is({BOLT: 1}),
+    "links_and_array": _is({BOLT: 5}, consolidated=(BOLT,)),
+    "link_chain": _is({BOLT: 2}, consolidated=(BOLT,)),
+    "chain_across_files": _is({BOLT: 1}),
+    "link_to_array": _is({BOLT: 3}),
+    "array_of_array": _is({BOLT: 6}),
+    "sub_object_link": _is({"frame.FCStd#Inner": 1}),
+    "sub_element_link": _is({BOLT: 1}, sub_element_link=("top.FCStd#Reference",)),
+    "link_in_folder": _is({BOLT: 2}, consolidated=(BOLT,)),
+    "inline_part": _is({BOLT: 3}, consolidated=(BOLT,)),
+    "inline_assembly": _is({BOLT: 3}, consolidated=(BOLT,)),
+    "link_group": _is({BOLT: 1, PLATE: 1}),
+    "link_to_group_in_file": _is({BOLT: 2}),
+    "link_to_group_elsewhere": _is({"kit.FCStd#Bundle": (1, {BOLT: 2})}, consolidated=(BOLT,)),
+    "link_to_assembly": _is({SUB: (1, SUB_CONTENT)}, consolidated=(BOLT,)),
+    "same_part_on_two_levels": _is({BOLT: 3, SUB: (2, SUB_CONTENT)}, consolidated=(BOLT,)),
+    "assembly_link_rigid": _is({SUB: (2, SUB_CONTENT)}, consolidated=(BOLT,)),
+    "assembly_link_flexible": _is({SUB: (1, SUB_CONTENT)}, consolidated=(BOLT,)),
+    "assembly_link_nested": _is(
+        {"middle.FCStd#Middle": (1, {SUB: (2, SUB_CONTENT), BOLT: 1})}, consolidated=(BOLT,)
+    ),
+    "assembly_link_with_array": _is({SUB: (1, {BOLT: 4})}),
+    "assembly_link_stale": _is(
+        {SUB: (1, {BOLT: 1, PLATE: 1, WASHER: 1})}, stale_assembly_link=("top.FCStd#SubLink",)
+    ),
+    "assembly_link_never_recomputed": _is({SUB: (1, SUB_CONTENT)}, consolidated=(BOLT,)),
+    "assembly_below_a_part": _is(
+        {SUB: (1, {BOLT: 2}), BOLT: 1}, live_0_20=_is({BOLT: 1}, lost_assembly=("top.FCStd#SubLink",))
+    ),
+    "joints_and_sheets": _is({BOLT: 2}, consolidated=(BOLT,)),
+    "sheets_sketches_datums": _is({BOLT: 1}),
+    "copy_on_change": _is({BOLT: 1}, variant=("top.FCStd#Variant",)),
+    "draft_link_array": _is({BOLT: 6}, draft_array=("top.FCStd#Array",)),
+    "boolean_operands": _is({BOLT: 1}, local_geometry=("top.FCStd#Top",)),
+    "hidden_link": _is({BOLT: 2}, consolidated=(BOLT,)),
+    "mirrored_link": _is({BOLT: 2}, consolidated=(BOLT,), mirrored=("top.FCStd#Mirrored",)),
+    "mirrored_array_element": _is({BOLT: 2}, mirrored=("top.FCStd#Row",)),
+    "excluded_link": _is({BOLT: 1}, excluded=("top.FCStd#LeftOut",)),
+    "excluded_part": _is({BOLT: 1}, excluded=("top.FCStd#Fixture",)),
+    "suppressed_link": _is(
+        {BOLT: 1},
+        suppressed=("top.FCStd#Off",),
+        # FreeCAD 0.20 does not know the extension and drops its property.
+        live_0_20=_is({BOLT: 2}, consolidated=(BOLT,)),
+    ),
+    "suppressed_by_property": _is({BOLT: 1}, suppressed=("top.FCStd#Off",)),
+    "in_document_link": _is({BOLT: 1}, in_document_link=("top.FCStd#Reference",)),
+    "unset_link": _is({BOLT: 1}, unset_link=("top.FCStd#Empty",)),
+    "loose_links": _is({BOLT: 2}, consolidated=(BOLT,), no_container=("top.FCStd",)),
+    "spares_beside_the_model": _is({BOLT: 1}),
+    "body_as_part": _is({"body.FCStd#Body": 1}),
+    "empty_assembly": _is({}, empty_bom=("top.FCStd#Top",)),
+    "link_python": _is({BOLT: 1}),
+    "deep_mix": _is({BOLT: 7}, consolidated=(BOLT,)),
+    # --- files ------------------------------------------------------------------------------------------
+    "missing_file": _is({BOLT: 1}, missing_file=("top.FCStd#Lost1", "top.FCStd#Lost2")),
+    "missing_file_below": _is({SUB: (1, {BOLT: 2})}, consolidated=(BOLT,), missing_file=("sub.FCStd#Plate",)),
+    "target_deleted": _is({"kit.FCStd#Plate": 1}, missing_object=("top.FCStd#Lost",)),
+    "sub_object_deleted": _is({BOLT: 1}, missing_object=("top.FCStd#Lost",)),
+    "object_cycle": _is({BOLT: 1}, in_document_link=("top.FCStd#ToTwo", "top.FCStd#ToOne")),
+    "document_cycle": _is({"other.FCStd#Other": (1, {BOLT: 1})}, cycle=("other.FCStd#ToTop",)),
+    "awkward_names": _is(
+        {"Größe & Söhne/Schraube <M8> & 'Co' №1.FCStd#Bolt": 1}, top="Baugruppe №2 & Rest.FCStd"
+    ),
+    "parent_path": _is({"parts/bolt.FCStd#Bolt": 1}, top="assemblies/deep/top.FCStd"),
+    "symlinked_folder": _is({"real/bolt.FCStd#Bolt": 2}, consolidated=("real/bolt.FCStd#Bolt",)),
+    "saved_elsewhere": _is(
+        {},
+        top="new/deeper/top.FCStd",
+        missing_file=("new/deeper/top.FCStd#Bolt", "new/deeper/top.FCStd#Plate"),
+    ),
+    "partial_part_document": _is({"kit.FCStd#Bolt": 1}, uuids={"kit.FCStd#Bolt": UUID_1}),
+    "duplicate_labels": _is({"one.FCStd#Part": 2, "two.FCStd#Part": 1}, consolidated=("one.FCStd#Part",)),
+    "two_parts_in_one_file": _is({"pair.FCStd#Left": 1, "pair.FCStd#Right": 2}),
+    "expression_only": _is({BOLT: 1}),
+    # FreeCAD (with its fix of CVE-2026-73235) ignores the declaration; our reader refuses such a file.
+    "doctype": _is(
+        {BOLT: 1}, unreadable_file=("top.FCStd#BadLink",), live=_is({BOLT: 1, "bad.FCStd#Bad": 1})
+    ),
+    "truncated_zip": _is({BOLT: 1}, unreadable_file=("top.FCStd#BadLink",)),
+    "no_document_xml": _is({BOLT: 1}, unreadable_file=("top.FCStd#BadLink",)),
+    "lfs_pointer": _is({BOLT: 1}, lfs_pointer=("top.FCStd#BadLink",)),
+    "empty_file": _is({BOLT: 1}, unreadable_file=("top.FCStd#BadLink",)),
+    # --- identity ---------------------------------------------------------------------------------------
+    "identity_in_meta": _is({BOLT: 1}, uuids={BOLT: UUID_1}),
+    "identity_in_document_property": _is({BOLT: 1}, uuids={BOLT: UUID_1}),
+    "identity_of_objects": _is(
+        {"pair.FCStd#Left": 1, "pair.FCStd#Right": 1},
+        uuids={"pair.FCStd#Left": UUID_3, "pair.FCStd#Right": UUID_2},
+    ),
+    "copied_identity": _is(
+        {"one.FCStd#Part": 1, "two.FCStd#Part": 1},
+        uuids={"one.FCStd#Part": UUID_1, "two.FCStd#Part": UUID_1},
+        copied_identity=("one.FCStd#Part", "two.FCStd#Part"),
+    ),
+    "shared_identity": _is(
+        {"pair.FCStd#Left": 1, "pair.FCStd#Right": 1},
+        uuids={"pair.FCStd#Left": UUID_1, "pair.FCStd#Right": UUID_1},
+        shared_identity=("pair.FCStd#Left", "pair.FCStd#Right"),
+    ),
+}
