@@ -17,7 +17,7 @@ from silo.inertia.core import MassProps, TensorProblem, combine_arrays, is_rigid
 from silo.inertia.frames import ASSEMBLY_FRAME, FrameChoice, LinkFrame
 from silo.inertia.links import Claims
 from silo.inertia.masses import Placed
-from silo.inertia.massrule import Decision, Note
+from silo.inertia.massrule import Note
 from silo.inertia.matching import Matching
 from silo.inertia.model import Assembly
 from silo.inertia.products import companions, leaf_products, sub_assemblies
@@ -72,35 +72,47 @@ def chosen_frame(name: str, claims: Claims, choice: FrameChoice) -> LinkFrame:
 
 
 def _parts(assembly: Assembly, placed: Placed, indices: Iterable[int], link: str) -> Iterator[PartResult]:
-    groups: dict[tuple[str, Decision, float], list[int]] = {}
+    """Pieces that are alike in name, size, mass and its source, together; products or not.
+
+    A bearing's fourteen balls are fourteen products in many files, and one line for people.
+    """
+    groups: dict[tuple[object, ...], list[int]] = {}
     for index in indices:
         if placed.counted[index]:
-            key = (assembly.instances[index].prototype, placed.decisions[index], float(placed.mass[index]))
+            product = assembly.prototypes[assembly.instances[index].prototype]
+            size = (f"{placed.volume[index]:.9g}", f"{placed.mass[index]:.9g}")
+            key = (product.name, product.part_number, product.problems, placed.decisions[index], *size)
             groups.setdefault(key, []).append(index)
-    for (prototype, decision, mass), members in groups.items():
-        product = assembly.prototypes[prototype]
-        volume = float(placed.volume[members[0]])
-        notes = [*decision.notes, *(Note(problem.code, problem.message) for problem in product.problems)]
-        yield PartResult(
-            name=product.name,
-            paths=tuple(assembly.instances[index].name for index in members),
-            mass=mass,
-            volume=volume,
-            com=tuple(product.com_m.tolist()),
-            source=decision.source,
-            rule=decision.rule,
-            decided_by=decision.decided,
-            material=decision.material,
-            material_name=decision.material_name,
-            density=decision.density
-            if decision.density is not None
-            else (mass / volume if volume > 0 else None),
-            density_source=decision.density_source,
-            quantum=decision.quantum_kg,
-            part_number=decision.part_number or product.part_number or "",
-            lines=decision.lines,
-            warnings=tuple(PartWarning(link, product.name, note.message, note.code) for note in notes),
-        )
+    for members in groups.values():
+        yield _part(assembly, placed, members, link)
+
+
+def _part(assembly: Assembly, placed: Placed, members: Sequence[int], link: str) -> PartResult:
+    instances = [assembly.instances[index] for index in members]
+    products = [assembly.prototypes[key] for key in dict.fromkeys(i.prototype for i in instances)]
+    product, decision = products[0], placed.decisions[members[0]]
+    mass, volume = float(placed.mass[members[0]]), float(placed.volume[members[0]])
+    same_axes = all(np.allclose(p.com_m, product.com_m, rtol=1e-9, atol=1e-9) for p in products)
+    implied = mass / volume if volume > 0 else None
+    notes = [*decision.notes, *(Note(problem.code, problem.message) for problem in product.problems)]
+    return PartResult(
+        name=product.name,
+        paths=tuple(instance.name for instance in instances),
+        mass=mass,
+        volume=volume,
+        com=tuple(product.com_m.tolist()) if same_axes else None,
+        source=decision.source,
+        rule=decision.rule,
+        decided_by=decision.decided,
+        material=decision.material,
+        material_name=decision.material_name,
+        density=decision.density if decision.density is not None else implied,
+        density_source=decision.density_source,
+        quantum=decision.quantum_kg,
+        part_number=decision.part_number or product.part_number or "",
+        lines=decision.lines,
+        warnings=tuple(PartWarning(link, product.name, note.message, note.code) for note in notes),
+    )
 
 
 def _part_warnings(report: InertiaReport, parts: Iterable[PartResult]) -> None:

@@ -51,7 +51,7 @@ class Options:
     unknown_is_zero: bool = False
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Decision:
     """Where a product's mass comes from.
 
@@ -225,7 +225,7 @@ class MassRule:
         code = MassCode.NOT_IN_BOM if self.has_bom else MassCode.NO_BOM
         notes = [Note(code, f"{message}; the default density ({density:g} kg/m³) was used")]
         if not prototype.volume_m3:
-            notes.append(_no_volume(prototype))
+            notes = [*(notes if self.has_bom else ()), _no_volume(prototype)]
         return _with(base, density=density, density_source="default", notes=tuple(notes))
 
     def _from_file(self, base: Decision, prototype: Prototype, notes: tuple[Note, ...]) -> Decision:

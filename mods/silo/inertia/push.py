@@ -152,6 +152,7 @@ def _properties(part: PartResult) -> dict[str, Any]:
     found: dict[str, Any] = {"mass_kg": _rounded(part.mass)}
     if part.volume > 0:
         found["volume_m3"] = _rounded(part.volume)
+    if part.volume > 0 and part.com is not None:
         found["com_m"] = tuple(_rounded(value) for value in part.com)
     return found
 

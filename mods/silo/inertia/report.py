@@ -34,7 +34,8 @@ class PartResult:
     mass, total_mass
         of one piece and of all [kg].
     volume, com
-        of one piece [m^3]; its centre of mass in the part's own axes [m].
+        of one piece [m^3]; its centre of mass in the part's own axes [m], None where the pieces have
+        axes of their own each (equal shapes that a file holds one by one).
     paths
         instance paths of the pieces, ``/`` between levels.
     material, material_name
@@ -53,7 +54,7 @@ class PartResult:
     paths: tuple[str, ...]
     mass: float
     volume: float
-    com: tuple[float, float, float]
+    com: tuple[float, float, float] | None
     source: Source
     rule: Rule
     decided_by: Decided

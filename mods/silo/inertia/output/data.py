@@ -62,7 +62,7 @@ def _part(part: PartResult) -> dict[str, Any]:
         "total_mass": part.total_mass,
         "quantum": part.quantum,
         "volume": part.volume,
-        "com": list(part.com),
+        "com": None if part.com is None else list(part.com),
         "density": part.density,
         "density_source": part.density_source,
         "source": str(part.source),

@@ -16,6 +16,12 @@ from silo.inertia.report import InertiaReport, LinkResult, PartResult, PartWarni
 MAX_PART_ROWS = 60
 """Rows of parts in a terminal; JSON, CSV and Markdown have them all."""
 
+NOISE = 1e-9
+"""Relative: what is rounding in a table for people. Files have every digit."""
+
+MAX_PLACES = 6
+"""Links and parts that one warning names; JSON has one entry for each."""
+
 _SOURCE_WORDS = {
     Source.BOM_MASS: "BOM mass",
     Source.MATERIAL: "material × volume",
@@ -66,7 +72,7 @@ def _links_table(report: InertiaReport) -> Table:
         table.add_row(
             _plain("whole assembly"),
             _plain(_short(report.total.mass)),
-            _plain(_vector(report.total.com)),
+            _plain(_vector(report.total.com, 1.0)),
             _plain(f"in no link: {_short(loose)} kg" if report.unclaimed else ""),
             _plain(str(sum(part.quantity for _, part in report.parts()))),
             _plain(str(len(report.warnings))),
@@ -75,15 +81,21 @@ def _links_table(report: InertiaReport) -> Table:
 
 
 def _link_cells(report: InertiaReport, link: LinkResult) -> Sequence[str]:
-    t = link.props.inertia
+    moments, products = _tensor(link)
     return (
         link.name,
         _short(link.props.mass),
-        _vector(link.props.com),
-        _vector((t[0, 0], t[1, 1], t[2, 2])) + "\n" + _vector((t[0, 1], t[0, 2], t[1, 2])),
+        _vector(link.props.com, 1.0),
+        f"{moments}\n{products}",
         str(sum(part.quantity for part in link.parts)),
         str(sum(w.link_name == link.name for w in report.warnings)),
     )
+
+
+def _tensor(link: LinkResult) -> tuple[str, str]:
+    t = link.props.inertia
+    size = float(abs(t).max())
+    return _vector((t[0, 0], t[1, 1], t[2, 2]), size), _vector((t[0, 1], t[0, 2], t[1, 2]), size)
 
 
 def _parts_table(report: InertiaReport) -> RenderableType:
@@ -116,12 +128,27 @@ def _warnings_text(warnings: Sequence[PartWarning]) -> Text:
     if not warnings:
         return Text("No warnings.", style="green")
     text = Text(f"{len(warnings)} {'warning' if len(warnings) == 1 else 'warnings'}\n", style="yellow")
-    for warning in warnings:
-        where = " / ".join(word for word in (warning.link_name, warning.part_name) if word)
-        text.append(f"  {_clean(where)}: " if where else "  ", style="bold")
-        text.append(_clean(warning.message))
-        text.append(f"  [{warning.code}]\n", style="dim")
+    for (message, code), where in _grouped(warnings).items():
+        text.append(f"  {_places(where)}: " if where else "  ", style="bold")
+        text.append(_clean(message))
+        text.append(f"  [{code}]\n", style="dim")
     return text
+
+
+def _grouped(warnings: Iterable[PartWarning]) -> dict[tuple[str, str], list[str]]:
+    """Message and code → where; what is said of twenty parts alike is said once."""
+    groups: dict[tuple[str, str], list[str]] = {}
+    for warning in warnings:
+        where = groups.setdefault((warning.message, str(warning.code)), [])
+        names = " / ".join(_clean(word) for word in (warning.link_name, warning.part_name) if word)
+        if names:
+            where.append(names)
+    return groups
+
+
+def _places(where: Sequence[str]) -> str:
+    more = f" and {len(where) - MAX_PLACES} more" if len(where) > MAX_PLACES else ""
+    return ", ".join(where[:MAX_PLACES]) + more
 
 
 def report_markdown(report: InertiaReport, picture: str | None = None) -> str:
@@ -136,7 +163,7 @@ def report_markdown(report: InertiaReport, picture: str | None = None) -> str:
         loose = sum(part.total_mass for part in report.unclaimed)
         out += [f"Parts without a link sum up to {_short(loose)} kg; they are in no link's mass.", ""]
     out += ["## Warnings", ""]
-    out += [_warning_row(w) for w in report.warnings] or ["None."]
+    out += [_warning_row(*group, where) for group, where in _grouped(report.warnings).items()] or ["None."]
     return "\n".join(out) + "\n"
 
 
@@ -144,14 +171,14 @@ def _link_rows(report: InertiaReport) -> Iterable[str]:
     yield "| Link | Mass kg | Centre of mass m | Ixx, Iyy, Izz kg m² | Ixy, Ixz, Iyz kg m² | Parts |"
     yield "|---|--:|--:|--:|--:|--:|"
     for link in report.links.values():
-        t = link.props.inertia
+        moments, products = _tensor(link)
         yield (
-            f"| {_cell(link.name)} | {_short(link.props.mass)} | {_vector(link.props.com)} "
-            f"| {_vector((t[0, 0], t[1, 1], t[2, 2]))} | {_vector((t[0, 1], t[0, 2], t[1, 2]))} "
-            f"| {sum(part.quantity for part in link.parts)} |"
+            f"| {_cell(link.name)} | {_short(link.props.mass)} | {_vector(link.props.com, 1.0)} "
+            f"| {moments} | {products} | {sum(part.quantity for part in link.parts)} |"
         )
     if report.total is not None:
-        yield f"| **whole assembly** | **{_short(report.total.mass)}** | {_vector(report.total.com)} | | | |"
+        total = report.total
+        yield f"| **whole assembly** | **{_short(total.mass)}** | {_vector(total.com, 1.0)} | | | |"
 
 
 def _frames(report: InertiaReport) -> Iterable[str]:
@@ -176,9 +203,8 @@ def _part_rows(report: InertiaReport) -> Iterable[str]:
         )
 
 
-def _warning_row(warning: PartWarning) -> str:
-    where = " / ".join(_cell(word) for word in (warning.link_name, warning.part_name) if word)
-    return f"- {f'**{where}**: ' if where else ''}{_cell(warning.message)} (`{warning.code}`)"
+def _warning_row(message: str, code: str, where: Sequence[str]) -> str:
+    return f"- {f'**{_cell(_places(where))}**: ' if where else ''}{_cell(message)} (`{code}`)"
 
 
 def _cell(text: str) -> str:
@@ -198,5 +224,6 @@ def _short(value: float) -> str:
     return f"{value:.6g}"
 
 
-def _vector(values: Iterable[float]) -> str:
-    return "  ".join(f"{value + 0.0:.5g}" for value in values)
+def _vector(values: Iterable[float], size: float = 0.0) -> str:
+    """Five digits each; what is noise against ``size`` is shown as 0."""
+    return "  ".join(f"{value:.5g}" if abs(value) > NOISE * size else "0" for value in values)
