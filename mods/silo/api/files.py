@@ -49,7 +49,7 @@ def upload(
             "POST",
             transport.address.api("items", part_number, "file"),
             subject,
-            body=lambda: form,
+            body=form.rewound,
             headers=headers,
             cancelled=cancelled,
         )

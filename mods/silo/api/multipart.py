@@ -44,17 +44,16 @@ class FileForm:
         self._path = path
         self._progress, self._cancelled = on_progress, cancelled
         self._boundary = secrets.token_hex(16)
-        self._head = self._text_parts(fields) + self._file_head(file_name or path.name)
-        self._tail = f"\r\n--{self._boundary}--\r\n".encode()
-        self._hash = hashlib.sha256()
+        self._begin = self._text_parts(fields) + self._file_head(file_name or path.name)
+        self._end = f"\r\n--{self._boundary}--\r\n".encode()
         try:
             self._file: BinaryIO = path.open("rb")
         except OSError as error:
             raise _unreadable(path, error) from error
         self.file_size = os.fstat(self._file.fileno()).st_size
-        self._left = self.file_size
         # `requests` takes the length of a stream from this attribute and sends it as Content-Length.
-        self.len = len(self._head) + self.file_size + len(self._tail)
+        self.len = len(self._begin) + self.file_size + len(self._end)
+        self.rewound()
 
     @property
     def content_type(self) -> str:
@@ -64,6 +63,13 @@ class FileForm:
     def sha256(self) -> str:
         """Of the bytes read so far; of the file, once the form was read to its end."""
         return self._hash.hexdigest()
+
+    def rewound(self) -> Self:
+        """The form from its beginning: a redirect wants it once more."""
+        self._head, self._tail, self._left = self._begin, self._end, self.file_size
+        self._hash = hashlib.sha256()
+        self._file.seek(0)
+        return self
 
     def read(self, size: int = -1) -> bytes:
         """The next bytes of the form."""
