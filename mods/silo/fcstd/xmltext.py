@@ -159,9 +159,11 @@ class XmlText:
         if self._inflater.finished:
             raise _Unexpected
         more = self._inflater.step(max(_FIRST_STEP, len(text) * (_GROWTH - 1)))
+        known = len(text)
+        text = self._hold(text + more)
         if self._head is not None:
-            _refuse_markup(text[-1:] + more, 0)
-        return self._hold(text + more)
+            _refuse_markup(text, max(0, known - 1))
+        return text
 
     def _hold(self, text: bytes) -> bytes:
         self._text, self._known = text, len(text)

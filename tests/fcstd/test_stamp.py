@@ -1,0 +1,332 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Stamping: the identity is there, everything else is byte for byte what it was."""
+
+from __future__ import annotations
+
+import io
+import os
+import stat
+import zipfile
+from pathlib import Path
+
+import pytest
+from fcstd_writer import COMMENT, Doc, container, part, save_xml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from silo.bom.errors import DocumentError
+from silo.bom.identity import identity_of
+from silo.fcstd import open_document, stamp
+from silo.fcstd.container import FileState
+from silo.fcstd.stamp import _write
+
+ROOT = hasattr(os, "geteuid") and os.geteuid() == 0
+
+
+def with_entries(folder: Path) -> Path:
+    """A file with side entries of all kinds, Document.xml in the middle."""
+    target = io.BytesIO()
+    with zipfile.ZipFile(target, "w") as file:
+        file.writestr(
+            zipfile.ZipInfo("first.brp", (2020, 1, 2, 3, 4, 6)), b"shape " * 500, zipfile.ZIP_DEFLATED
+        )
+        info = zipfile.ZipInfo("Document.xml", (2021, 2, 3, 4, 5, 8))
+        info.external_attr, info.extra = 0o644 << 16, b"\x55\x54\x01\x00\x00"
+        file.writestr(info, part().xml(), zipfile.ZIP_DEFLATED)
+        file.writestr(
+            zipfile.ZipInfo("stored.png", (2022, 3, 4, 5, 6, 10)), os.urandom(300), zipfile.ZIP_STORED
+        )
+        file.writestr("empty", b"")
+        file.comment = COMMENT
+    path = folder / "part.FCStd"
+    path.write_bytes(target.getvalue())
+    return path
+
+
+def test_the_identity_is_read_back(tmp_path: Path) -> None:
+    """Stamped, then read as the identity of what the file holds."""
+    path = part().save(tmp_path / "part.FCStd")
+    assert stamp(path, "u-1") is True
+    document = open_document(path)
+    assert document.Meta == {"SiloUUID": "u-1"}
+    assert identity_of(document.getObject("Box")) == "u-1"
+
+
+def test_one_object_of_several(tmp_path: Path) -> None:
+    """One file may give several parts; each has its own key beside the document's."""
+    path = part().add("Part::Box", "Other").save(tmp_path / "part.FCStd")
+    assert stamp(path, "u-1")
+    assert stamp(path, "u-2", object_name="Other")
+    document = open_document(path)
+    assert document.Meta == {"SiloUUID": "u-1", "SiloUUID/Other": "u-2"}
+    assert [identity_of(obj) for obj in document.Objects] == ["u-1", "u-2"]
+
+
+def test_nothing_else_changes(tmp_path: Path) -> None:
+    """Packed bytes, order, times, attributes, extra fields and the comment of all other entries stay."""
+    path = with_entries(tmp_path)
+    before = path.read_bytes()
+    assert stamp(path, "u-1")
+    after = path.read_bytes()
+    with zipfile.ZipFile(io.BytesIO(before)) as old, zipfile.ZipFile(io.BytesIO(after)) as new:
+        assert new.testzip() is None
+        assert new.comment == COMMENT
+        assert new.namelist() == old.namelist()
+        for was, now in zip(old.infolist(), new.infolist(), strict=True):
+            assert (now.date_time, now.external_attr, now.extra) == (
+                was.date_time,
+                was.external_attr,
+                was.extra,
+            )
+            if now.filename != "Document.xml":
+                assert _entry(after, now) == _entry(before, was)
+
+
+def _entry(raw: bytes, info: zipfile.ZipInfo) -> bytes:
+    """Header and packed bytes."""
+    return raw[info.header_offset : info.header_offset + 30 + len(info.filename) + info.compress_size]
+
+
+def test_the_text_changes_by_the_item_only(tmp_path: Path) -> None:
+    """Every other line of Document.xml stays."""
+    path = with_entries(tmp_path)
+    before = zipfile.ZipFile(path).read("Document.xml").decode().splitlines()
+    stamp(path, "u-1")
+    after = zipfile.ZipFile(path).read("Document.xml").decode().splitlines()
+    assert [line for line in after if line not in before] == [
+        '            <Map count="1">',
+        '                <Item key="SiloUUID" value="u-1"/>',
+        "            </Map>",
+    ]
+
+
+def test_the_same_identity_again_writes_nothing(tmp_path: Path) -> None:
+    """Idempotent, to the byte and the time."""
+    path = with_entries(tmp_path)
+    stamp(path, "u-1")
+    before = (path.read_bytes(), path.stat().st_mtime_ns, path.stat().st_ino)
+    assert stamp(path, "U-1") is False
+    assert (path.read_bytes(), path.stat().st_mtime_ns, path.stat().st_ino) == before
+
+
+def refused(path: Path, identity: str = "u-2", **options: object) -> str:
+    """Why a file is not stamped; it must then be as it was, with nothing beside it."""
+    before = path.read_bytes(), sorted(os.listdir(path.parent))
+    with pytest.raises(DocumentError) as caught:
+        stamp(path, identity, **options)  # type: ignore[arg-type]
+    assert (path.read_bytes(), sorted(os.listdir(path.parent))) == before
+    return caught.value.reason
+
+
+def test_another_identity_is_not_overwritten(tmp_path: Path) -> None:
+    """A file that is a part already stays that part, unless somebody insists."""
+    path = part(uuid="u-1").save(tmp_path / "part.FCStd")
+    assert "another identity already (SiloUUID): u-1" in refused(path)
+    assert stamp(path, "u-2", replace=True)
+    assert open_document(path).Meta == {"SiloUUID": "u-2"}
+
+
+def test_a_property_that_would_go_first_is_an_identity_too(tmp_path: Path) -> None:
+    """Meta beside a contrary property would have no effect, so it is not written."""
+    path = (
+        Doc(extra={"SiloUUID": "u-1"}).add("Part::Box", "Box", SiloItemId="u-3").save(tmp_path / "part.FCStd")
+    )
+    assert "SiloUUID is another identity already: u-1" in refused(path, replace=True)
+    assert "SiloItemId is another identity already: u-3" in refused(path, object_name="Box")
+    assert stamp(path, "u-1")
+    assert stamp(path, "u-3", object_name="Box")
+
+
+def test_an_object_that_is_not_there(tmp_path: Path) -> None:
+    """No identity for what the file does not hold."""
+    assert "no object named 'Gone'" in refused(part().save(tmp_path / "p.FCStd"), object_name="Gone")
+
+
+@pytest.mark.parametrize("identity", ["", "  ", " u", "a\nb", "a\0", "x" * 201, "\ufffe", "\x85"])
+def test_what_is_no_identity(tmp_path: Path, identity: str) -> None:
+    """One line of text, as long as an identity may be."""
+    assert "is no identity" in refused(part().save(tmp_path / "p.FCStd"), identity)
+
+
+def test_read_only_files_stay(tmp_path: Path) -> None:
+    """A file that its owner protected is not replaced, though the folder would allow it."""
+    path = part().save(tmp_path / "p.FCStd")
+    path.chmod(0o444)
+    assert refused(path) == "it is read-only; nothing was written"
+
+
+@pytest.mark.skipif(ROOT, reason="an administrator may write anywhere")
+def test_read_only_folders_stay(tmp_path: Path) -> None:
+    """No rights in the folder: a plain sentence."""
+    path = part().save(tmp_path / "in" / "p.FCStd")
+    path.parent.chmod(0o555)
+    try:
+        assert "folder is read-only" in refused(path)
+    finally:
+        path.parent.chmod(0o755)
+
+
+def test_a_file_that_changed_meanwhile_is_left_alone(tmp_path: Path) -> None:
+    """Whoever saved between our reading and our writing wins."""
+    path = part().save(tmp_path / "p.FCStd")
+    state = FileState.of(path.stat())
+    content = part(uuid="u-1").bytes()
+    other = part("saved by FreeCAD").bytes()
+    path.write_bytes(other)
+    with pytest.raises(DocumentError, match="changed by somebody else"):
+        _write(str(path), state, content, "SiloUUID", "u-1")
+    assert path.read_bytes() == other
+    assert os.listdir(tmp_path) == ["p.FCStd"]
+
+
+def test_a_copy_without_the_identity_is_thrown_away(tmp_path: Path) -> None:
+    """The new file is read before it takes the place of the old one."""
+    path = part().save(tmp_path / "p.FCStd")
+    state = FileState.of(path.stat())
+    for content, words in ((part().bytes(), "does not hold"), (part().bytes()[:-9], "cannot be read")):
+        with pytest.raises(DocumentError, match=words):
+            _write(str(path), state, content, "SiloUUID", "u-1")
+    assert path.read_bytes() == part().bytes()
+    assert os.listdir(tmp_path) == ["p.FCStd"]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="limits of POSIX")
+def test_a_full_disk_leaves_the_file(tmp_path: Path) -> None:
+    """An error of the system while writing leaves no half file and no rest."""
+    import resource
+
+    path = part().save(tmp_path / "p.FCStd")
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))
+    try:
+        found = refused(path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert found == "it cannot be written: File too large"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="rights of POSIX")
+def test_rights_and_links_stay(tmp_path: Path) -> None:
+    """Mode bits are kept; a symlink stays a symlink and its file is stamped."""
+    path = part().save(tmp_path / "store" / "p.FCStd")
+    path.chmod(0o640)
+    link = tmp_path / "p.FCStd"
+    link.symlink_to("store/p.FCStd")
+    assert stamp(link, "u-1")
+    assert link.is_symlink()
+    assert stat.S_IMODE(path.stat().st_mode) == 0o640
+    assert open_document(path).Meta == {"SiloUUID": "u-1"}
+
+
+META = '<Property name="Meta" type="App::PropertyMap" status="1">\n<Map count="0">\n</Map>\n</Property>'
+
+
+@pytest.mark.parametrize(
+    "meta",
+    [
+        META,
+        META.replace('<Map count="0">\n</Map>', '<Map count="0"/>'),
+        META.replace('"', "'"),
+        '<Property type="App::PropertyMap" name="Meta"/>',
+        f"<!-- {META.replace('Meta', 'Other')} -->{META}",
+        META.replace('status="1"', 'doc="a > b"'),
+    ],
+)
+def test_meta_in_other_forms(tmp_path: Path, meta: str) -> None:
+    """However a writer lays it out, the map is found and filled."""
+    xml = part().xml()
+    start = xml.index('        <Property name="Meta"')
+    end = xml.index("</Property>", start) + len("</Property>")
+    path = save_xml(tmp_path / "p.FCStd", xml[:start] + meta + xml[end:])
+    assert stamp(path, "u-1")
+    document = open_document(path)
+    assert document.Meta == {"SiloUUID": "u-1"}
+    assert [o.Name for o in document.Objects] == ["Box"]
+
+
+def test_without_meta_one_is_added(tmp_path: Path) -> None:
+    """A document without the map gets one, and counts it."""
+    path = Doc(meta=None).add("Part::Box", "Box").save(tmp_path / "p.FCStd")
+    before = open_document(path).PropertiesList
+    assert stamp(path, "u-1")
+    document = open_document(path)
+    assert document.PropertiesList == (*before, "Meta")
+    assert not document.properties._careful
+    assert document.Meta == {"SiloUUID": "u-1"}
+
+
+def test_without_any_property_one_is_added(tmp_path: Path) -> None:
+    """An empty list of properties is opened for it."""
+    xml = '<?xml version="1.0" encoding="utf-8"?><Document SchemaVersion="4"><Properties Count="0"/>'
+    xml += '<Objects Count="0"/><ObjectData Count="0"/></Document>'
+    path = save_xml(tmp_path / "p.FCStd", xml)
+    assert stamp(path, "u-1")
+    assert open_document(path).Meta == {"SiloUUID": "u-1"}
+
+
+def test_without_a_place_for_it_it_is_refused(tmp_path: Path) -> None:
+    """A document without properties has no room for an identity."""
+    path = save_xml(tmp_path / "p.FCStd", "<Document><Objects/><ObjectData/></Document>")
+    assert "no document properties" in refused(path)
+
+
+def test_other_encodings_are_refused(tmp_path: Path) -> None:
+    """Only UTF-8 is edited in place."""
+    xml = part().xml().replace("utf-8", "iso-8859-1")
+    assert "not in UTF-8" in refused(save_xml(tmp_path / "p.FCStd", xml.encode("latin-1")))
+
+
+def test_files_that_cannot_be_read_cannot_be_stamped(tmp_path: Path) -> None:
+    """A damaged file is not made worse."""
+    path = tmp_path / "p.FCStd"
+    path.write_bytes(part().bytes()[:-5])
+    assert "cut short" in refused(path)
+
+
+def test_entries_with_data_descriptors(tmp_path: Path) -> None:
+    """Containers written as a stream have lengths behind the data; those of the other entries stay there."""
+
+    class Stream(io.RawIOBase):
+        def __init__(self) -> None:
+            self.data = bytearray()
+
+        def writable(self) -> bool:
+            return True
+
+        def write(self, chunk) -> int:  # type: ignore[no-untyped-def]
+            self.data += chunk
+            return len(chunk)
+
+    stream = Stream()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as file:  # type: ignore[call-overload]
+        for name, content in (("Document.xml", part().xml()), ("a.brp", "shape" * 99), ("b.brp", "")):
+            with file.open(zipfile.ZipInfo(name), "w") as entry:
+                entry.write(content.encode())
+    path = tmp_path / "p.FCStd"
+    path.write_bytes(bytes(stream.data))
+    assert stamp(path, "u-1")
+    assert open_document(path).Meta == {"SiloUUID": "u-1"}
+    with zipfile.ZipFile(path) as file:
+        assert file.testzip() is None
+        assert file.read("a.brp") == b"shape" * 99
+
+
+def test_overlapping_entries_are_refused(tmp_path: Path) -> None:
+    """A second entry that begins within Document.xml would be torn by a longer one."""
+    raw = bytearray(container({"Document.xml": part().xml().encode(), "other": b"x"}))
+    at = raw.rindex(b"PK\x01\x02") + 42
+    raw[at : at + 4] = (40).to_bytes(4, "little")
+    path = tmp_path / "p.FCStd"
+    path.write_bytes(raw)
+    assert "overlap" in refused(path)
+
+
+TEXT = st.text(st.characters(codec="utf-8", exclude_categories=("Cc", "Cs", "Cn")), max_size=9)
+
+
+@given(st.dictionaries(TEXT, TEXT, max_size=4))
+def test_what_was_in_meta_stays(tmp_path_factory: pytest.TempPathFactory, meta: dict[str, str]) -> None:
+    """Whatever people keep in Meta, in any characters, survives."""
+    path = Doc(meta=meta).add("Part::Box", "Box").save(tmp_path_factory.mktemp("meta") / "p.FCStd")
+    stamp(path, "u-1", replace=True)
+    assert open_document(path).Meta == {**meta, "SiloUUID": "u-1"}
