@@ -110,6 +110,8 @@ class _Groups:
 
     def occurrences(self, names: Mapping[str, Match]) -> Iterator[tuple[Match, list[int]]]:
         """Each placed sub-assembly that has a row, deepest first, with its instances."""
+        if not names:
+            return
         below: dict[tuple[str, ...], list[int]] = defaultdict(list)
         product: dict[tuple[str, ...], str] = {}
         for index, instance in enumerate(self.instances):

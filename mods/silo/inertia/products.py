@@ -63,6 +63,8 @@ def companions(assembly: Assembly) -> frozenset[str]:
 
     Pro/E writes a SOLID and a wire COMPOUND for one product: that is one part, not two of one name.
     """
+    if all(prototype.has_solid for prototype in assembly.prototypes.values()):
+        return frozenset()
     solid_places = {
         (i.path[:-1], i.product_path[-1:])
         for i in assembly.instances

@@ -20,6 +20,10 @@ _MARGIN = 1e-14
 """Relative; above what printing fifteen digits may change, far below what matters."""
 
 
+_NOISE = 1e-14
+"""Relative: an element below this is the rest of a sum that cancelled."""
+
+
 def number(value: float) -> str:
     """Fifteen significant digits, which hide the last bit's noise; never "-0"."""
     return f"{value + 0.0:.15g}"
@@ -32,14 +36,22 @@ def settled(props: MassProps) -> MassProps:
     are then raised by what is missing, which is below 1e-9 of the largest one; more than that is no rounding
     and stays as it is, for the check to find.
     """
-    tensor = _printed((props.inertia + props.inertia.T) / 2)
+    tensor = _printed(_quiet((props.inertia + props.inertia.T) / 2))
     for _ in range(4):
         low, mid, high = np.linalg.eigvalsh(tensor)
         missing = float(high - low - mid)
         if missing <= -_MARGIN / 2 * high or missing > CHECK_TOLERANCE * high:
             break
         tensor = _printed(tensor + (max(missing, 0.0) + _MARGIN * high) * np.eye(3))
-    return MassProps(float(number(props.mass)), _printed(props.com), tensor)
+    reach = np.abs(props.com).max() + np.sqrt(np.abs(tensor).max() / props.mass if props.mass > 0 else 0)
+    return MassProps(float(number(props.mass)), _printed(_quiet(props.com, reach)), tensor)
+
+
+def _quiet(values: Floats, size: float | None = None) -> Floats:
+    """Zero for what is rounding against ``size``: 1e-18 m beside 0.3 m is no position."""
+    size = float(np.abs(values).max()) if size is None else size
+    result: Floats = np.where(np.abs(values) <= _NOISE * size, 0.0, values)
+    return result
 
 
 def _printed(values: Floats) -> Floats:
