@@ -66,8 +66,7 @@ class Matrix:
 
 
 def _walk_live(freecad: FreeCAD, tops: list[Path], profile: Path) -> Answers:
-    profile.mkdir()
-    env = {"FREECAD_USER_HOME": str(profile)}
+    env = freecad.profile(profile)
     results = run_freecad([str(top) for top in tops], command=freecad.command, timeout_s=120, env=env)
     return {Path(top): found for top, found in results}
 

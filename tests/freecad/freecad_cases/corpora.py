@@ -10,9 +10,7 @@ from __future__ import annotations
 import json
 import os
 import stat
-import subprocess
 import zipfile
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,7 +20,6 @@ from freecad_cases.truth import TRUTH, Truth
 BUILD = Path(__file__).with_name("build.py")
 DATA = Path(__file__).resolve().parents[2] / "data"
 ARCHIVES = DATA / "freecad"
-_CODE = 'import os, runpy; runpy.run_path(os.environ["SILO_SCRIPT"], run_name="__main__")'
 _MANIFEST = "built.json"
 # Zip cannot tell times before 1980; every entry has the same, so that equal content gives equal archives.
 _TIME = (1980, 1, 1, 0, 0, 0)
@@ -56,32 +53,12 @@ def load(folder: Path) -> Corpus:
     return Corpus(folder.resolve(), tuple(told["freecad"]), tuple(told["built"]))
 
 
-def run_script(
-    freecad: FreeCAD, script: Path, profile: Path, env: Mapping[str, str], timeout_s: float = 300
-) -> str:
-    """Run a Python script inside a FreeCAD without a window; its output. CalledProcessError if it fails."""
-    profile.mkdir(parents=True, exist_ok=True)
-    done = subprocess.run(
-        [freecad.command, "-c", _CODE],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        errors="replace",
-        cwd=profile,
-        env={**os.environ, "SILO_SCRIPT": str(script), "FREECAD_USER_HOME": str(profile), **env},
-        timeout=timeout_s,
-        check=False,
-    )
-    if done.returncode != 0:
-        raise AssertionError(f"{script.name} failed in FreeCAD {freecad.short}:\n{done.stdout[-4000:]}")
-    return done.stdout
-
-
 def build(freecad: FreeCAD, folder: Path) -> Corpus:
     """Have a FreeCAD build all the cases that it can."""
     folder.mkdir(parents=True)
-    run_script(freecad, BUILD, folder.parent / f"profile-{freecad.short}", {"SILO_CASES_OUT": str(folder)})
+    env = freecad.profile(folder.parent / f"profile-{freecad.short}")
+    done = freecad.run(BUILD, {**env, "SILO_CASES_OUT": str(folder)}, cwd=folder)
+    assert done.returncode == 0, f"FreeCAD {freecad.short} did not build its cases:\n{done.stdout[-4000:]}"
     return load(folder)
 
 

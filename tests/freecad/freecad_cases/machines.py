@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
@@ -17,6 +18,10 @@ ROOTS = REPOSITORY / "scripts" / "freecad-roots.sh"
 
 # What the add-on must work in; the last part of a version does not matter.
 WANTED = ("0.20", "1.0", "1.1")
+
+# As it is before a test gives itself a home of its own.
+_ENVIRONMENT = dict(os.environ)
+_CODE = 'import os, runpy; runpy.run_path(os.environ["SILO_SCRIPT"], run_name="__main__")'
 
 
 @dataclass(frozen=True)
@@ -42,14 +47,46 @@ class FreeCAD:
         beside = Path(self.command).parent / program
         return str(beside) if beside.exists() else program
 
+    def profile(self, folder: Path, *, dependencies: bool = False) -> dict[str, str]:
+        """Environment for a run with a profile of its own, in a new folder.
+
+        dependencies
+            with the Python packages that the Addon Manager would install; skips loudly without them.
+        """
+        folder.mkdir(parents=True)
+        if dependencies:
+            if not (self.dependencies / "requests").is_dir():
+                miss(f"the Python packages for FreeCAD {self.short} are not in {self.dependencies}")
+            (folder / "AdditionalPythonPackages").symlink_to(self.dependencies, target_is_directory=True)
+        return {"FREECAD_USER_HOME": str(folder)}
+
+    def run(
+        self, script: Path, env: Mapping[str, str], *, cwd: Path, timeout_s: float = 300
+    ) -> subprocess.CompletedProcess[str]:
+        """Run a Python script inside this FreeCAD without a window, once, with the script's exit code."""
+        return subprocess.run(
+            [self.command, "-c", _CODE],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            errors="replace",
+            cwd=cwd,
+            env={**os.environ, "SILO_SCRIPT": str(script), **env},
+            timeout=timeout_s,
+            check=False,
+        )
+
 
 @cache
 def freecads() -> Mapping[str, FreeCAD]:
     """By version ("1.0"). Empty where there is none at all."""
     if os.name != "posix":
         return {}
-    told = subprocess.run([ROOTS, "--list"], capture_output=True, text=True, timeout=60, check=False)
-    found = {}
+    told = subprocess.run(
+        [ROOTS, "--list"], capture_output=True, text=True, timeout=60, check=False, env=_ENVIRONMENT
+    )
+    found: dict[str, FreeCAD] = {}
     for line in told.stdout.splitlines():
         name, version, python, command, dependencies = line.split("\t")
         parts = tuple(int(part) for part in version.split(".") if part.isdigit())
@@ -62,10 +99,12 @@ def need(version: str) -> FreeCAD:
     """The FreeCAD of this version; skips loudly without it, and fails where the machine was to have it."""
     found = freecads().get(version)
     if found is None:
-        reason = (
-            f"no FreeCAD {version} on this machine; scripts/freecad-roots.sh builds it (as root on Debian)"
-        )
-        if os.environ.get("SILO_REQUIRE_FREECAD") == "1":
-            pytest.fail(reason)
-        pytest.skip(reason)
+        miss(f"no FreeCAD {version} on this machine; scripts/freecad-roots.sh builds it (as root on Debian)")
     return found
+
+
+def miss(reason: str) -> NoReturn:
+    """Skip, or fail where the machine was to have everything."""
+    if os.environ.get("SILO_REQUIRE_FREECAD") == "1":
+        pytest.fail(reason)
+    pytest.skip(reason)

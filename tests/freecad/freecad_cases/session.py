@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""A person's session, played inside FreeCAD: open, edit, close, and what the walker says at each step.
+
+``SILO_CASES`` names an unpacked corpus of FreeCAD 0.20, ``SILO_OUT`` the file for the answers (JSON).
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+sys.dont_write_bytecode = True
+sys.path.insert(0, os.environ["SILO_MODS"])
+
+import FreeCAD as App  # noqa: E402
+
+from silo.bom.errors import SiloError  # noqa: E402
+from silo.bom.model import Extraction  # noqa: E402
+from silo.workbench import host, live  # noqa: E402
+
+CASES = Path(os.environ["SILO_CASES"]) / "asm4"
+
+
+def told(found: Extraction) -> dict[str, Any]:
+    return {
+        "bom": {entry.object_name: entry.quantity for entry in found.entries},
+        "findings": [finding.code.value for finding in found.findings],
+        "blocked": found.blocked,
+    }
+
+
+def add_bolt(doc: Any, bolt: Any, name: str) -> None:
+    doc.getObject("Top").newObject("App::Link", name).LinkedObject = bolt
+
+
+def unsaved_edits() -> dict[str, Any]:
+    doc = host.open_fully(str(CASES / "plain_link" / "top.FCStd"))
+    add_bolt(doc, doc.getObject("Link").LinkedObject, "Second")
+    return told(live.extract_live(doc))
+
+
+def found_open_by_another_path() -> dict[str, Any]:
+    folder = CASES / "array_of_one"
+    doc = host.open_fully(str(folder / "top.FCStd"))
+    add_bolt(doc, doc.getObject("Row").LinkedObject, "Second")
+    other = folder.parent / "by_another_path"
+    other.symlink_to(folder, target_is_directory=True)
+    answer = told(live.read(str(other / "top.FCStd")))
+    return {**answer, "documents": len(host.documents())}
+
+
+def broken_document_is_not_reloaded() -> dict[str, Any]:
+    path = str(CASES / "missing_file" / "top.FCStd")
+    doc = host.open_fully(path)
+    add_bolt(doc, doc.getObject("Link").LinkedObject, "Second")
+    return told(live.read(path))
+
+
+def part_document_is_completed() -> dict[str, Any]:
+    top = host.open_fully(str(CASES / "partial_part_document" / "top.FCStd"))
+    path = str(CASES / "partial_part_document" / "kit.FCStd")
+    before = host.find_document(path)
+    partial, objects = host.is_partial(before), len(before.Objects)
+    after = host.open_fully(path)
+    return {
+        "partial": [partial, host.is_partial(after)],
+        "more objects": len(after.Objects) > objects,
+        "active": App.ActiveDocument.Name == top.Name,
+        **told(live.extract_live(top)),
+    }
+
+
+def closed_part() -> dict[str, Any]:
+    doc = host.open_fully(str(CASES / "plain_link" / "top.FCStd"))
+    App.closeDocument(doc.getObject("Link").LinkedObject.Document.Name)
+    found = live.extract_live(doc)
+    return {**told(found), "message": found.findings[0].message}
+
+
+def unsaved_document() -> dict[str, Any]:
+    doc = App.newDocument("Never saved")
+    doc.addObject("App::Part", "Top").Type = "Assembly"
+    return told(live.extract_live(doc))
+
+
+def hostile_file() -> str:
+    try:
+        live.read_checked(str(CASES / "doctype" / "bad.FCStd"))
+    except SiloError as error:
+        return str(error)
+    return "opened"
+
+
+def broken_file() -> str:
+    try:
+        live.read_checked(str(CASES / "truncated_zip" / "bad.FCStd"))
+    except SiloError as error:
+        return str(error)
+    return "opened"
+
+
+def main() -> None:
+    answers = {}
+    for step in (
+        unsaved_edits,
+        found_open_by_another_path,
+        broken_document_is_not_reloaded,
+        part_document_is_completed,
+        closed_part,
+        unsaved_document,
+        hostile_file,
+        broken_file,
+    ):
+        answers[step.__name__] = step()
+        host.close_all()
+    Path(os.environ["SILO_OUT"]).write_text(json.dumps(answers))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Batches with real FreeCAD and a real server: ``--via freecad``, and freecadcmd without our command line."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import uuid
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from freecad_cases import corpora, machines
+from freecad_cases.machines import REPOSITORY, WANTED, FreeCAD
+
+from silo.api.client import SiloClient
+from silo.cli.main import main
+from silo_server.run import running_server
+
+pytestmark = pytest.mark.freecad
+
+HEADLESS = REPOSITORY / "mods" / "silo" / "workbench" / "headless.py"
+
+
+@dataclass(frozen=True)
+class Vault:
+    """A folder with one good assembly (top.FCStd, sub.FCStd and their parts), and a server that knows it."""
+
+    folder: Path
+    client: SiloClient
+    env: dict[str, str]
+
+    @property
+    def top(self) -> Path:
+        return self.folder / "top.FCStd"
+
+    def lines(self, part_of: str) -> dict[str, float]:
+        """What the server's BOM of an assembly holds, by file name of the component."""
+        return {
+            self.names[line.child_part_number]: line.quantity
+            for line in self.client.get_bom(self.numbers[part_of])
+        }
+
+    @property
+    def names(self) -> dict[str, str]:
+        return {number: name for name, number in self.numbers.items()}
+
+    @property
+    def numbers(self) -> dict[str, str]:
+        told = json.loads((self.folder / "numbers.json").read_text())
+        assert isinstance(told, dict)
+        return told
+
+
+@pytest.fixture
+def vault(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Iterator[Vault]:
+    """The case ``link_to_assembly`` as FreeCAD 0.20 wrote it, so that every FreeCAD reads it; registered."""
+    corpus = corpora.unpack(corpora.ARCHIVES / "corpus-0.20.zip", tmp_path / "corpus")
+    folder = tmp_path / "vault"
+    shutil.copytree(corpus.base("asm4/link_to_assembly"), folder)
+    token = "silo_" + uuid.uuid4().hex
+    for name in ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME"):
+        monkeypatch.setenv(name, str(tmp_path / "home"))
+    with running_server(f"sqlite:///{tmp_path / 'silo.db'}", token=token) as server:
+        env = {"SILO_API_URL": server.base_url, "SILO_API_TOKEN": token}
+        for name, value in env.items():
+            monkeypatch.setenv(name, value)
+        assert main(["register", "--yes", str(folder / "top.FCStd")]) == 0
+        capsys.readouterr()
+        with SiloClient(server.base_url, token) as client:
+            found = Vault(folder, client, env)
+            numbers = _numbers(folder, client)
+            (folder / "numbers.json").write_text(json.dumps(numbers))
+            yield found
+
+
+def _numbers(folder: Path, client: SiloClient) -> dict[str, str]:
+    from silo.fcstd import Library
+
+    numbers = {}
+    with Library() as library:
+        for path in folder.glob("*.FCStd"):
+            item = client.get_item_by_uuid(library.open(path).Meta["SiloUUID"])
+            assert item is not None
+            numbers[path.stem] = str(item["part_number"])
+    return numbers
+
+
+def _json(capsys: pytest.CaptureFixture[str]) -> Any:
+    return json.loads(capsys.readouterr().out)
+
+
+# --- silo-mod sync --via freecad ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("version", WANTED)
+def test_sync_via_freecad_brings_the_bom_to_the_server(
+    vault: Vault,
+    version: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Children before parents, the right quantities; a second run, and one over the files, change nothing."""
+    _use(machines.need(version), tmp_path, monkeypatch)
+    words = ["sync", "--via", "freecad", "--recursive", "--json", str(vault.top)]
+    assert main(words) == 0
+    (result,) = _json(capsys)["results"]
+    assert [one["status"] for one in result["assemblies"]] == ["merged", "merged"]
+    assert vault.lines("top") == {"sub": 1}
+    assert vault.lines("sub") == {"bolt": 2, "plate": 1}
+
+    for again in (words, ["sync", "--recursive", "--json", str(vault.top)]):
+        assert main(again) == 0
+        (result,) = _json(capsys)["results"]
+        assert [one["status"] for one in result["assemblies"]] == ["unchanged", "unchanged"]
+
+
+@pytest.mark.parametrize("version", WANTED)
+def test_one_bad_file_does_not_stop_a_folder(
+    vault: Vault,
+    version: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """A truncated file is told, parts are left alone, the rest is synced; exit code 1 and a report."""
+    _use(machines.need(version), tmp_path, monkeypatch)
+    good = (vault.folder / "plate.FCStd").read_bytes()
+    (vault.folder / "aaa broken.FCStd").write_bytes(good[: len(good) // 2])
+    report = tmp_path / "report.md"
+    assert main(["sync", "--via", "freecad", "--json", "--report", str(report), str(vault.folder)]) == 1
+    results = {Path(one["top"]).name: one for one in _json(capsys)["results"]}
+    assert not results["aaa broken.FCStd"]["ok"]
+    assert results["bolt.FCStd"]["skipped"]
+    assert results["top.FCStd"]["assemblies"][0]["status"] == "merged"
+    assert vault.lines("top") == {"sub": 1}
+    text = report.read_text()
+    assert "4 of 5 files in order" in text
+    assert "aaa broken.FCStd" in text
+
+
+def _use(freecad: FreeCAD, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SILO_FREECADCMD", freecad.command)
+    for name, value in freecad.profile(tmp_path / "profile").items():
+        monkeypatch.setenv(name, value)
+
+
+# --- freecadcmd without our command line --------------------------------------------------------------------
+
+
+def headless(
+    freecad: FreeCAD, vault: Vault, args: Any, tmp_path: Path, *, dependencies: bool
+) -> subprocess.CompletedProcess[str]:
+    profile = freecad.profile(tmp_path / f"profile-{uuid.uuid4().hex}", dependencies=dependencies)
+    text = args if isinstance(args, str) else json.dumps(args)
+    return freecad.run(HEADLESS, {**profile, **vault.env, "SILO_ARGS": text}, cwd=vault.folder.parent)
+
+
+@pytest.mark.parametrize("version", WANTED)
+def test_freecadcmd_alone_syncs_and_reports(vault: Vault, version: str, tmp_path: Path) -> None:
+    """The documented line does what the command line does: reports, progress, exit code."""
+    freecad = machines.need(version)
+    (vault.folder / "zzz.FCStd").write_text("no zip")
+    args = {"tops": ["vault"], "recursive": True, "json": "out.json", "report": "out.md"}
+    done = headless(freecad, vault, args, tmp_path, dependencies=True)
+    assert done.returncode == 1, done.stdout
+    assert vault.lines("top") == {"sub": 1}
+    assert vault.lines("sub") == {"bolt": 2, "plate": 1}
+    results = json.loads((tmp_path / "out.json").read_text())["results"]
+    assert {Path(one["top"]).name: one["ok"] for one in results} == {
+        "bolt.FCStd": True,
+        "plate.FCStd": True,
+        "sub.FCStd": True,
+        "top.FCStd": True,
+        "zzz.FCStd": False,
+    }
+    assert "4 of 5 files in order" in (tmp_path / "out.md").read_text()
+    assert "[5/5]" in done.stdout
+
+    (vault.folder / "zzz.FCStd").unlink()
+    again = headless(freecad, vault, args, tmp_path, dependencies=True)
+    assert again.returncode == 0, again.stdout
+
+
+@pytest.mark.parametrize("version", WANTED)
+def test_freecadcmd_without_packages_still_writes_the_boms(
+    vault: Vault, version: str, tmp_path: Path
+) -> None:
+    """No requests in FreeCAD's Python: one plain sentence, the BOMs as JSON, exit code 3, no traceback."""
+    args = {"tops": ["vault/top.FCStd"], "json": "out.json"}
+    done = headless(machines.need(version), vault, args, tmp_path, dependencies=False)
+    assert done.returncode == 3, done.stdout
+    assert "Traceback" not in done.stdout
+    assert "has no package" in done.stdout
+    (result,) = json.loads((tmp_path / "out.json").read_text())["results"]
+    (entry,) = result["bom"]["entries"]
+    assert (entry["object"], entry["quantity"]) == ("Sub", 1)
+    assert {child["object"]: child["quantity"] for child in entry["children"]} == {"Bolt": 2, "Plate": 1}
+
+
+@pytest.mark.parametrize("version", WANTED)
+def test_wrong_arguments_are_told_in_plain_words(vault: Vault, version: str, tmp_path: Path) -> None:
+    """Exit code 2 and what was wanted, for each way of getting it wrong."""
+    freecad = machines.need(version)
+    for args, words in {
+        "nonsense": "must be a JSON object",
+        '{"tops": []}': '"tops" must be a list',
+        '{"tops": ["a"], "recursiv": true}': "unknown keys: recursiv",
+        '{"tops": ["a"], "recursive": 1}': '"recursive" must be true or false',
+    }.items():
+        done = headless(freecad, vault, args, tmp_path, dependencies=False)
+        assert (done.returncode, words in done.stdout) == (2, True), done.stdout
+        assert "Traceback" not in done.stdout
