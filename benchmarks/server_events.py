@@ -78,7 +78,7 @@ def post_merges(
         parent, *children = api.items(11)
         for n in range(merges):
             key = f"merge-{n}"
-            body = merge_body({child: n + 1 for child in children}, sync_id=key)
+            body = merge_body(dict.fromkeys(children, n + 1), sync_id=key)
             sent[key] = time.perf_counter()
             api.good("POST", bom(parent, "merge"), body)
             answered[key] = time.perf_counter()

@@ -5,7 +5,8 @@
 
 Measured at the client, over HTTP on the loopback, the median of N: the first merge (all lines new), the same
 merge again (no change), a merge in which every quantity changed, one with every line unreferenced, and the
-read of the BOM. Then the expanded tree of 100 000 occurrences, once with few and once with many distinct lines.
+read of the BOM. Then the expanded tree of 100 000 occurrences, once with few and once with many distinct
+lines.
 """
 
 from __future__ import annotations

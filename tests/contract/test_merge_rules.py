@@ -182,7 +182,7 @@ def test_giving_the_assembly_s_quantity_back_ends_the_override(api: Api) -> None
 
 
 def test_an_override_that_left_the_assembly_is_told(api: Api) -> None:
-    """A person changed the quantity, then CAD dropped the part: the line stays, and silence would be wrong."""
+    """A person changed the quantity, then CAD dropped the part: the line stays, and is told."""
     parent, a = api.items(2)
     api.merge(parent, {a: 4})
     api.good("PUT", bom(parent, a), {"quantity": 6})

@@ -16,6 +16,7 @@ from silo_server.routes.models import (
     NewItemBody,
     NumberBody,
     NumberOut,
+    Short,
     UuidsBody,
 )
 from silo_server.routes.render import item_to_wire
@@ -26,7 +27,7 @@ router = APIRouter(prefix="/api", tags=["items"])
 
 Limit = Annotated[int, Query(ge=1, le=1000)]
 Offset = Annotated[int, Query(ge=0, le=10_000_000)]
-Word = Annotated[str, Query(max_length=200)]
+Word = Annotated[Short, Query()]
 
 
 @router.get("/items", response_model=list[ItemOut], responses=READ_ERRORS)

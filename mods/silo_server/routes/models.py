@@ -5,10 +5,18 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
 
-Text = Annotated[str, StringConstraints(max_length=10_000)]
-Short = Annotated[str, StringConstraints(max_length=200)]
+
+def _no_nul(text: str) -> str:
+    # PostgreSQL has no place for it; what one database refuses, the other does as well.
+    if "\x00" in text:
+        raise ValueError("wanted a text, got one with the character NUL in it")
+    return text
+
+
+Text = Annotated[str, StringConstraints(max_length=10_000), AfterValidator(_no_nul)]
+Short = Annotated[str, StringConstraints(max_length=200), AfterValidator(_no_nul)]
 Properties = dict[Short, Any]
 
 

@@ -24,6 +24,7 @@ from silo_server.routes.context import (
 from silo_server.routes.models import RevisionBody, RevisionOut
 from silo_server.routes.render import revision_to_wire
 from silo_server.services import items, revisions
+from silo_server.services.merge_request import is_text
 from silo_server.values import Actor, Revision
 
 router = APIRouter(prefix="/api/items/{part_number}", tags=["revisions"])
@@ -100,11 +101,18 @@ async def upload_file(server: ServerDep, caller: Editor, part_number: str, reque
         file, comment, raw = form.get("file"), form.get("comment"), form.get("properties")
         if not isinstance(file, UploadFile):
             raise RejectedError("file: wanted a multipart form with the file in a part named 'file'")
-        if isinstance(comment, UploadFile) or isinstance(raw, UploadFile):
-            raise RejectedError("comment, properties: wanted texts, got files")
+        if isinstance(raw, UploadFile) or not is_text(comment or "", 10_000):
+            raise RejectedError("comment, properties: wanted texts of at most 10 000 characters")
         properties = _properties(raw)
         revision = await anyio.to_thread.run_sync(
-            _store, server, caller, part_number, file, comment or "", properties, _idempotency_key(request)
+            _store,
+            server,
+            caller,
+            part_number,
+            file,
+            str(comment or ""),
+            properties,
+            _idempotency_key(request),
         )
     return json_answer(revision_to_wire(part_number, revision), 201)
 

@@ -86,6 +86,8 @@ def get_item(tx: Tx, part_number: str, *, include_archived: bool = False, lock: 
 
     ``lock`` makes other writers of this item, and of its BOM, wait until this transaction ends.
     """
+    if "\x00" in part_number:
+        raise NotFoundError("no item has a part number with the character NUL in it")
     query = select(items).where(items.c.part_number_key == part_number.casefold())
     row = tx.conn.execute(query.with_for_update(key_share=True) if lock else query).one_or_none()
     if row is None or (row.archived_at and not include_archived):

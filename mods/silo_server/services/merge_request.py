@@ -8,9 +8,10 @@ each with the index of its entry, in the one 400.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeGuard
 
 from silo.bom.errors import RejectedError
 from silo_server.errors import TooLargeError
@@ -55,7 +56,7 @@ def read_merge_order(body: Any, max_entries: int) -> MergeOrder:
     if len(body["entries"]) > max_entries:
         raise TooLargeError(f"entries: this server takes at most {max_entries}, got {len(body['entries'])}")
     sync_id, dry_run = body.get("sync_id"), body.get("dry_run")
-    if sync_id is not None and not (isinstance(sync_id, str) and 0 < len(sync_id) <= 128):
+    if sync_id is not None and not (is_text(sync_id, 128) and sync_id):
         raise RejectedError("sync_id: wanted a text of 1 to 128 characters")
     if dry_run is not None and not isinstance(dry_run, bool):
         raise RejectedError("dry_run: wanted true or false")
@@ -69,6 +70,13 @@ def read_merge_order(body: Any, max_entries: int) -> MergeOrder:
         if problem is not None:
             problems.append((index, problem))
     return MergeOrder(entries, problems, sync_id, bool(dry_run), *document)
+
+
+def is_text(value: Any, longest: int) -> TypeGuard[str]:
+    """True for a text that both databases can keep (no NUL, no half of a surrogate pair)."""
+    if not isinstance(value, str) or len(value) > longest or "\x00" in value:
+        return False
+    return value.isascii() or not any("\ud800" <= c <= "\udfff" for c in value)
 
 
 def quantity_problem(value: Any) -> str | None:
@@ -87,7 +95,7 @@ def _entry(index: int, raw: Any) -> tuple[OrderEntry | None, str | None]:
     name, quantity = raw.get("child_part_number"), raw.get("quantity")
     problem = quantity_problem(quantity)
     text = None if problem is None else f"entries[{index}].quantity: {problem}"
-    if not isinstance(name, str) or not name.strip() or len(name) > 200:
+    if not is_text(name, 200) or not name.strip():
         wrong = f"entries[{index}].child_part_number: wanted a part number, got {_shown(name)}"
         return None, wrong if text is None else f"{wrong}; {text}"
     # An entry with a bad quantity is still looked up, so that an unknown number is told as well.
@@ -100,11 +108,11 @@ def _document(raw: Any) -> tuple[str | None, str | None, int | None]:
     if not isinstance(raw, Mapping):
         raise RejectedError('document: wanted {"file": …, "sha256": …, "revision": …}')
     file, sha256, revision = raw.get("file"), raw.get("sha256"), raw.get("revision")
-    if file is not None and not isinstance(file, str):
+    if file is not None and not is_text(file, 4096):
         raise RejectedError("document.file: wanted a file name")
-    if sha256 is not None and not (isinstance(sha256, str) and len(sha256) == 64):
+    if sha256 is not None and not (isinstance(sha256, str) and re.fullmatch("[0-9A-Fa-f]{64}", sha256)):
         raise RejectedError("document.sha256: wanted 64 hexadecimal digits")
-    if revision is not None and (isinstance(revision, bool) or not isinstance(revision, int)):
+    if revision is not None and not (type(revision) is int and 0 <= revision < 2**31):
         raise RejectedError("document.revision: wanted a whole number")
     return file, sha256, revision
 

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Uploads as revisions, downloads, thumbnails."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import zipfile
+from typing import Any
+
+from silo_server.testing import Answer, Api, form_body
+
+PNG = b"\x89PNG\r\n\x1a\n" + b"picture"
+
+
+def upload(api: Api, number: str, content: bytes, name: str = "Part.FCStd", **more: Any) -> Answer:
+    """Upload a file."""
+    headers = more.pop("headers", {})
+    body, form = form_body({"file": (name, content), **more})
+    return api.call("POST", f"/api/items/{number}/file", body=body, headers={**form, **headers})
+
+
+def test_an_upload_is_a_new_revision(api: Api) -> None:
+    """``file``, ``comment``, ``properties``: the answer has number, SHA-256 and size."""
+    number = api.item()
+    content = b"content" * 1000
+    answer = upload(api, number, content, comment="first", properties=json.dumps({"mass_kg": 2}))
+    assert answer.status == 201
+    revision = answer.json()
+    assert revision["revision_number"] == 1
+    assert revision["file_checksum"] == hashlib.sha256(content).hexdigest()
+    assert (revision["file_size"], revision["file_name"]) == (7000, "Part.FCStd")
+    assert (revision["comment"], revision["properties"]) == ("first", {"mass_kg": 2})
+    assert upload(api, number, b"second").json()["revision_number"] == 2
+    item = api.get(f"/api/items/{number}")
+    assert (item["current_revision"], item["properties"]) == (2, {"mass_kg": 2})
+    assert [r["revision_number"] for r in api.get(f"/api/items/{number}/revisions")] == [2, 1]
+    assert api.get(f"/api/items/{number}/revisions/1") == revision
+
+
+def test_a_download_is_the_file_and_never_something_to_run(api: Api) -> None:
+    """Served as an attachment of no type, sandboxed, with its hash as ETag."""
+    number = api.item()
+    page = b"<script>alert(1)</script>"
+    upload(api, number, page, name='evil".html')
+    upload(api, number, b"newest")
+    answer = api.call("GET", f"/api/items/{number}/file/1")
+    assert answer.body == page
+    assert answer.headers["content-type"] == "application/octet-stream"
+    assert answer.headers["content-disposition"].startswith("attachment")
+    assert answer.headers["x-content-type-options"] == "nosniff"
+    assert "sandbox" in answer.headers["content-security-policy"]
+    assert api.call("GET", f"/api/items/{number}/file").body == b"newest"
+    etag = {"If-None-Match": answer.headers["etag"]}
+    assert api.call("GET", f"/api/items/{number}/file/1", headers=etag).status == 304
+    part = api.call("GET", f"/api/items/{number}/file/1", headers={"Range": "bytes=0-6"})
+    assert (part.status, part.body) == (206, b"<script")
+
+
+def test_a_name_from_a_client_is_only_a_name(api: Api) -> None:
+    """No path of an upload reaches the disk."""
+    number = api.item()
+    for name in ("../../etc/passwd", "..\\..\\x.FCStd", "/abs/olute", "..", "\x01"):
+        revision = upload(api, number, b"x", name=name).json()
+        assert "/" not in revision["file_name"]
+        assert "\\" not in revision["file_name"]
+        assert revision["file_name"] not in ("", ".", "..")
+
+
+def test_the_same_content_is_kept_once(api: Api, server: Any) -> None:
+    """By hash: two items with the same file share it."""
+    a, b = api.items(2)
+    content = b"only once " * 50
+    checksum = upload(api, a, content).json()["file_checksum"]
+    upload(api, b, content)
+    assert len(list(server.settings.storage.rglob(checksum))) == 1
+    assert api.call("GET", f"/api/items/{b}/file").body == content
+
+
+def test_a_repeated_upload_makes_one_revision(api: Api) -> None:
+    """``Idempotency-Key``: sending twice does no harm; another file under the same key is refused."""
+    number = api.item()
+    key = {"Idempotency-Key": "commit-1"}
+    first = upload(api, number, b"x", headers=key)
+    again = upload(api, number, b"x", headers=key)
+    assert first.json() == again.json()
+    assert upload(api, number, b"y", headers=key).status == 409
+    assert len(api.get(f"/api/items/{number}/revisions")) == 1
+
+
+def test_a_thumbnail_is_taken_from_an_fcstd_file(api: Api) -> None:
+    """``thumbnails/Thumbnail.png`` inside the file; what is no PNG is not served."""
+    number, other = api.items(2)
+    api.bad(404, "GET", f"/api/items/{number}/thumbnail")
+    for item, picture in ((number, PNG), (other, b"<svg onload=alert(1)>")):
+        out = io.BytesIO()
+        with zipfile.ZipFile(out, "w") as archive:
+            archive.writestr("Document.xml", "<Document/>")
+            archive.writestr("thumbnails/Thumbnail.png", picture)
+        upload(api, item, out.getvalue())
+    answer = api.call("GET", f"/api/items/{number}/thumbnail")
+    assert (answer.status, answer.body, answer.headers["content-type"]) == (200, PNG, "image/png")
+    api.bad(404, "GET", f"/api/items/{other}/thumbnail")
+    upload(api, number, b"a later revision without a picture")
+    assert api.call("GET", f"/api/items/{number}/thumbnail").body == PNG
+
+
+def test_what_is_no_upload_is_refused(api: Api) -> None:
+    """400 with what was wanted; nothing is stored."""
+    number = api.item()
+    path = f"/api/items/{number}/file"
+    api.bad(400, "POST", path, {"file": "x"})
+    body, headers = form_body({"comment": "no file"})
+    assert "'file'" in api.bad(400, "POST", path, body=body, headers=headers)["message"]
+    body, headers = form_body({"file": ("a", b"x"), "properties": "[1]"})
+    assert "properties" in api.bad(400, "POST", path, body=body, headers=headers)["message"]
+    assert upload(api, "NO-SUCH", b"x").status == 404
+    assert api.get(f"/api/items/{number}/revisions") == []
+    api.bad(404, "GET", f"/api/items/{number}/file")
+    api.bad(404, "GET", f"/api/items/{number}/file/1")

@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Items: identity, numbers, search, change, archive."""
+
+from __future__ import annotations
+
+import threading
+import uuid
+
+import pytest
+
+from silo_server.testing import Api, bom
+
+
+def test_an_item_gets_a_number_of_its_category(api: Api) -> None:
+    """``kindred-rd``: category and a 4-digit serial, counted per category."""
+    made = api.good("POST", "/api/items", {"schema": "kindred-rd", "category": "F03", "description": "Eye"})
+    again = api.good("POST", "/api/items", {"schema": "kindred-rd", "category": "f03", "name": "Eye 2"})
+    assert made["part_number"] == "F03-0001"
+    assert again["part_number"] == "F03-0002"
+    assert (made["name"], made["description"], made["item_type"]) == ("Eye", "Eye", "part")
+    assert uuid.UUID(made["id"])
+
+
+def test_the_category_says_the_type(api: Api) -> None:
+    """A01 is an assembly unless the request says otherwise."""
+    made = api.good("POST", "/api/items", {"category": "A02", "name": "Robot"})
+    assert made["item_type"] == "assembly"
+    made = api.good("POST", "/api/items", {"category": "A02", "name": "Robot", "item_type": "tool"})
+    assert made["item_type"] == "tool"
+
+
+def test_the_preview_consumes_nothing(api: Api) -> None:
+    """``generate-part-number`` may be called often; the number is given by POST /api/items."""
+    ask = {"schema": "kindred-rd", "category": "R27"}
+    first = api.good("POST", "/api/generate-part-number", ask)
+    assert first == api.good("POST", "/api/generate-part-number", ask)
+    made = api.good("POST", "/api/items", {"category": "R27", "name": "Servo"})
+    assert made["part_number"] == first["part_number"]
+    assert api.good("POST", "/api/generate-part-number", ask) != first
+
+
+def test_a_taken_number_is_jumped_over(api: Api) -> None:
+    """An explicit number in the way leaves a gap, never an error."""
+    api.item("F09-0001")
+    api.item("F09-0002")
+    assert api.good("POST", "/api/items", {"category": "F09", "name": "Rivet"})["part_number"] == "F09-0003"
+
+
+def test_many_at_once_get_different_numbers(api: Api) -> None:
+    """Numbers are unique however many ask at the same moment."""
+    numbers: list[str] = []
+
+    def make() -> None:
+        mine = api.as_(api.token)
+        for _ in range(5):
+            made = mine.good("POST", "/api/items", {"category": "C01", "name": "Glue"})
+            numbers.append(made["part_number"])
+
+    threads = [threading.Thread(target=make) for _ in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert sorted(numbers) == [f"C01-{n:04d}" for n in range(1, 31)]
+
+
+def test_numbers_are_unique_whatever_their_case(api: Api) -> None:
+    """409 for a number that is there already."""
+    number = api.item()
+    error = api.bad(409, "POST", "/api/items", {"part_number": number.swapcase(), "name": "x"})
+    assert error["error"] == "duplicate"
+
+
+@pytest.mark.parametrize("number", ["a/b", "", " ", "a\nb", "x" * 65, "by-uuid", "..", "a?b", "a%2fb"])
+def test_a_number_must_fit_into_a_path(api: Api, number: str) -> None:
+    """What cannot stand in a URL or a cell is no part number."""
+    api.bad(400, "POST", "/api/items", {"part_number": number, "name": "x"})
+
+
+def test_a_number_may_be_anything_else(api: Api) -> None:
+    """Nothing parses numbers by a pattern: blanks, dots and letters of any alphabet are fine."""
+    number = f"Ä 12.5 +x {uuid.uuid4().hex[:6]}"
+    api.item(number)
+    from urllib.parse import quote
+
+    assert api.get("/api/items/" + quote(number))["part_number"] == number
+
+
+def test_a_client_s_uuid_makes_a_repeat_harmless(api: Api) -> None:
+    """POST with ``id`` twice makes one item (the retry after a crash)."""
+    identity = str(uuid.uuid4())
+    body = {"id": identity, "category": "M01", "name": "Bracket"}
+    first = api.call("POST", "/api/items", body)
+    again = api.call("POST", "/api/items", body)
+    assert (first.status, again.status) == (201, 200)
+    assert first.json() == again.json()
+    assert first.json()["id"] == identity
+
+
+def test_by_uuid(api: Api) -> None:
+    """The item by its UUID, in any written form; 404 when unknown or archived, 400 for no UUID."""
+    number = api.item()
+    item = api.get(f"/api/items/{number}")
+    assert api.get(f"/api/items/by-uuid/{item['id'].upper()}") == item
+    assert api.bad(404, "GET", f"/api/items/by-uuid/{uuid.uuid4()}")["error"] == "not_found"
+    api.bad(400, "GET", "/api/items/by-uuid/nonsense")
+    api.good("DELETE", f"/api/items/{number}")
+    api.bad(404, "GET", f"/api/items/by-uuid/{item['id']}")
+
+
+def test_many_uuids_in_one_request(api: Api) -> None:
+    """The batch look-up: found ones once each in the order asked, missing ones absent, nonsense no error."""
+    ids = [api.get(f"/api/items/{number}")["id"] for number in api.items(5)]
+    asked = [ids[3], str(uuid.uuid4()), ids[0], ids[3], "nonsense"]
+    found = api.good("POST", "/api/items/by-uuid", {"uuids": asked})["items"]
+    assert [item["id"] for item in found] == [ids[3], ids[0]]
+    assert api.good("POST", "/api/items/by-uuid", {"uuids": []}) == {"items": []}
+
+
+def test_search_and_paging(api: Api) -> None:
+    """Every word must be somewhere in number, name or description; the total is in a header."""
+    word = uuid.uuid4().hex[:8]
+    for n in range(5):
+        api.item(f"S-{word}-{n}", name=f"Hex bolt {n}", description="zinc", item_type="tool")
+    answer = api.call("GET", f"/api/items?search=BOLT+{word}&limit=2&offset=1")
+    assert [item["part_number"] for item in answer.json()] == [f"S-{word}-1", f"S-{word}-2"]
+    assert answer.headers["x-total-count"] == "5"
+    assert len(api.get(f"/api/items/search?q={word}+zinc")) == 5
+    assert api.get(f"/api/items?search={word}&item_type=part") == []
+    assert api.get(f"/api/items?search={word}%25") == []
+    assert api.get(f"/api/items?search={word}_") == []
+
+
+def test_renaming_keeps_the_identity(api: Api) -> None:
+    """A part number may change; the UUID, the lines and the history do not."""
+    parent, child = api.items(2)
+    api.merge(parent, {child: 2})
+    before = api.get(f"/api/items/{child}")
+    renamed = api.good("PUT", f"/api/items/{child}", {"part_number": child + "-B", "name": "Renamed"})
+    assert (renamed["id"], renamed["part_number"], renamed["name"]) == (
+        before["id"],
+        child + "-B",
+        "Renamed",
+    )
+    assert api.quantities(parent) == {child + "-B": 2}
+    api.bad(404, "GET", f"/api/items/{child}")
+    assert api.get(f"/api/items/search?q={child}-b")[0]["name"] == "Renamed"
+
+
+def test_only_properties_make_a_revision(api: Api) -> None:
+    """Changes in place make none; properties make one; the same properties make none."""
+    number = api.item()
+    assert api.good("PUT", f"/api/items/{number}", {"description": "new"})["current_revision"] == 0
+    changed = api.good("PUT", f"/api/items/{number}", {"properties": {"mass_kg": 1}, "comment": "weighed"})
+    assert (changed["current_revision"], changed["properties"]) == (1, {"mass_kg": 1})
+    same = api.good("PUT", f"/api/items/{number}", {"properties": {"mass_kg": 1}})
+    assert same["current_revision"] == 1
+    assert api.get(f"/api/items/{number}/revisions")[0]["comment"] == "weighed"
+
+
+def test_archiving_is_no_deleting(api: Api) -> None:
+    """An archived item is not found, keeps its number and its place in BOMs, and can come back."""
+    parent, child = api.items(2)
+    api.merge(parent, {child: 1})
+    api.good("DELETE", f"/api/items/{child}")
+    api.bad(404, "GET", f"/api/items/{child}")
+    api.bad(409, "POST", "/api/items", {"part_number": child, "name": "x"})
+    assert api.lines(parent)[child]["child_archived"] is True
+    assert api.good("POST", f"/api/items/{child}/unarchive")["part_number"] == child
+    assert api.get(f"/api/items/{child}")["archived_at"] is None
+    assert api.get(bom(child, "where-used"))[0]["parent_part_number"] == parent
+
+
+def test_texts_that_no_database_takes_are_refused_or_kept(api: Api) -> None:
+    """NUL and lone surrogates are 400 on both databases; every real text comes back as it was."""
+    api.bad(400, "POST", "/api/items", body=b'{"part_number": "N-1", "name": "a\\u0000b"}', headers=JSON)
+    api.bad(400, "POST", "/api/items", body=b'{"part_number": "N-2", "name": "a\\ud800b"}', headers=JSON)
+    text = "Ünïcode 螺栓 🔩 <b>&amp;'\"\\"
+    number = api.item(name=text, description=text, properties={"note": text})
+    item = api.get(f"/api/items/{number}")
+    assert (item["name"], item["description"], item["properties"]) == (text, text, {"note": text})
+
+
+JSON = {"Content-Type": "application/json"}
+
+
+def test_unknown_schema_and_category(api: Api) -> None:
+    """The message says where the known ones are."""
+    api.bad(404, "POST", "/api/items", {"schema": "other", "category": "F01", "name": "x"})
+    error = api.bad(400, "POST", "/api/items", {"category": "Q99", "name": "x"})
+    assert "/api/schemas/kindred-rd" in error["message"]
+    api.bad(400, "POST", "/api/items", {"name": "neither number nor category"})
+
+
+def test_schemas(api: Api) -> None:
+    """The schema with its segments, and its form with the two-stage category picker."""
+    schema = api.get("/api/schemas/kindred-rd")
+    segments = {segment["name"]: segment for segment in schema["segments"]}
+    assert segments["category"]["values"]["F01"] == "Screws and bolts"
+    assert api.get("/api/schemas")[0]["name"] == "kindred-rd"
+    form = api.get("/api/schemas/kindred-rd/form")
+    domains = {domain["code"]: domain for domain in form["category_picker"]["domains"]}
+    assert domains["A"]["categories"][0] == {
+        "code": "A01",
+        "label": "Mechanical assembly",
+        "item_type": "assembly",
+    }
+    assert "mass_kg" in [field["name"] for field in form["field_groups"][0]["fields"]]
+    api.bad(404, "GET", "/api/schemas/nothing")

@@ -1,0 +1,270 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Decisions on what a merge left open, undo, history, compare, restore."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from silo_server.testing import Api, bom
+
+
+def decide(api: Api, parent: str, **actions: str) -> Any:
+    """Decide by part number → action."""
+    decisions = [{"child_part_number": number, "action": action} for number, action in actions.items()]
+    return api.good("POST", bom(parent, "resolve"), {"decisions": decisions})
+
+
+@pytest.fixture
+def unreferenced(api: Api) -> tuple[str, str, str]:
+    """An assembly whose two parts are not referenced any more."""
+    parent, a, b = api.items(3)
+    api.merge(parent, {a: 1, b: 2})
+    api.merge(parent, {})
+    return parent, a, b
+
+
+def test_keep_one_remove_one_and_the_next_sync_is_quiet(api: Api, unreferenced: Any) -> None:
+    """The whole story: banner → keep one as intentional, remove one → the next merge warns of nothing."""
+    parent, a, b = unreferenced
+    review = api.get(bom(parent, "review"))
+    assert [line["child_part_number"] for line in review["unreferenced"]] == [a, b]
+    decisions = [
+        {"child_part_number": a, "action": "keep", "reason": "bought separately"},
+        {"child_part_number": b, "action": "remove"},
+    ]
+    api.good("POST", bom(parent, "resolve"), {"decisions": decisions})
+    line = api.lines(parent)[a]
+    assert (line["source"], line["reason"], line["unreferenced_since"]) == (
+        "manual",
+        "bought separately",
+        None,
+    )
+    assert api.merge(parent, {})["warnings"] == []
+    assert api.quantities(parent) == {a: 1}
+    change = api.get(bom(parent, "history"))[1]
+    assert (change["kind"], change["summary"], change["reason"]) == (
+        "resolve",
+        "1 removed, 1 kept as intentional",
+        "bought separately",
+    )
+
+
+def test_undo_takes_a_decision_back(api: Api, unreferenced: Any) -> None:
+    """Undo of a bulk decision brings every line back as it was, id and flag included."""
+    parent, a, b = unreferenced
+    before = api.get(bom(parent))
+    change = decide(api, parent, **{a: "keep", b: "remove"})
+    api.good("POST", bom(parent, "undo"), {"change_id": change["change_id"]})
+    assert api.get(bom(parent)) == before
+    newest = api.get(bom(parent, "history"))[0]
+    assert (newest["kind"], newest["refers_to"]) == ("undo", change["change_id"])
+    again = api.good("POST", bom(parent, "undo"), {"change_id": newest["id"]})
+    assert list(api.lines(parent)) == [a]
+    assert again["version"] > newest["version"]
+
+
+def test_undo_is_refused_where_the_line_went_on(api: Api, unreferenced: Any) -> None:
+    """What changed again since is not overwritten: 409 names it."""
+    parent, a, _ = unreferenced
+    change = decide(api, parent, **{a: "keep"})
+    api.good("PUT", bom(parent, a), {"quantity": 9})
+    error = api.bad(409, "POST", bom(parent, "undo"), {"change_id": change["change_id"]})
+    assert a in error["message"]
+
+
+def test_a_conflict_is_settled_either_way(api: Api) -> None:
+    """CAD says 4, Silo says 6: keep either, one click; then the next merge is quiet."""
+    for action, quantity, source in (("take_cad", 4, "assembly"), ("keep_silo", 6, "manual")):
+        parent, a = api.items(2)
+        api.merge(parent, {a: 4})
+        api.good("PUT", bom(parent, a), {"quantity": 6})
+        assert len(api.merge(parent, {a: 4})["warnings"]) == 1
+        decide(api, parent, **{a: action})
+        line = api.lines(parent)[a]
+        assert (line["quantity"], line["source"], line["override"]) == (quantity, source, False)
+        assert api.get(bom(parent, "review"))["conflicts"] == []
+        assert api.merge(parent, {a: 4})["warnings"] == []
+
+
+def test_a_kept_quantity_is_asked_again_only_when_cad_says_something_else(api: Api) -> None:
+    """ "Keep Silo's" holds for the number that CAD said then."""
+    parent, a = api.items(2)
+    api.good("POST", bom(parent), {"child_part_number": a, "quantity": 6})
+    api.merge(parent, {a: 4})
+    decide(api, parent, **{a: "keep_silo"})
+    assert api.merge(parent, {a: 4})["warnings"] == []
+    assert [w["assembly_quantity"] for w in api.merge(parent, {a: 5})["warnings"]] == [5]
+
+
+def test_undoing_keep_silo_asks_again(api: Api) -> None:
+    """The decision lives beside the line; undo takes it back too."""
+    parent, a = api.items(2)
+    api.merge(parent, {a: 4})
+    api.good("PUT", bom(parent, a), {"quantity": 6})
+    api.merge(parent, {a: 4})
+    change = decide(api, parent, **{a: "keep_silo"})
+    api.good("POST", bom(parent, "undo"), {"change_id": change["change_id"]})
+    assert [c["child_part_number"] for c in api.get(bom(parent, "review"))["conflicts"]] == [a]
+    assert len(api.merge(parent, {a: 4})["warnings"]) == 1
+
+
+def test_an_override_that_cad_dropped_can_be_removed_by_taking_cad(api: Api) -> None:
+    """CAD has it no more: taking CAD's word removes the line."""
+    parent, a = api.items(2)
+    api.merge(parent, {a: 4})
+    api.good("PUT", bom(parent, a), {"quantity": 6})
+    api.merge(parent, {})
+    decide(api, parent, **{a: "take_cad"})
+    assert api.get(bom(parent)) == []
+
+
+def test_decisions_that_do_not_fit_are_told_together_and_change_nothing(api: Api, unreferenced: Any) -> None:
+    """All or nothing, all problems at once, each with its index."""
+    parent, a, b = unreferenced
+    api.merge(parent, {a: 1})
+    before = api.get(bom(parent))
+    decisions = [
+        {"child_part_number": b, "action": "remove"},
+        {"child_part_number": a, "action": "keep"},
+        {"child_part_number": "NO-SUCH", "action": "remove"},
+        {"child_part_number": a, "action": "take_cad"},
+    ]
+    error = api.bad(400, "POST", bom(parent, "resolve"), {"decisions": decisions})
+    assert [problem[:12] for problem in error["problems"]] == ["decisions[1]", "decisions[2]", "decisions[3]"]
+    assert api.get(bom(parent)) == before
+    api.bad(400, "POST", bom(parent, "resolve"), {"decisions": []})
+
+
+def test_history_tells_who_when_and_what(api: Api) -> None:
+    """Every merge and every edit is a change with its lines before and after."""
+    parent, a, b = api.items(3)
+    api.merge(parent, {a: 1, b: 1})
+    api.merge(parent, {a: 3})
+    api.good("PUT", bom(parent, b), {"notes": "spare"})
+    api.good("DELETE", bom(parent, b))
+    changes = api.get(bom(parent, "history"))
+    assert [c["kind"] for c in changes] == ["edit", "edit", "merge", "merge"]
+    assert [c["version"] for c in changes] == [4, 3, 2, 1]
+    merge = api.get(bom(parent, f"history/{changes[2]['id']}"))
+    lines = {line["child_part_number"]: line for line in merge["lines"]}
+    assert (lines[a]["before"]["quantity"], lines[a]["after"]["quantity"]) == (1, 3)
+    assert "unreferenced_since" in lines[b]["after"]
+    removed = api.get(bom(parent, f"history/{changes[0]['id']}"))["lines"][0]
+    assert (removed["before"]["notes"], removed["after"]) == ("spare", None)
+    assert api.get(bom(parent, "history") + f"?before={changes[1]['id']}&limit=1") == [changes[2]]
+
+
+def test_a_merge_without_change_is_in_the_history_too(api: Api) -> None:
+    """Who checked, when, from which file is stored; the version stays."""
+    parent, a = api.items(2)
+    api.merge(parent, {a: 1})
+    api.merge(parent, {a: 1}, document={"file": "A.FCStd", "revision": 2})
+    newest, oldest = api.get(bom(parent, "history"))
+    assert (newest["version"], newest["line_count"]) == (oldest["version"], 0)
+    assert newest["document"]["revision"] == 2
+
+
+def test_any_two_points_compare_side_by_side(api: Api) -> None:
+    """Change ids, times, and now; rows say what was added, removed, changed and how."""
+    parent, a, b, c = api.items(4)
+    api.merge(parent, {a: 1, b: 1})
+    first = api.get(bom(parent, "history"))[0]["id"]
+    api.merge(parent, {a: 2, b: 1, c: 1})
+    api.good("DELETE", bom(parent, b))
+    rows = {row["child_part_number"]: row for row in api.get(bom(parent, f"compare?from={first}"))["lines"]}
+    assert {number: row["status"] for number, row in rows.items()} == {
+        a: "changed",
+        b: "removed",
+        c: "added",
+    }
+    assert rows[a]["fields"] == ["quantity"]
+    assert (rows[a]["before"]["quantity"], rows[a]["after"]["quantity"]) == (1, 2)
+    everything = api.get(bom(parent, "compare?from=2020-01-01T00:00:00Z&to=now"))
+    assert everything["from"] == 0
+    assert {row["status"] for row in everything["lines"]} == {"added"}
+    same = api.get(bom(parent, "compare?from=now"))
+    assert {row["status"] for row in same["lines"]} == {"unchanged"}
+    for wrong in ("yesterday", "2020-01-01"):
+        api.bad(400, "GET", bom(parent, f"compare?from={wrong}"))
+    api.bad(404, "GET", bom(parent, "compare?from=999999999"))
+
+
+def test_the_history_adds_up_to_the_state(api: Api) -> None:
+    """The BOM as of the newest change is the BOM."""
+    parent, a, b, c = api.items(4)
+    api.merge(parent, {a: 1, b: 2})
+    api.good("POST", bom(parent), {"child_part_number": c, "quantity": 3, "notes": "by hand"})
+    api.merge(parent, {b: 5})
+    api.good("PUT", bom(parent, b), {"quantity": 7})
+    newest = api.get(bom(parent, "history"))[0]["id"]
+    past = {line["child_part_number"]: line for line in api.get(bom(parent, f"history/{newest}/bom"))}
+    for number, line in api.lines(parent).items():
+        for key in ("id", "quantity", "source", "rel_type"):
+            assert past[number][key] == line[key]
+        for key in ("notes", "unreferenced_since", "cad_quantity"):
+            assert past[number].get(key) == line[key]
+
+
+def test_restore_writes_a_new_change(api: Api) -> None:
+    """An earlier state comes back with its line ids; nothing of the history is lost."""
+    parent, a, b = api.items(3)
+    api.merge(parent, {a: 1, b: 2})
+    wanted = api.get(bom(parent))
+    first = api.get(bom(parent, "history"))[0]["id"]
+    api.merge(parent, {a: 5})
+    api.good("DELETE", bom(parent, b))
+    api.good("POST", bom(parent, "restore"), {"change_id": first, "reason": "wrong file"})
+    assert api.get(bom(parent)) == wanted
+    changes = api.get(bom(parent, "history"))
+    assert (changes[0]["kind"], changes[0]["refers_to"], changes[0]["reason"]) == (
+        "restore",
+        first,
+        "wrong file",
+    )
+    assert len(changes) == 4
+    api.good("POST", bom(parent, "restore"), {"change_id": 0})
+    assert api.get(bom(parent)) == []
+    api.bad(404, "POST", bom(parent, "restore"), {"change_id": 10**9})
+
+
+def test_restore_cannot_make_a_ring(api: Api) -> None:
+    """What was fine then may be a cycle now: 409."""
+    a, b = api.items(2)
+    api.merge(a, {b: 1})
+    old = api.get(bom(a, "history"))[0]["id"]
+    api.good("DELETE", bom(a, b))
+    api.merge(b, {a: 1})
+    assert api.bad(409, "POST", bom(a, "restore"), {"change_id": old})["error"] == "cycle"
+
+
+def test_edits_respect_if_match(api: Api) -> None:
+    """Two people with the same page open: the second gets 412."""
+    parent, a, b = api.items(3)
+    api.merge(parent, {a: 1})
+    page = {"If-Match": api.call("GET", bom(parent)).headers["etag"]}
+    assert api.call("PUT", bom(parent, a), {"notes": "first"}, headers=page).status == 200
+    api.bad(412, "PUT", bom(parent, a), {"notes": "second"}, headers=page)
+    api.bad(412, "DELETE", bom(parent, a), headers=page)
+    api.bad(412, "POST", bom(parent), {"child_part_number": b}, headers=page)
+    api.bad(412, "POST", bom(parent, "undo"), {"change_id": 1}, headers={"If-Match": '"nonsense"'})
+
+
+def test_lines_by_hand(api: Api) -> None:
+    """Add, change, clear, remove; a child stands in a BOM once."""
+    parent, a = api.items(2)
+    line = api.good("POST", bom(parent), {"child_part_number": a})
+    assert (line["quantity"], line["source"], line["rel_type"]) == (1, "manual", "component")
+    api.bad(409, "POST", bom(parent), {"child_part_number": a})
+    api.bad(404, "POST", bom(parent), {"child_part_number": "NO-SUCH"})
+    changed = api.good("PUT", bom(parent, a), {"notes": "n", "reference_designators": ["R1"], "unit": "m"})
+    assert (changed["notes"], changed["reference_designators"], changed["unit"]) == ("n", ["R1"], "m")
+    cleared = api.good("PUT", bom(parent, a), {"notes": None})
+    assert (cleared["notes"], cleared["unit"]) == (None, "m")
+    api.bad(400, "PUT", bom(parent, a), {"quantity": None})
+    api.bad(400, "PUT", bom(parent, a), {"rel_type": "friend"})
+    api.bad(400, "PUT", bom(parent, a), {"source": "dream"})
+    assert api.call("DELETE", bom(parent, a)).status == 204
+    api.bad(404, "DELETE", bom(parent, a))
+    api.bad(404, "PUT", bom(parent, a), {"notes": "x"})
