@@ -150,11 +150,12 @@ def test_file_names_of_all_kinds(tmp_path: Path) -> None:
 
 def test_joined_as_text_like_freecad(tmp_path: Path) -> None:
     """``..`` takes a name away before symlinks are followed, as FreeCAD does (observed, 0.20)."""
-    part("right").save(tmp_path / "project" / "parts" / "p.FCStd")
-    part("wrong").save(tmp_path / "elsewhere" / "parts" / "p.FCStd")
+    part(uuid="right").save(tmp_path / "project" / "parts" / "p.FCStd")
+    part(uuid="wrong").save(tmp_path / "elsewhere" / "parts" / "p.FCStd")
     (tmp_path / "elsewhere" / "asm").mkdir()
     (tmp_path / "project" / "asm").symlink_to("../elsewhere/asm")
-    assert target(tmp_path / "project" / "asm", "../parts/p.FCStd").Document.Label == "right"
+    found = target(tmp_path / "project" / "asm", "../parts/p.FCStd")
+    assert found.Document.Meta == {"SiloUUID": "right"}
 
 
 def test_found_from_where_the_owner_really_lies(tmp_path: Path) -> None:

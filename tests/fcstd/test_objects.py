@@ -109,6 +109,13 @@ def test_what_has_no_plain_value_is_absent(tmp_path: Path, xml: str) -> None:
     assert own(obj, "P", "default") == "default"
 
 
+@pytest.mark.parametrize("name", ["Group", "LinkedObject", "ElementCount", "ElementList", "ScaleVector"])
+def test_freecads_own_properties_have_their_kind(tmp_path: Path, name: str) -> None:
+    """A text where a link should be is no link; FreeCAD does not restore it either."""
+    assert not hasattr(read(tmp_path, **{name: "text"}), name)
+    assert read(tmp_path, Label=7).Label == "F"
+
+
 def test_an_object_has_freecads_attributes(tmp_path: Path) -> None:
     """Name, label, type, document, properties."""
     obj = read(tmp_path, Zeta=1, Alpha=2, Label="a label")
@@ -129,7 +136,7 @@ def test_without_a_label_the_name_is_the_label(tmp_path: Path) -> None:
     path = tmp_path / "x.FCStd"
     path.write_bytes(container({"Document.xml": xml.encode()}))
     document = open_document(path)
-    assert (document.Label, document.Objects[0].Label) == ("x", "Box")
+    assert document.Objects[0].Label == "Box"
 
 
 def test_nothing_is_forwarded_to_a_links_target(tmp_path: Path) -> None:
@@ -147,7 +154,7 @@ def test_a_document_has_freecads_attributes(tmp_path: Path) -> None:
     document = open_document(doc.save(tmp_path / "2 nd ü.FCStd"))
     assert isinstance(document, DocumentLike)
     assert document.FileName == os.path.realpath(tmp_path / "2 nd ü.FCStd")
-    assert (document.Label, document.Name) == ("the label", "_2_nd__")
+    assert (document.Label, document.Name) == ("2 nd ü", "_2_nd__")
     assert document.Meta == {"SiloUUID": "u-1"}
     assert document.SiloUUID == document.getPropertyByName("SiloUUID") == "u-2"
     assert document.Uid == "3a4cb85d-6224-4a3f-bde2-ab5c5ce51855"

@@ -39,7 +39,7 @@ def dump(document: FcstdDocument) -> dict[str, Any]:
     """All that a document says."""
     return {
         "properties": {
-            name: document.getPropertyByName(name) for name in document.PropertiesList if name != "Material"
+            name: document.getPropertyByName(name) for name in document.PropertiesList if name != "Label"
         },
         "meta": dict(document.Meta),
         "objects": {
@@ -273,10 +273,10 @@ def test_an_unknown_encoding_is_refused(tmp_path: Path) -> None:
 
 def test_wrong_utf8_is_refused(tmp_path: Path) -> None:
     """Bytes that are no UTF-8 where a text is asked for."""
-    raw = part("Ä").xml().encode().replace("Ä".encode(), b"\xff")
-    document = open_document(save_xml(tmp_path / "bad.FCStd", raw))
+    raw = part(Note="Ä").xml().encode().replace("Ä".encode(), b"\xff")
+    box = open_document(save_xml(tmp_path / "bad.FCStd", raw)).getObject("Box")
     with pytest.raises(DocumentError, match=r"UTF-8|well-formed"):
-        _ = document.Label
+        _ = box and box.Note
 
 
 def test_too_many_objects_are_refused(tmp_path: Path) -> None:

@@ -34,7 +34,7 @@ _DOUBLES, _FLOATS = Struct("<3d"), Struct("<3f")
 class FcstdDocument:
     """One FCStd file. ``FileName`` is absolute and without symlinks.
 
-    Document properties (``Label``, ``Uid``, ``Meta``, ``Comment``, own ones of FreeCAD >= 0.21) are
+    Document properties (``Uid``, ``Meta``, ``Comment``, own ones of FreeCAD >= 0.21) are
     attributes.
     """
 
@@ -52,10 +52,14 @@ class FcstdDocument:
         self.values: dict[bytes, Any] = {}
 
     @cached_property
+    def Label(self) -> str:
+        """The file's name without its ending; FreeCAD ignores the saved label (``Document::Restore``)."""
+        return os.path.splitext(os.path.basename(self.FileName))[0]
+
+    @cached_property
     def Name(self) -> str:
         """The internal name that FreeCAD would give: the file's, in ASCII letters, digits and ``_``."""
-        stem = os.path.splitext(os.path.basename(self.FileName))[0]
-        name = re.sub(r"[^A-Za-z0-9_]", "_", stem)
+        name = re.sub(r"[^A-Za-z0-9_]", "_", self.Label)
         return f"_{name}" if name[:1].isdigit() else name or "Unnamed"
 
     @cached_property
@@ -92,7 +96,7 @@ class FcstdDocument:
 
     def getPropertyByName(self, name: str) -> Any:
         """A document property. AttributeError where there is none, or none with a plain value."""
-        value = self._value(name)
+        value = self.Label if name == "Label" else self._value(name)
         if value is ABSENT:
             raise AttributeError(f"the document {self.FileName} has no readable property {name!r}")
         return value
@@ -100,13 +104,7 @@ class FcstdDocument:
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
             raise AttributeError(name)
-        try:
-            value = self.getPropertyByName(name)
-        except AttributeError:
-            if name != "Label":
-                raise
-            value = os.path.splitext(os.path.basename(self.FileName))[0]
-        self.__dict__[name] = value
+        value = self.__dict__[name] = self.getPropertyByName(name)
         return value
 
     def __repr__(self) -> str:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from silo.bom.document import LinkProblem as Problem
 from silo.fcstd.properties import Properties
 from silo.fcstd.typetree import ancestors
-from silo.fcstd.values import ABSENT, LocalList, Ref, RefList, SideEntry, Style
+from silo.fcstd.values import ABSENT, LocalList, Ref, RefList, SideEntry, Style, Vector
 
 if TYPE_CHECKING:
     from silo.fcstd.document import FcstdDocument
@@ -21,6 +21,18 @@ if TYPE_CHECKING:
 # Equal properties of a document are written in equal bytes (1000 links have one ElementCount), so values are
 # remembered by their bytes; long ones seldom repeat.
 _REMEMBER_AT_MOST = 1024
+
+# FreeCAD's own properties have one kind; of another kind (a damaged file) FreeCAD ignores them too.
+_KINDS: dict[str, type] = {
+    "ElementCount": int,
+    "ElementList": LocalList,
+    "Group": LocalList,
+    "LinkCopyOnChangeSource": Ref,
+    "LinkedObject": Ref,
+    "ScaleList": SideEntry,
+    "ScaleVector": Vector,
+    "VisibilityList": tuple,
+}
 
 
 class FcstdObject:
@@ -53,6 +65,12 @@ class FcstdObject:
         return self.properties.names
 
     @property
+    def Label(self) -> str:
+        """What people call the object; its ``Name`` where the file has no label."""
+        label = self.properties.value("Label")
+        return label if isinstance(label, str) else self.Name
+
+    @property
     def LinkProblem(self) -> Problem | None:
         """Why ``LinkedObject`` is None; None where it is not, or where there is no such property."""
         ref = self.properties.value("LinkedObject")
@@ -60,7 +78,7 @@ class FcstdObject:
 
     def getPropertyByName(self, name: str) -> Any:
         """The value of a property. AttributeError where there is none, or none that is plain."""
-        if name not in self.properties.numbers:
+        if name not in self.properties.numbers:  # a plain attribute, such as Name, is no property
             raise AttributeError(f"{self.TypeId} {self.Name} has no property {name!r}")
         return getattr(self, name)
 
@@ -73,14 +91,10 @@ class FcstdObject:
                 return mine[name]
             properties = self.properties
         piece = properties.piece(name)
-        if piece is not None:
-            value = self._value(name, piece)
-        elif name == "Label":
-            value = self.Name
-        else:
+        if piece is None:
             raise AttributeError(name)
         # The file does not change while it is open, so the next access need not come here.
-        mine[name] = value
+        value = mine[name] = self._value(name, piece)
         return value
 
     def _load(self) -> None:
@@ -101,9 +115,10 @@ class FcstdObject:
         known = self.Document.values
         if (value := known.get(piece, ABSENT)) is not ABSENT:
             return value
-        value = self._resolved(self.properties.value(name))
-        if value is ABSENT:
+        raw = self.properties.value(name)
+        if raw is ABSENT or not isinstance(raw, _KINDS.get(name, object)):
             raise AttributeError(f"{name}: {self.TypeId} {self.Name} has no such property with a plain value")
+        value = self._resolved(raw)
         if len(piece) <= _REMEMBER_AT_MOST:
             known[piece] = value
         return value

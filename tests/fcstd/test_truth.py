@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Real assemblies of public projects: instance counts equal those that FreeCAD itself gave."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections import Counter
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from silo.bom.findings import FindingCode
+from silo.bom.links import extract
+from silo.bom.model import BomEntry
+from silo.bom.roots import choose_assembly
+from silo.fcstd import Library
+
+DATA = Path(__file__).resolve().parents[3] / "shared" / "data" / "assemblies"
+TRUTHS = sorted(DATA.glob("*/truth/*.json"))
+
+
+def test_the_data_is_there() -> None:
+    """Without the data nothing below runs; that must be seen."""
+    if not TRUTHS:
+        pytest.skip(f"no assemblies with ground truth in {DATA}")
+    assert len(TRUTHS) == 7
+
+
+def instances(entries: Iterable[BomEntry], times: int = 1) -> Counter[tuple[str, str]]:
+    """Instances per (file, object) over all levels, sub-assemblies included."""
+    found: Counter[tuple[str, str]] = Counter()
+    for entry in entries:
+        found[entry.key] += times * entry.quantity
+        found += instances(entry.children, times * entry.quantity)
+    return found
+
+
+def expected(truth: dict[str, Any], folder: Path) -> Counter[tuple[str, str]]:
+    """The counts that are reached through links to other documents; broken ones are findings."""
+    found: Counter[tuple[str, str]] = Counter()
+    for root in truth["roots"]:
+        for item in root["instance_counts"]:
+            if item["external"] and not item.get("broken"):
+                found[os.path.realpath(folder / item["file"]), item["object"]] += item["external"]
+    return found
+
+
+@pytest.mark.parametrize("path", TRUTHS, ids=[path.stem for path in TRUTHS])
+def test_counts_equal_the_ground_truth(path: Path) -> None:
+    """Every component of every level, as often as in FreeCAD; what is missing is reported, not counted."""
+    truth, folder = json.loads(path.read_text()), path.parent.parent
+    with Library() as library:
+        found = extract(choose_assembly(library.open(folder / truth["top"])))
+    assert instances(found.entries) == expected(truth, folder)
+    missing = [f.message for f in found.findings if f.code is FindingCode.MISSING_FILE]
+    assert len(missing) == len(truth["missing_files"])
+    for file in truth["missing_files"]:
+        assert any(os.path.basename(file) in message for message in missing)
+
+
+@pytest.mark.parametrize("path", TRUTHS, ids=[path.stem for path in TRUTHS])
+def test_links_have_the_targets_that_freecad_gave_them(path: Path) -> None:
+    """Link by link: target file, target object, type and label."""
+    truth, folder = json.loads(path.read_text()), path.parent.parent
+    with Library() as library:
+        for record in truth["links"]:
+            link = library.open(folder / record["doc"]).getObject(record["name"])
+            assert link is not None
+            assert (link.TypeId, link.Label) == (record["type"], record["label"])
+            target = link.LinkedObject
+            if record.get("target_type") is None:
+                assert target is None
+                continue
+            target = target[0] if isinstance(target, tuple) else target
+            where = os.path.relpath(target.Document.FileName, os.path.realpath(folder))
+            assert where.replace(os.sep, "/") == record["target_file"]
+            assert (target.Name, target.Label) == (record["target_name"], record["target_label"])
+            assert target.TypeId == record["target_type"]
+
+
+@pytest.mark.parametrize("path", TRUTHS, ids=[path.stem for path in TRUTHS])
+def test_documents_say_what_freecad_said(path: Path) -> None:
+    """Label, writer and number of objects of every document that was loaded in full."""
+    truth, folder = json.loads(path.read_text()), path.parent.parent
+    with Library() as library:
+        for record in truth["documents"]:
+            document = library.open(folder / record["file"])
+            assert document.Label == record["label"]
+            assert document.ProgramVersion == record["written_by"]
+            if not record["partial"]:
+                assert len(document.Objects) == record["objects"]
+            assert not document._xml.is_careful
