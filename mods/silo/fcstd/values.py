@@ -27,8 +27,12 @@ class _Absent:
 # An unreadable or unsupported value is absent, never a guess.
 ABSENT: Final = _Absent()
 
-# A static enumeration keeps its names in FreeCAD, not in the file (src/App/Link.cpp).
-_ENUMERATIONS = {"LinkCopyOnChange": ("Disabled", "Enabled", "Owned", "Tracking")}
+# A static enumeration keeps its names in FreeCAD, not in the file (src/App/Link.cpp); of those that are not
+# known here, the value is the number.
+_ENUMERATIONS = {
+    "LinkCopyOnChange": ("Disabled", "Enabled", "Owned", "Tracking"),
+    "LinkMode": ("None", "Auto Delete", "Auto Link", "Auto Unlink"),
+}
 
 _INTEGER = re.compile(r"\s*([+-]?\d{1,18})\s*\Z")
 
