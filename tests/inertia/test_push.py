@@ -87,7 +87,7 @@ def test_push_keeps_other_properties_and_runs_once(report: Any) -> None:
 
 def test_identities_of_the_document_give_numbers(report: Any) -> None:
     """Where neither BOM nor geometry file has a number."""
-    plan = plan_push(report, {"nameless": "F01-0009"})
+    plan = plan_push(report, {"nameless": "F01-0009", "other": "X"})
     assert "F01-0009" in {item.part_number for item in plan.items}
 
 

@@ -52,7 +52,6 @@ def fill_links(
         report.links[name] = link
         report.link_properties[name] = props.to_inertial()
         _part_warnings(report, parts)
-        _link_warnings(report, link)
     report.unclaimed = tuple(_parts(assembly, placed, claims.unclaimed, ""))
     _part_warnings(report, report.unclaimed)
     report.total = sum_up(placed, range(len(assembly.instances)))
@@ -111,6 +110,7 @@ def _part(assembly: Assembly, placed: Placed, members: Sequence[int], link: str)
         quantum=decision.quantum_kg,
         part_number=decision.part_number or product.part_number or "",
         lines=decision.lines,
+        products=tuple(p.key for p in products),
         warnings=tuple(PartWarning(link, product.name, note.message, note.code) for note in notes),
     )
 
@@ -121,19 +121,16 @@ def _part_warnings(report: InertiaReport, parts: Iterable[PartResult]) -> None:
             report.add_warning(warning.link_name, warning.part_name, warning.message, warning.code)
 
 
-def _link_warnings(report: InertiaReport, link: LinkResult) -> None:
-    if TensorProblem.ZERO_MASS in link.problems:
-        report.add_warning(
-            link.name,
-            "",
-            "the link has no mass; physics engines refuse a moving link without one",
-            MassCode.ZERO_MASS_LINK,
-        )
-        return
-    for problem in link.problems:
-        report.add_warning(
-            link.name, "", f"the link's inertia tensor {_TENSOR_WORDS[problem]}", MassCode.BAD_TENSOR
-        )
+def tell_tensors(report: InertiaReport) -> None:
+    """Links that a simulator would refuse, or take in silence and get wrong."""
+    for link in report.links.values():
+        if TensorProblem.ZERO_MASS in link.problems:
+            words = "the link has no mass; physics engines refuse a moving link without one"
+            report.add_warning(link.name, "", words, MassCode.ZERO_MASS_LINK)
+            continue
+        for problem in link.problems:
+            words = f"the link's inertia tensor {_TENSOR_WORDS[problem]}"
+            report.add_warning(link.name, "", words, MassCode.BAD_TENSOR)
 
 
 def tensor_words(problems: Iterable[TensorProblem]) -> str:

@@ -8,14 +8,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from silo.inertia.aggregate import fill_links, tell_bom, tell_claims, tell_rows
+from silo.inertia.aggregate import fill_links, tell_bom, tell_claims, tell_rows, tell_tensors
 from silo.inertia.bom import BOMEntry, BOMParser, BomTable, as_table
 from silo.inertia.core import Floats
 from silo.inertia.frames import FrameChoice, LinkFrame
 from silo.inertia.links import Claims, LinkMap, claim, read_link_map
 from silo.inertia.masses import place_all
 from silo.inertia.massrule import MassRule, Options
-from silo.inertia.matching import Matching, match
+from silo.inertia.matching import match
 from silo.inertia.materials import MaterialHit, MaterialTable, load_materials
 from silo.inertia.model import Assembly, Prototype
 from silo.inertia.products import leaf_products, sub_assemblies
@@ -36,6 +36,8 @@ class Task:
         link → (4, 4) placement in the assembly's frame, where ``frame`` is URDF.
     loose_link
         a link that takes what no other claims; None: such parts are listed as unclaimed.
+    simulated
+        the links go to a simulator: warn of those that it would refuse.
     """
 
     materials: MaterialTable = field(default_factory=load_materials)
@@ -44,6 +46,7 @@ class Task:
     frame: FrameChoice = FrameChoice.ASSEMBLY
     urdf_frames: Mapping[str, Floats] | None = None
     loose_link: str | None = None
+    simulated: bool = True
 
 
 def calculate(assembly: Assembly, table: BomTable | None, task: Task | None = None) -> InertiaReport:
@@ -75,13 +78,11 @@ def _run(
     for problem in assembly.problems:
         report.add_warning("", "", problem.message, problem.code)
     fill_links(report, assembly, placed, claims, task.frame)
-    _tell_rest(report, assembly, matching, claims)
-    return report
-
-
-def _tell_rest(report: InertiaReport, assembly: Assembly, matching: Matching, claims: Claims) -> None:
+    if task.simulated:
+        tell_tensors(report)
     tell_claims(report, assembly, claims)
     tell_rows(report, assembly, matching)
+    return report
 
 
 def _gathered(claims: Claims, loose: str | None) -> Claims:

@@ -78,7 +78,7 @@ def plan_push(
     """What a report says of each item. Pure.
 
     part_numbers
-        part name → number, where neither BOM nor geometry file has it (a FreeCAD document's identities).
+        prototype key → number, where neither BOM nor geometry file has it (a FreeCAD document's identities).
     top
         part number of the whole assembly; its mass and centre are pushed as well, where no part is a gap.
     """
@@ -89,11 +89,12 @@ def plan_push(
     for _, part in report.parts():
         gap = _gap(part)
         gaps += gap is not None
-        part_number = part.part_number or known.get(part.name, "")
-        if gap is not None or not part_number:
+        numbers = [part.part_number] if part.part_number else [known[k] for k in part.products if k in known]
+        if gap is not None or not numbers:
             skipped[Skipped(part.name, gap or "it has no part number")] = None
             continue
-        by_number[part_number].append(part)
+        for part_number in dict.fromkeys(numbers):
+            by_number[part_number].append(part)
     items: list[PushItem] = []
     for part_number, parts in by_number.items():
         values = {tuple(_properties(part).items()) for part in parts}

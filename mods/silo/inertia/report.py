@@ -48,6 +48,8 @@ class PartResult:
         by the BOM, else by the geometry file; "" where neither has one.
     lines
         BOM lines it came from.
+    products
+        keys of the prototypes it stands for: one, or several that are alike.
     """
 
     name: str
@@ -65,6 +67,7 @@ class PartResult:
     quantum: float = 0.0
     part_number: str = ""
     lines: tuple[int, ...] = ()
+    products: tuple[str, ...] = ()
     warnings: tuple[PartWarning, ...] = ()
 
     @property

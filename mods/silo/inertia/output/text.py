@@ -50,15 +50,12 @@ def material_of(part: PartResult) -> str:
 
 def report_tables(report: InertiaReport) -> RenderableType:
     """Links, parts and warnings for a terminal."""
-    pieces: list[RenderableType] = [_links_table(report), Text(), _parts_table(report), Text()]
-    pieces.append(_warnings_text(report.warnings))
-    return Group(*pieces)
+    warnings = _warnings_text(report.warnings, with_links=not _is_one_body(report))
+    return Group(_links_table(report), Text(), _parts_table(report), Text(), warnings)
 
 
 def _links_table(report: InertiaReport) -> Table:
-    table = Table(
-        title=_plain(f"{report.assembly or 'assembly'}: mass properties per link"), title_justify="left"
-    )
+    table = Table(title=_plain(f"{report.assembly or 'assembly'}: mass properties"), title_justify="left")
     for heading, justify in (("Link", "left"), ("Mass kg", "right"), ("Centre of mass m", "right")):
         table.add_column(heading, justify=justify)  # type: ignore[arg-type]
     table.add_column("Ixx Iyy Izz / Ixy Ixz Iyz  kg m²", justify="right")
@@ -66,7 +63,7 @@ def _links_table(report: InertiaReport) -> Table:
     table.add_column("Warnings", justify="right")
     for link in report.links.values():
         table.add_row(*(_plain(cell) for cell in _link_cells(report, link)))
-    if report.total is not None:
+    if report.total is not None and not _is_one_body(report):
         table.add_section()
         loose = sum(part.total_mass for part in report.unclaimed)
         table.add_row(
@@ -100,47 +97,53 @@ def _tensor(link: LinkResult) -> tuple[str, str]:
 
 def _parts_table(report: InertiaReport) -> RenderableType:
     table = Table(title="Parts and where their masses come from", title_justify="left")
-    table.add_column("Link")
-    table.add_column("Part")
-    table.add_column("Qty", justify="right")
-    table.add_column("Mass kg", justify="right")
-    table.add_column("Source")
-    table.add_column("Matched")
-    table.add_column("Material")
+    with_links = not _is_one_body(report)
+    for heading in ("Link", "Part") if with_links else ("Part",):
+        table.add_column(heading)
+    for heading in ("Qty", "Volume cm³", "Mass kg"):
+        table.add_column(heading, justify="right")
+    for heading in ("Source", "Matched", "Material"):
+        table.add_column(heading)
     rows = report.parts()
     for link, part in rows[:MAX_PART_ROWS]:
-        cells = (
-            link or "(no link)",
+        cells = [
             part.name,
             str(part.quantity),
+            f"{part.volume * 1e6:.5g}",
             _short(part.mass),
             _SOURCE_WORDS[part.source],
             how(part),
             material_of(part),
-        )
-        table.add_row(*(_plain(cell) for cell in cells), style="yellow" if part.warnings else "")
+        ]
+        shown = [link or "(no link)", *cells] if with_links else cells
+        table.add_row(*(_plain(cell) for cell in shown), style="yellow" if part.warnings else "")
     if len(rows) > MAX_PART_ROWS:
         table.caption = f"… and {len(rows) - MAX_PART_ROWS} more; --report parts.csv has them all"
     return table
 
 
-def _warnings_text(warnings: Sequence[PartWarning]) -> Text:
+def _is_one_body(report: InertiaReport) -> bool:
+    return len(report.links) == 1 and not report.unclaimed
+
+
+def _warnings_text(warnings: Sequence[PartWarning], *, with_links: bool) -> Text:
     if not warnings:
         return Text("No warnings.", style="green")
     text = Text(f"{len(warnings)} {'warning' if len(warnings) == 1 else 'warnings'}\n", style="yellow")
-    for (message, code), where in _grouped(warnings).items():
+    for (message, code), where in _grouped(warnings, with_links=with_links).items():
         text.append(f"  {_places(where)}: " if where else "  ", style="bold")
         text.append(_clean(message))
         text.append(f"  [{code}]\n", style="dim")
     return text
 
 
-def _grouped(warnings: Iterable[PartWarning]) -> dict[tuple[str, str], list[str]]:
+def _grouped(warnings: Iterable[PartWarning], *, with_links: bool = True) -> dict[tuple[str, str], list[str]]:
     """Message and code → where; what is said of twenty parts alike is said once."""
     groups: dict[tuple[str, str], list[str]] = {}
     for warning in warnings:
         where = groups.setdefault((warning.message, str(warning.code)), [])
-        names = " / ".join(_clean(word) for word in (warning.link_name, warning.part_name) if word)
+        link = warning.link_name if with_links or not warning.part_name else ""
+        names = " / ".join(_clean(word) for word in (link, warning.part_name) if word)
         if names:
             where.append(names)
     return groups
