@@ -145,16 +145,7 @@ def apply_import(
 
 def read_csv(data: bytes, max_rows: int) -> list[tuple[int, dict[str, str]]]:
     """(row number, field → text) of each row that says anything; RejectedError where this is no BOM."""
-    text = _decode(data)
-    sample = text[:4096]
-    delimiter = max(",;\t", key=lambda d: sample.splitlines()[0].count(d) if sample.strip() else 0)
-    try:
-        table = list(csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True))
-    except csv.Error as error:
-        raise RejectedError(f"file: wanted CSV, got something that does not read as such ({error})") from None
-    start = next((n for n, row in enumerate(table) if "part_number" in _fields(row)), None)
-    if start is None or "quantity" not in _fields(table[start]):
-        raise RejectedError("file: wanted a header row with 'Part number' and 'Quantity', found none")
+    table, start, delimiter = _table(_decode(data))
     if len(table) - start > max_rows + 1:
         raise TooLargeError(f"file: this server takes at most {max_rows} rows, got {len(table) - start - 1}")
     names = _fields(table[start])
@@ -165,6 +156,23 @@ def read_csv(data: bytes, max_rows: int) -> list[tuple[int, dict[str, str]]]:
             record["decimal_comma"] = "1" if delimiter != "," else ""
             records.append((number, record))
     return records
+
+
+def _table(text: str) -> tuple[list[list[str]], int, str]:
+    """(cells, index of the header row, delimiter), by the delimiter with which there is a header."""
+    broken: csv.Error | None = None
+    for delimiter in (",", ";", "\t"):
+        try:
+            table = list(csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True))
+        except csv.Error as error:
+            broken = error
+            continue
+        for index, row in enumerate(table):
+            if {"part_number", "quantity"} <= set(_fields(row)):
+                return table, index, delimiter
+    if broken is not None:
+        raise RejectedError(f"file: wanted CSV, got something that does not read as such ({broken})")
+    raise RejectedError("file: wanted a header row with 'Part number' and 'Quantity', found none")
 
 
 def _plan_row(

@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Export to CSV, XLSX and JSON; import from CSV with validation first."""
+
+from __future__ import annotations
+
+import csv
+import io
+
+import pytest
+from openpyxl import load_workbook
+
+from silo_server.testing import Api, bom, form_body
+
+EVIL = ['=HYPERLINK("http://x")', "+1+1", "-2", "@SUM(A1)", "\t=1", "＝1"]
+
+
+def read(data: bytes) -> list[dict[str, str]]:
+    """The rows of a CSV export."""
+    return list(csv.DictReader(io.StringIO(data.decode("utf-8"), newline="")))
+
+
+@pytest.fixture
+def tree(api: Api) -> tuple[str, str, str, str]:
+    """top → 2 × sub, 3 × leaf; sub → 4 × leaf, 1 × other."""
+    top, sub, leaf, other = api.items(4)
+    api.good("PUT", f"/api/items/{leaf}", {"properties": {"mass_kg": 0.25, "material": "Steel"}})
+    api.merge(top, {sub: 2, leaf: 3})
+    api.merge(sub, {leaf: 4, other: 1})
+    return top, sub, leaf, other
+
+
+def test_csv_is_rfc_4180(api: Api, tree: tuple[str, ...]) -> None:
+    """CRLF, quotes doubled, UTF-8, a header, as an attachment."""
+    top, sub, leaf, _ = tree
+    api.good("PUT", bom(top, leaf), {"notes": 'say "hi",\nthen ÿ', "reference_designators": ["R1", "R2"]})
+    answer = api.call("GET", bom(top, "export.csv"))
+    assert answer.headers["content-type"] == "text/csv; charset=utf-8; header=present"
+    assert "attachment" in answer.headers["content-disposition"]
+    assert b'"say ""hi"",\nthen \xc3\xbf"' in answer.body
+    assert answer.body.endswith(b"\r\n")
+    rows = read(answer.body)
+    assert [(r["Item"], r["Part number"], r["Quantity"], r["Source"]) for r in rows] == [
+        ("1", sub, "2", "assembly"),
+        ("2", leaf, "3", "assembly"),
+    ]
+    assert (rows[1]["Mass"], rows[1]["Material"]) == ("0.25 kg", "Steel")
+    assert rows[1]["Reference designators"] == "R1 R2"
+
+
+def test_indented_and_flat_views(api: Api, tree: tuple[str, ...]) -> None:
+    """The whole tree with structured item numbers; the leaves with their totals."""
+    top, sub, leaf, other = tree
+    rows = read(api.call("GET", bom(top, "export.csv?view=indented")).body)
+    assert [(r["Item"], r["Level"], r["Part number"], r["Total quantity"]) for r in rows] == [
+        ("1", "1", sub, "2"),
+        ("1.1", "2", leaf, "8"),
+        ("1.2", "2", other, "2"),
+        ("2", "1", leaf, "3"),
+    ]
+    flat = read(api.call("GET", bom(top, "export.csv?view=flat")).body)
+    assert {r["Part number"]: r["Quantity"] for r in flat} == {leaf: "11", other: "2"}
+    told = api.get(bom(top, "export.json?view=flat"))
+    assert (told["view"], {line["part_number"]: line["quantity"] for line in told["lines"]}) == (
+        "flat",
+        {leaf: 11, other: 2},
+    )
+    api.bad(400, "GET", bom(top, "export.csv?view=sideways"))
+
+
+@pytest.mark.parametrize("text", EVIL)
+def test_no_cell_is_run_as_a_formula(api: Api, text: str) -> None:
+    """CSV: an apostrophe before it; XLSX: a text cell. The import takes the apostrophe off again."""
+    parent, child = api.items(2)
+    api.good("POST", bom(parent), {"child_part_number": child, "notes": text})
+    data = api.call("GET", bom(parent, "export.csv")).body
+    assert read(data)[0]["Notes"] == "'" + text
+    book = load_workbook(io.BytesIO(api.call("GET", bom(parent, "export.xlsx")).body))
+    header = [cell.value for cell in book.active[1]]
+    cell = book.active[2][header.index("Notes")]
+    assert cell.data_type == "s"
+    assert cell.value == text
+
+
+def test_xlsx_has_numbers_as_numbers(api: Api, tree: tuple[str, ...]) -> None:
+    """Quantities can be summed in a spreadsheet."""
+    book = load_workbook(io.BytesIO(api.call("GET", bom(tree[0], "export.xlsx")).body))
+    header = [cell.value for cell in book.active[1]]
+    assert [row[header.index("Quantity")].value for row in book.active.iter_rows(min_row=2)] == [2, 3]
+
+
+def test_our_own_export_imported_again_changes_nothing(api: Api, tree: tuple[str, ...]) -> None:
+    """Round trip: every row is the same."""
+    top = tree[0]
+    api.good("PUT", bom(top, tree[2]), {"notes": "=1", "find_number": "10", "unit": "m"})
+    before = api.get(bom(top))
+    data = api.call("GET", bom(top, "export.csv")).body
+    answer = api.good("POST", bom(top, "import"), body=data, headers={"Content-Type": "text/csv"})
+    assert answer["counts"] == {"add": 0, "change": 0, "same": 2, "skip": 0, "error": 0}
+    assert api.get(bom(top)) == before
+
+
+def test_import_is_validated_row_by_row_before_anything_is_written(api: Api) -> None:
+    """The preview says what each row would do; with a problem anywhere nothing is imported."""
+    parent, a, b, c = api.items(4)
+    api.merge(parent, {a: 1})
+    api.good("POST", bom(parent), {"child_part_number": b, "quantity": 2})
+    cells = ["Part number,Qty,Notes", f"{a},5,", f"{b.lower()},2,", f"{c},1,new", "NO-SUCH,1,", f"{c},2,"]
+    rows = "\r\n".join([*cells, f"{c},x,", ""])
+    preview = api.good("POST", bom(parent, "import?dry_run=true"), body=rows.encode())
+    statuses = [row["status"] for row in preview["rows"]]
+    assert statuses == ["change", "same", "add", "error", "error", "error"]
+    assert len(preview["problems"]) == 3
+    error = api.bad(400, "POST", bom(parent, "import"), body=rows.encode())
+    assert error["problems"] == preview["problems"]
+    assert [problem.split(":")[0] for problem in error["problems"]] == ["row 5", "row 6", "row 7"]
+    assert api.quantities(parent) == {a: 1, b: 2}
+    good = "\r\n".join(rows.split("\r\n")[:4])
+    body, headers = form_body({"file": ("bom.csv", good.encode())})
+    answer = api.call("POST", bom(parent, "import"), body=body, headers=headers)
+    assert answer.json()["counts"]["add"] == 1
+    lines = api.lines(parent)
+    assert (lines[a]["source"], lines[a]["override"], lines[a]["cad_quantity"]) == ("manual", True, 1)
+    assert (lines[c]["source"], lines[c]["notes"]) == ("manual", "new")
+    change = api.get(bom(parent, "history"))[0]
+    assert (change["kind"], change["document"]["file"]) == ("import", "bom.csv")
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "cp1252"])
+def test_files_of_other_spreadsheets(api: Api, encoding: str) -> None:
+    """Semicolons with decimal commas, byte-order marks, title lines, cp1252."""
+    parent, a = api.items(2)
+    text = f"Stückliste\n\nQty;Part Number;Notes;Other\n1,5;{a};für später;x\n;;;\n"
+    api.good("POST", bom(parent, "import"), body=text.encode(encoding))
+    line = api.lines(parent)[a]
+    assert (line["quantity"], line["notes"]) == (1.5, "für später")
+
+
+@pytest.mark.parametrize(
+    "data", [b"", b"\x00\xff\x00", b"a,b\r\n1,2", b'Part number,Quantity\r\n"broken', b"\xff\xfe\x00"]
+)
+def test_what_is_no_bom_is_refused(api: Api, data: bytes) -> None:
+    """400, whatever it is."""
+    parent = api.item()
+    api.bad(400, "POST", bom(parent, "import"), body=data)
+
+
+def test_an_import_cannot_make_a_ring(api: Api) -> None:
+    """409 with the path, nothing imported."""
+    top, sub = api.items(2)
+    api.merge(top, {sub: 1})
+    body = f"Part number,Quantity\r\n{top},1\r\n".encode()
+    assert api.bad(409, "POST", bom(sub, "import"), body=body)["path"] == [sub, top, sub]
