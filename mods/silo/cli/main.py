@@ -24,6 +24,8 @@ _COMMANDS = (
     "register",
     "serve",
     "watch",
+    "inertia",
+    "mass",
     "demo",
 )
 
