@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import json
+import os
+import re
 import shutil
 import subprocess
 import uuid
@@ -22,6 +24,7 @@ from silo_server.run import running_server
 
 pytestmark = pytest.mark.freecad
 
+HEADLESS_PAGE = REPOSITORY / "docs" / "headless.md"
 HEADLESS = REPOSITORY / "mods" / "silo" / "workbench" / "headless.py"
 
 
@@ -186,6 +189,28 @@ def test_freecadcmd_alone_syncs_and_reports(vault: Vault, version: str, tmp_path
     (vault.folder / "zzz.FCStd").unlink()
     again = headless(freecad, vault, args, tmp_path, dependencies=True)
     assert again.returncode == 0, again.stdout
+
+
+@pytest.mark.parametrize("version", WANTED)
+def test_the_line_in_the_docs_works_as_it_stands(vault: Vault, version: str, tmp_path: Path) -> None:
+    """Copied from docs/headless.md into a shell: it syncs the folder and writes both reports."""
+    freecad = machines.need(version)
+    line = re.search(r"```sh\n(SILO_ARGS=.*?)```", HEADLESS_PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    assert line is not None
+    env = {
+        **os.environ,
+        **vault.env,
+        **freecad.profile(tmp_path / "profile", dependencies=True),
+        "SILO_MOD": str(REPOSITORY),
+        "PATH": f"{Path(freecad.command).parent}:{os.environ['PATH']}",
+    }
+    done = subprocess.run(
+        ["sh", "-c", line[1]], cwd=tmp_path, env=env, capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert vault.lines("sub") == {"bolt": 2, "plate": 1}
+    assert "4 of 4 files in order" in (tmp_path / "sync.md").read_text()
+    assert len(json.loads((tmp_path / "sync.json").read_text())["results"]) == 4
 
 
 @pytest.mark.parametrize("version", WANTED)
