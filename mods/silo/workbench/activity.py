@@ -75,6 +75,8 @@ class Entry:
         but only if it knows at least as much: our own sync (1) is not replaced by the server's event (0).
     also
         the key of another entry that this one includes, such as the upload of the file.
+    icon
+        name of one of the add-on's icons.
     badges
         the counts, each with its tone: ``+1 added``, ``~1 qty changed``, ``⚠1 unreferenced``.
     """
@@ -89,6 +91,7 @@ class Entry:
     actions: tuple[Action, ...] = ()
     rank: int = 0
     also: str = ""
+    icon: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "title", plain(self.title))

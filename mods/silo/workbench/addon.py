@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from silo.workbench import host, qt
 from silo.workbench.activity import Action, Do
 from silo.workbench.pane import ActivityDock
-from silo.workbench.prefs import PreferencePage
+from silo.workbench.prefs import page_class
 from silo.workbench.session import Session, Shown, Told
 from silo.workbench.settings import GROUP, Preferences, read_known
 from silo.workbench.tokens import Keyring
@@ -17,6 +17,9 @@ from silo.workbench.words import plain, translate
 
 if TYPE_CHECKING:
     from silo.workbench.commit_flow import CommitFlow
+    from silo.workbench.hooks import CommitHook
+    from silo.workbench.preview_flow import PreviewFlow
+    from silo.workbench.register_flow import RegisterFlow
     from silo.workbench.sending import Sent
 
 # FreeCAD's window comes first; a server is not talked to before it stands.
@@ -36,6 +39,9 @@ class AddOn:
         self.relay = qt.Relay(self._bug)
         self._session: Session | None = None
         self._commits: CommitFlow | None = None
+        self._previews: PreviewFlow | None = None
+        self._registrations: RegisterFlow | None = None
+        self._hook: CommitHook | None = None
         self._drawn: Shown | None = None
         self._timer: Any = None
 
@@ -51,6 +57,7 @@ class AddOn:
         self._timer.timeout.connect(self.session.tick)
         self._timer.start(TICK_MS)
         qt.QtCore.QCoreApplication.instance().aboutToQuit.connect(self.session.close)
+        self._find_foreign_commit()
 
     @property
     def session(self) -> Session:
@@ -73,6 +80,30 @@ class AddOn:
             self._commits = CommitFlow(self.session, self.preferences)
         return self._commits
 
+    @property
+    def previews(self) -> PreviewFlow:
+        """The previews; made when first needed."""
+        if self._previews is None:
+            from silo.workbench.preview_flow import PreviewFlow
+
+            self._previews = PreviewFlow(
+                self.session,
+                self.commits,
+                register=self.register_path,
+                show=self.show_objects,
+                view=self.open_page,
+            )
+        return self._previews
+
+    @property
+    def registrations(self) -> RegisterFlow:
+        """The registering dialogs; made when first needed."""
+        if self._registrations is None:
+            from silo.workbench.register_flow import RegisterFlow
+
+            self._registrations = RegisterFlow(self.session, self.preferences, self.commits)
+        return self._registrations
+
     def settings_changed(self) -> None:
         """The preference page was saved."""
         host.save_parameters()
@@ -93,6 +124,14 @@ class AddOn:
 
     def _sent(self, sent: Sent) -> None:
         """A commit of this FreeCAD arrived."""
+        if sent.commit is None:
+            return
+        path = sent.commit.snapshot.path
+        if self._previews is not None:
+            self._previews.again(path)
+        left = len(sent.resolved.unresolved) if sent.resolved is not None else 0
+        if left and self.preferences.flag("AskRegister") and self.commits.was_asked_for(sent.commit.key):
+            self.register_path(path)
 
     def _bug(self, error: BaseException) -> None:
         host.error(plain(f"[Silo] unexpected problem: {type(error).__name__}: {error}", 500))
@@ -110,10 +149,35 @@ class AddOn:
 
     def preference_page(self) -> Any:
         """The class of the preference page."""
-        return PreferencePage
+        return page_class(self.preferences, lambda: self.session, self.settings_changed)
 
     def hook_commit(self, name: str) -> None:
         """Sync the BOM after this command, which is not ours."""
+        if self._hook is None:
+            from silo.workbench.commit_flow import has_identity
+            from silo.workbench.hooks import CommitHook
+
+            self._hook = CommitHook(
+                host,
+                ended=lambda doc: self.commits.sync_only(doc),
+                has_identity=has_identity,
+                later=qt.later,
+            )
+            host.main_window().workbenchActivated.connect(self._hook.connect)
+        self._hook.watch(name)
+
+    def _find_foreign_commit(self) -> None:
+        """Add-ons that were loaded after this one may have brought a commit of their own."""
+        from silo.workbench.commands import COMMIT, commands
+        from silo.workbench.hooks import FOREIGN
+
+        ours = {name: command.text for name, command in commands(self).items()}
+        for name in FOREIGN:
+            told = host.command_info(name).get("menuText")
+            if told is not None and told not in (ours.get(name), ours[COMMIT]):
+                self.hook_commit(name)
+        if self._hook is not None:
+            self._hook.connect()
 
     def commit(self) -> None:
         """Commit the active document."""
@@ -125,9 +189,23 @@ class AddOn:
 
     def preview(self) -> None:
         """Compare the active assembly with the server."""
+        doc = host.active_document()
+        if doc is not None:
+            self.previews.start(doc)
 
     def register(self) -> None:
         """Give part numbers to components."""
+        doc = host.active_document()
+        if doc is not None:
+            self.registrations.start(doc)
+
+    def register_path(self, path: str) -> None:
+        """Give part numbers to the components of this document, where it is open."""
+        doc = host.find_document(path)
+        if doc is None:
+            host.warning(translate("Silo", "[Silo] This document is not open: ") + plain(path))
+        else:
+            self.registrations.start(doc)
 
     def show_activity(self) -> None:
         """Show the pane."""
@@ -154,6 +232,8 @@ class AddOn:
             self.session.discard(action.target)
         elif action.do is Do.STOP:
             self.session.cancel()
+        elif action.do in (Do.REGISTER, Do.DECIDE):
+            self.register_path(action.document)
         elif action.do is Do.SETTINGS:
             self.show_settings()
 

@@ -45,7 +45,7 @@ class Box(QtWidgets.QFrame):  # type: ignore[misc]
         layout.addLayout(self._head(entry))
         if entry.badges:
             badges = [widgets.label(badge.text, badge.tone, bold=True, wrap=False) for badge in entry.badges]
-            layout.addLayout(widgets.row(*badges, spacing=12))
+            layout.addLayout(widgets.row(*badges, gap=12))
         for line in entry.lines:
             self._line(layout, line)
         if entry.actions:
@@ -54,6 +54,9 @@ class Box(QtWidgets.QFrame):  # type: ignore[misc]
     def _head(self, entry: Entry) -> Any:
         layout = QtWidgets.QHBoxLayout()
         layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(6)
+        if entry.icon:
+            layout.addWidget(widgets.picture(entry.icon), 0, QtCore.Qt.AlignmentFlag.AlignTop)
         layout.addWidget(widgets.label(entry.title, bold=True), 1)
         when = widgets.label(
             " · ".join(filter(None, (entry.who, _clock(entry.when)))), Tone.QUIET, wrap=False

@@ -10,6 +10,7 @@ import os
 import time
 from collections import deque
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from silo.workbench import host, live, qt, snapshot, widgets
 from silo.workbench.activity import Action, Do, Entry, Line, Tone
 from silo.workbench.commit import Plan, Row, State, Taken, Taker, plan
 from silo.workbench.commit_dialog import CommitDialog, refusal
+from silo.workbench.decisions import Decisions
 from silo.workbench.session import Session
 from silo.workbench.settings import ALLOW, Preferences
 from silo.workbench.snapshot import Snapshot
@@ -48,13 +50,19 @@ class CommitFlow:
 
     def __init__(self, session: Session, preferences: Preferences) -> None:
         self._session, self._preferences = session, preferences
+        self.decisions = Decisions()
         self._taker = Taker(LiveDocuments(), take_snapshot, session.spool.hold, new_key)
         self._turns: deque[tuple[Iterator[Taken], str]] = deque()
+        self._asked_for: set[str] = set()
 
     @property
     def running(self) -> bool:
         """True while documents are being saved."""
         return bool(self._turns)
+
+    def was_asked_for(self, key: str) -> bool:
+        """True for the commit of a document that a person committed, not one below it."""
+        return key in self._asked_for
 
     def start(self, doc: Any) -> None:
         """Commit a document: ask where there is something to ask, then go on without waiting."""
@@ -91,6 +99,11 @@ class CommitFlow:
             row = Row(doc, taken.path, taken.label, State.SAVED)
             self._keep(Taken(row, taken, new_key()), "", with_file=False)
 
+    def send(self, doc: Any, comment: str) -> None:
+        """Send a document that has just been saved, as it is."""
+        path = os.path.realpath(doc.FileName)
+        self.run((Row(doc, path, str(doc.Label), State.SAVED),), comment)
+
     def _turn(self) -> None:
         if not self._turns:
             return
@@ -118,9 +131,11 @@ class CommitFlow:
     def _keep(self, taken: Taken, comment: str, *, with_file: bool = True) -> None:
         if taken.snapshot is None:
             return
+        if taken.row.is_top and with_file:
+            self._asked_for.add(taken.key)
         commit = Commit(
             key=taken.key,
-            snapshot=taken.snapshot,
+            snapshot=self.decided(taken.snapshot),
             taken_at=time.time(),
             comment=comment,
             file=(taken.held or Path(taken.row.path)) if with_file else None,
@@ -129,6 +144,12 @@ class CommitFlow:
         )
         label = taken.row.label
         self._session.keep(commit, failed=lambda error: self._tell_error(label, str(error)))
+
+    def decided(self, taken: Snapshot) -> Snapshot:
+        """The snapshot without what a person has decided already (files that are one part)."""
+        if taken.extraction is None:
+            return taken
+        return replace(taken, extraction=self.decisions.without_accepted(taken.extraction))
 
     def _tell_error(self, label: str, text: str) -> None:
         self._session.add(
@@ -139,6 +160,7 @@ class CommitFlow:
                 tone=Tone.ERROR,
                 lines=(Line(text, Tone.ERROR),),
                 rank=1,
+                icon="silo-commit",
             )
         )
 
@@ -148,6 +170,14 @@ class CommitFlow:
         if self._session.shown.connection == "offline":
             return translate("Silo", "There is no connection now: the files are saved, and sent later.")
         return ""
+
+
+def has_identity(doc: Any) -> bool:
+    """True for a document that belongs to Silo."""
+    try:
+        return bool(take_snapshot(doc).identity)
+    except SiloError:
+        return False
 
 
 def not_in_silo(taken: Snapshot) -> Entry:
@@ -162,4 +192,5 @@ def not_in_silo(taken: Snapshot) -> Entry:
         lines=(Line(translate("Silo", "It has no Silo part number yet, so it was not sent."), Tone.WARNING),),
         actions=(register,),
         rank=1,
+        icon="silo-commit",
     )

@@ -13,11 +13,12 @@ from silo.api.wire import MergeDiff, MergeEvent, MergeWarning
 from silo.bom.errors import SiloError
 from silo.bom.findings import Finding, FindingCode, Severity
 from silo.bom.model import BomEntry
+from silo.bom.naming import display_name
 from silo.bom.report import shorten
 from silo.bom_sync import Resolved, Status
 from silo.workbench.activity import Action, Do, Entry, Line, Tone
 from silo.workbench.sending import Sent
-from silo.workbench.words import counted, plain, translate
+from silo.workbench.words import counted, plain, quantity, translate
 
 # Makes an absolute address of a page such as `resolve_url`; raises SiloError for another server's.
 Page = Callable[[str], str]
@@ -38,6 +39,7 @@ def of_sent(sent: Sent, page: Page, now: float | None = None) -> Entry:
         lines=lines,
         actions=_view(url, page),
         rank=1,
+        icon="silo-bom" if sent.status in (Status.MERGED, Status.BLOCKED) else "silo-commit",
     )
 
 
@@ -180,22 +182,12 @@ def unregistered_lines(resolved: Resolved) -> tuple[Line, ...]:
     one = translate("Silo", "{n} component has no Silo part number")
     many = translate("Silo", "{n} components have no Silo part number")
     register = Action(Do.REGISTER, translate("Silo", "Register Parts…"), document=resolved.assembly.doc_path)
-    names = ", ".join(plain(entry_name(entry), 40) for entry in resolved.unresolved[:5])
+    names = ", ".join(plain(display_name(entry), 40) for entry in resolved.unresolved[:5])
     more = ", …" if count > 5 else ""
     return (
         Line(counted(count, one, many), Tone.WARNING, (register,)),
         Line(f"{names}{more}", Tone.QUIET),
     )
-
-
-def entry_name(entry: BomEntry) -> str:
-    """How a person knows a component that has no number."""
-    return entry.document_label or entry.label or os.path.basename(entry.doc_path) or entry.object_name
-
-
-def quantity(value: float | None) -> str:
-    """A quantity for people."""
-    return "?" if value is None else f"{value:g}"
 
 
 def console_lines(sent: Sent) -> tuple[str, ...]:
@@ -224,6 +216,7 @@ def of_event(event: ServerEvent, page: Page, now: float | None = None) -> Entry 
         who=_text(data, "user", "created_by"),
         lines=tuple(Line(text) for text in (_text(data, "comment", "description", "name"),) if text),
         actions=_view(f"/items/{number}", page),
+        icon="silo-commit" if event.type == "revision.created" else "silo-register",
     )
 
 
@@ -238,6 +231,7 @@ def of_merge(merge: MergeEvent, page: Page, when: float, event_id: str | None = 
         who=merge.user,
         badges=told,
         actions=_view(merge.resolve_url or f"/items/{merge.item}/bom", page),
+        icon="silo-bom",
     )
 
 

@@ -15,6 +15,7 @@ from typing import Any
 import FreeCAD
 
 from silo.bom.errors import DocumentError
+from silo.bom.identity import meta_key
 
 # --- FreeCAD itself --------------------------------------------------------------------------------------
 
@@ -90,13 +91,14 @@ def active_document() -> Any:
     return FreeCAD.ActiveDocument
 
 
+def documents_by_path() -> dict[str, Any]:
+    """The open documents by the real paths of their files; one file may have been opened by several paths."""
+    return {os.path.realpath(doc.FileName): doc for doc in documents() if doc.FileName}
+
+
 def find_document(path: str) -> Any:
-    """The open document of a file, or None; one file may have been opened by several paths."""
-    wanted = os.path.realpath(path)
-    for doc in documents():
-        if doc.FileName and os.path.realpath(doc.FileName) == wanted:
-            return doc
-    return None
+    """The open document of a file, or None."""
+    return documents_by_path().get(os.path.realpath(path))
 
 
 def is_partial(doc: Any) -> bool:
@@ -213,6 +215,36 @@ def is_writable(path: str) -> bool:
         return os.access(folder, os.W_OK)
     marked = not os.stat(path).st_mode & 0o222
     return os.access(path, os.W_OK) and os.access(folder, os.W_OK) and not marked
+
+
+def write_identity(doc: Any, name: str, identity: str, *, whole_document: bool) -> None:
+    """Write a Silo identity in every place that survives in all versions; the caller saves.
+
+    name
+        ``Name`` of the component's object; "" for the document itself.
+    whole_document
+        the document is this one component, so it carries the identity as well. Otherwise the identity is the
+        object's only (:mod:`silo.bom.identity` says where it is looked for).
+    """
+    obj = doc.getObject(name) if name else None
+    if name and obj is None:
+        raise DocumentError(doc.FileName, f"it has no object {name} any more")
+    if obj is not None:
+        _set_text(obj, "SiloItemId", identity)
+        if "SiloUUID" in obj.PropertiesList:
+            obj.SiloUUID = identity
+    # Meta gives a copy: only assigning a whole dictionary changes it.
+    doc.Meta = {**doc.Meta, meta_key("" if whole_document else name): identity}
+    if whole_document and hasattr(doc, "addProperty"):
+        _set_text(doc, "SiloUUID", identity)
+
+
+def _set_text(owner: Any, name: str, value: str) -> None:
+    if name not in owner.PropertiesList:
+        owner.addProperty("App::PropertyString", name, "Silo", "Identity of the item in Silo")
+    setattr(owner, name, value)
+    if hasattr(owner, "setEditorMode"):
+        owner.setEditorMode(name, ["ReadOnly"])
 
 
 def add_document_observer(observer: Any) -> None:

@@ -58,14 +58,14 @@ class Online:
 
     def connect(self, known: Known, store: TokenStore, *, live: bool) -> Server:
         """Use the server that the settings name; begin to listen to it where ``live``."""
-        self._use(choose_server(known, store, file_server=_file_server()))
+        self._use(choose_server(known, store, file_server=file_server()))
         self._listen(live=live)
         return self._server
 
     def need_client(self, known: Known, store: TokenStore) -> None:
         """Have a client; :class:`ConfigError` where no server is configured."""
         if self._client is None:
-            self._use(choose_server(known, store, file_server=_file_server()))
+            self._use(choose_server(known, store, file_server=file_server()))
         _ = self.client
 
     def retry_now(self) -> None:
@@ -126,7 +126,8 @@ class Online:
         self._sent(sent, entries.console_lines(sent))
 
 
-def _file_server() -> object | None:
+def file_server() -> object | None:
+    """The server in the configuration file of the command line; None where there is none."""
     # The environment is looked at before; here it is only asked where the file is.
     env = {name: value for name, value in os.environ.items() if not name.startswith("SILO_")}
     try:

@@ -19,6 +19,9 @@ NAME = "Database Activity"
 # More boxes than this are made only when somebody asks for them: widgets cost time, values do not.
 FIRST, MORE = 40, 60
 
+# Pixels.
+NARROW, WIDTH = 260, 320
+
 
 class ActivityDock(QtWidgets.QDockWidget):  # type: ignore[misc]  # PySide has no types
     """The dock. FreeCAD restores place and visibility by its object name, so that must never change.
@@ -55,6 +58,9 @@ class ActivityDock(QtWidgets.QDockWidget):  # type: ignore[misc]  # PySide has n
             # Made when it is first seen: FreeCAD's start is not the place for it.
             self._pane = Pane(self._on_action)
             self.setWidget(self._pane)
+            if self.width() < NARROW:
+                # Never placed by the user so far: wide enough to read, narrow enough to work beside.
+                self.parent().resizeDocks([self], [WIDTH], QtCore.Qt.Orientation.Horizontal)
         if self._shown is not None:
             self._pane.draw(self._shown)
 

@@ -8,6 +8,7 @@ disk at once even while the network hangs: one for the disk, one for the server.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -84,6 +85,8 @@ class Session:
         bug = self._told.bug
         self._disk = Worker("silo-disk", deliver, on_bug=bug)
         self._net = Worker("silo-network", deliver, on_busy=self._busy, on_bug=bug)
+        # What a person waits for on the preference page must not queue behind a long upload.
+        self._aside = Worker("silo-aside", deliver, on_bug=bug)
         self._online: Online | None = None
         self._live = False
 
@@ -238,14 +241,48 @@ class Session:
 
         self._net.submit(Job(title, run, done=done, failed=failed))
 
+    def aside(
+        self,
+        title: str,
+        work: Callable[[Control], Any],
+        done: Callable[[Any], None],
+        failed: Callable[[SiloError], None],
+    ) -> None:
+        """Work for a worker that needs no server of the session (settings, keyring)."""
+        self._aside.submit(Job(title, work, done=done, failed=failed))
+
+    def in_gui(self, call: Callable[[], Any], control: Control) -> Any:
+        """For a job: run ``call`` in the GUI thread and wait for what it gives or raises."""
+        finished = threading.Event()
+        result: list[Any] = []
+        problem: list[BaseException] = []
+
+        def run() -> None:
+            try:
+                result.append(call())
+            except BaseException as error:
+                problem.append(error)
+                if not isinstance(error, SiloError):
+                    raise
+            finally:
+                finished.set()
+
+        self._deliver(run)
+        while not finished.wait(0.2):
+            # Whoever closes FreeCAD, or presses Stop, must not wait for the GUI thread to have time.
+            control.check()
+        if problem:
+            raise problem[0]
+        return result[0]
+
     def cancel(self) -> None:
         """Stop what the network worker is doing."""
         self._net.cancel()
 
     def close(self) -> None:
         """FreeCAD ends. What is not sent waits on disk for the next time."""
-        self._disk.close()
-        self._net.close(0.5)
+        for worker in (self._aside, self._disk, self._net):
+            worker.close(0.5)
         if self._online is not None:
             self._online.close()
 

@@ -4,10 +4,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from silo.workbench.activity import Tone
+from silo.workbench.flow_layout import FlowLayout
 from silo.workbench.qt import QtCore, QtGui, QtWidgets
+
+ICONS = Path(__file__).parent / "resources" / "icons"
 
 # (on a light ground, on a dark ground)
 _COLOURS = {
@@ -80,16 +84,20 @@ def link_button(text: str, call: Callable[[], None], tip: str = "") -> Any:
     return made
 
 
-def row(*widgets: Any, stretch: bool = True, spacing: int = 8) -> Any:
-    """A layout of widgets side by side, pushed to the left."""
-    layout = QtWidgets.QHBoxLayout()
-    layout.setContentsMargins(0, 0, 0, 0)
-    layout.setSpacing(spacing)
+def row(*widgets: Any, gap: int = 10) -> Any:
+    """A layout of widgets side by side, in several lines where the width ends."""
+    layout = FlowLayout(gap)
     for widget in widgets:
         layout.addWidget(widget)
-    if stretch:
-        layout.addStretch(1)
     return layout
+
+
+def picture(name: str, size: int = 16) -> Any:
+    """One of the add-on's own icons as a label."""
+    made = QtWidgets.QLabel()
+    made.setPixmap(QtGui.QIcon(str(ICONS / f"{name}.svg")).pixmap(size, size))
+    made.setFixedSize(size, size)
+    return made
 
 
 def clear(layout: Any) -> None:

@@ -43,3 +43,8 @@ def plain(text: str, most: int = 200) -> str:
 def counted(count: int, one: str, many: str) -> str:
     """``one`` or ``many``, with ``{n}`` replaced by the count."""
     return (one if count == 1 else many).replace("{n}", str(count))
+
+
+def quantity(value: float | None) -> str:
+    """A quantity for people."""
+    return "?" if value is None else f"{value:g}"

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What a person decided once and is not to be asked again: files that are the same part on purpose.
+
+One small JSON file in the user's data folder. Losing it costs a repeated question, no more.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+from silo.bom.findings import Finding, FindingCode
+from silo.bom.identity import walk_entries
+from silo.bom.model import Extraction
+from silo.folders import data_folder
+
+
+class Decisions:
+    """Identities that may occur in several files: identity → the files."""
+
+    def __init__(self, path: Path | None = None) -> None:
+        self._path = path or data_folder() / "same-parts.json"
+
+    def accept(self, identity: str, files: Iterable[str]) -> None:
+        """These files are the same part, says a person."""
+        known = self._read()
+        known[identity.lower()] = sorted({*known.get(identity.lower(), ()), *files})
+        self._write(known)
+
+    def without_accepted(self, extraction: Extraction) -> Extraction:
+        """The extraction without the copied-identity findings that a person has accepted."""
+        if not any(f.code is FindingCode.COPIED_IDENTITY for f in extraction.findings):
+            return extraction
+        known = self._read()
+        identities = {
+            entry.key: (entry.silo_uuid or "").lower()
+            for entry in walk_entries((extraction.assembly, *extraction.entries))
+        }
+
+        def accepted(finding: Finding) -> bool:
+            if finding.code is not FindingCode.COPIED_IDENTITY or not finding.where:
+                return False
+            first = finding.where[0]
+            files = {place.doc_path for place in finding.where}
+            return files <= set(known.get(identities.get((first.doc_path, first.obj), ""), ()))
+
+        kept = tuple(f for f in extraction.findings if not accepted(f))
+        return replace(extraction, findings=kept)
+
+    def _read(self) -> dict[str, list[str]]:
+        try:
+            data = json.loads(self._path.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return {}
+        if not isinstance(data, dict):
+            return {}
+        return {str(k): [str(f) for f in v] for k, v in data.items() if isinstance(v, list)}
+
+    def _write(self, known: dict[str, list[str]]) -> None:
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            handle, name = tempfile.mkstemp(dir=self._path.parent, suffix=".new")
+            with os.fdopen(handle, "w", encoding="utf-8") as file:
+                json.dump(known, file, indent=1)
+            os.replace(name, self._path)
+        except OSError:
+            return
