@@ -189,9 +189,9 @@ def test_a_server_without_events_is_not_asked_again(server: Any, client: SiloCli
 def test_a_stream_that_falls_silent_is_dead(server: Any, stream: Callable[..., Any]) -> None:
     """No byte for the time of three heartbeats: the line is cut somewhere without anybody having said so."""
     server.on(EVENTS, stream(frame(1), stay=True))
-    with SiloClient(server.url, silence=0.1) as client, Watch(client) as watch:
+    with SiloClient(server.url, silence=0.5) as client, Watch(client) as watch:
         watch.event()
-        assert "silent for 0.1 s" in watch.state(Connection.OFFLINE).message
+        assert "silent for 0.5 s" in watch.state(Connection.OFFLINE).message
 
 
 def test_modes_are_told_on_connecting_and_when_they_change(

@@ -105,7 +105,7 @@ commits = st.tuples(
 actions = st.lists(st.one_of(commits, st.just("send")), min_size=1, max_size=12)
 
 
-@settings(deadline=None, max_examples=150)
+@settings(deadline=None, max_examples=100)
 @given(actions, fates)
 def test_each_commit_arrives_once_and_in_order(actions: list[Any], drawn: list[str | None]) -> None:
     """Kills at every step of sending, losses before and after the server acted, rejections in between."""

@@ -156,6 +156,12 @@ def test_the_cut_of_the_stream_does_not_matter(
     assert list(parse(raw[i : i + 1] for i in range(len(raw)))) == whole
 
 
+def test_an_empty_piece_between_cr_and_lf_ends_no_line() -> None:
+    """CR LF is one end of line, however the network cuts it."""
+    (event,) = parse([b"data: 1\r", b"", b"\ndata: 2\r\n\r", b"", b"\n"])
+    assert event.data == "1\n2"
+
+
 @given(events, st.binary(max_size=40))
 def test_garbage_after_an_event_does_no_harm_to_it(
     chosen: list[tuple[str | None, object, str | None, str]], garbage: bytes

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import closing
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import requests
 
@@ -186,3 +186,10 @@ class SiloClient(ItemCalls, BomCalls):
             for event in stream:
                 stop_if(cancelled)
                 yield event
+
+
+if TYPE_CHECKING:
+    from silo.api.protocol import SiloApi
+
+    # The type checker holds the two to their protocol.
+    _conforms: type[SiloApi] = SiloClient

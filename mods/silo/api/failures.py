@@ -159,7 +159,6 @@ TABLE = {
     u3.ConnectTimeoutError: _slow_connect,
     u3.NewConnectionError: _refused,
     u3.EmptyPoolError: _broken,
-    u3.FullPoolError: _broken,
     u3.ClosedPoolError: _broken,
     u3.LocationValueError: _address,
     u3.LocationParseError: _address,
@@ -184,8 +183,9 @@ TABLE = {
     TimeoutError: _slow_answer,
     OSError: _broken,
 }
-if hasattr(u3, "NameResolutionError"):  # urllib3 2
-    TABLE[u3.NameResolutionError] = _unknown_name
+for _name, _build in (("NameResolutionError", _unknown_name), ("FullPoolError", _broken)):
+    if hasattr(u3, _name):  # urllib3 2
+        TABLE[getattr(u3, _name)] = _build
 
 # Wrappers whose reason says more than they do.
 _WRAPPERS = (rq.ConnectionError, rq.ChunkedEncodingError, u3.MaxRetryError, u3.ProtocolError)

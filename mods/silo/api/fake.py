@@ -12,7 +12,7 @@ import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 from uuid import UUID, uuid4
 
 from silo.api.bodies import ItemBody, ItemChanges, LineBody, body
@@ -336,3 +336,10 @@ def _uuid(text: str) -> UUID | None:
         return UUID(text)
     except ValueError:
         return None
+
+
+if TYPE_CHECKING:
+    from silo.api.protocol import SiloApi
+
+    # The type checker holds the two to their protocol.
+    _conforms: type[SiloApi] = FakeSilo

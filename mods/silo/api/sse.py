@@ -112,11 +112,10 @@ class SseParser:
 
     def _normal(self, chunk: bytes) -> bytes:
         # A CR ends its line at once; a LF right after it, be it in the next piece, belongs to it.
-        if self._after_cr and chunk:
+        if not chunk:
+            return b""  # An empty piece says nothing of what follows the CR.
+        if self._after_cr:
             chunk = chunk.removeprefix(b"\n")
-            self._after_cr = False
-            if not chunk:
-                return b""
         self._after_cr = chunk.endswith(b"\r")
         return chunk.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
 

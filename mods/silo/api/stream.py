@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+import socket
 import threading
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
+from typing import Any
 
 import requests
 
@@ -86,11 +88,16 @@ class HttpEventStream:
         if not reading:
             self._response.close()
             return
-        # Closing the response here would wait for the reader; shutting the socket down wakes it. Where
-        # urllib3 cannot do that (before 2.3), the reader ends at its next byte or at the silence limit.
-        shutdown = getattr(self._response.raw, "shutdown", None)
-        if shutdown is not None:
-            try:
-                shutdown()
-            except (ValueError, RuntimeError, OSError):
-                return  # It ended by itself meanwhile.
+        # Closing the response here would wait for the reader; shutting the socket down wakes it.
+        try:
+            _shut_down(self._response)
+        except (AttributeError, ValueError, RuntimeError, OSError):
+            return  # It ended by itself meanwhile.
+
+
+def _shut_down(response: requests.Response) -> None:
+    raw: Any = response.raw
+    if hasattr(raw, "shutdown"):  # urllib3 2.3
+        raw.shutdown()
+    else:
+        raw._fp.fp.raw._sock.shutdown(socket.SHUT_RDWR)

@@ -21,6 +21,7 @@ from typing import Any, Protocol
 from urllib.parse import urljoin, urlsplit
 
 import requests
+import urllib3
 from requests.adapters import HTTPAdapter
 from requests.auth import AuthBase
 
@@ -39,6 +40,7 @@ from silo.bom.errors import (
 MAX_REDIRECTS = 5
 MAX_ERROR = 1 << 20
 _BUSY = (408, 429, 502, 503, 504)
+_CAN_UNPACK = hasattr(urllib3.HTTPResponse, "read1")
 _CHUNK = 1 << 16
 
 
@@ -224,7 +226,7 @@ class Transport:
                 url,
                 params=params,
                 data=call.body() if call.body else None,
-                headers=dict(call.headers),
+                headers=_headers(call),
                 auth=_Bearer(self._token if carry else None),
                 timeout=(self.timeouts.connect, read_timeout or self.timeouts.read),
                 allow_redirects=False,
@@ -264,6 +266,8 @@ class Transport:
                         f"{where.asked} took more than {self.timeouts.total:g} s to answer; try again later"
                     )
 
+            _check_length(response, size, where)
+
     def _rest(self, seconds: float, cancelled: Cancel | None) -> None:
         if cancelled is None:
             self._retries.sleep(seconds)
@@ -275,10 +279,24 @@ class Transport:
 def read_some(response: requests.Response) -> bytes:
     """What has arrived, decoded; waits for the first byte only; empty at the end."""
     # `iter_content` would wait until a chunk is full, and a server that drips could hold us for ever.
-    raw = response.raw
+    raw: Any = response.raw
     if hasattr(raw, "read1"):
         return bytes(raw.read1(_CHUNK, decode_content=True) or b"")
-    return bytes(raw.read(_CHUNK, decode_content=True))
+    # urllib3 1 (Debian 12, so FreeCAD 0.20 there) only has it one level deeper, without decoding.
+    return bytes(raw._fp.read1(_CHUNK) or b"")
+
+
+def _headers(call: Call) -> dict[str, str]:
+    packing = "gzip, deflate" if _CAN_UNPACK else "identity"
+    return {"Accept-Encoding": packing, "User-Agent": "silo-mod", **call.headers}
+
+
+def _check_length(response: requests.Response, size: int, where: Where) -> None:
+    # urllib3 1 takes an early end for the end.
+    told = response.headers.get("Content-Length", "")
+    packed = "Content-Encoding" in response.headers or response.request.method == "HEAD"
+    if told.isdigit() and not packed and size < int(told):
+        raise UnreachableError(f"{where.asked} closed the connection after {size} of {told} bytes; try again")
 
 
 def stop_if(cancelled: Cancel | None) -> None:
