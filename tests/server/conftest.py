@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Databases for the tests that start their own servers, or none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from silo_server.bootstrap import prepare
+from silo_server.db.engine import Database
+from silo_server.settings import Settings
+from silo_server.testing import Databases
+
+KINDS = ["sqlite", pytest.param("postgres", marks=pytest.mark.postgres)]
+
+
+@pytest.fixture(scope="session")
+def databases(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Databases]:
+    """Empty databases of both kinds."""
+    made = Databases(tmp_path_factory.mktemp("databases"))
+    yield made
+    made.close()
+
+
+@pytest.fixture(params=KINDS)
+def url(request: pytest.FixtureRequest, databases: Databases) -> str:
+    """An empty database, once of each kind."""
+    return databases.new(str(request.param))
+
+
+@pytest.fixture
+def db(url: str, tmp_path: Path) -> Iterator[Database]:
+    """A database at the newest schema, with a first admin."""
+    made = Database(Settings(database_url=url, files_dir=tmp_path))
+    prepare(made, "silo_test")
+    yield made
+    made.close()
