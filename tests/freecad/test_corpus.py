@@ -11,7 +11,9 @@ from freecad_cases.corpora import Corpus
 from freecad_cases.machines import WANTED
 from freecad_cases.truth import CONTROL, TRUTH
 
+from silo.bom.errors import SiloError
 from silo.bom.links import extract
+from silo.bom.model import Extraction
 from silo.bom.roots import choose_assembly
 from silo.fcstd import Library
 
@@ -26,9 +28,12 @@ def unpacked(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Corpus]:
     return {version: corpora.unpack(archive, folder / version) for version, archive in ARCHIVES.items()}
 
 
-def read(top: Path) -> object:
-    with Library() as library:
-        return extract(choose_assembly(library.open(top)))
+def read(top: Path) -> Extraction | SiloError:
+    try:
+        with Library() as library:
+            return extract(choose_assembly(library.open(top)))
+    except SiloError as error:
+        return error
 
 
 @pytest.mark.parametrize(("version", "key"), KEYS, ids=[f"{version}-{key}" for version, key in KEYS])

@@ -10,6 +10,7 @@ from typing import Any
 
 from freecad_cases.truth import Truth
 
+from silo.bom.errors import SiloError
 from silo.bom.findings import Finding, Place
 from silo.bom.identity import walk_entries
 from silo.bom.model import BomEntry, Extraction
@@ -76,8 +77,12 @@ def _shortened(value: Any, prefix: str) -> Any:
     return value
 
 
-def differences(found: Extraction, truth: Truth, base: Path) -> list[str]:
-    """How an extraction differs from the truth; nothing where it is right."""
+def differences(found: Extraction | SiloError, truth: Truth, base: Path) -> list[str]:
+    """How an extraction, or the lack of one, differs from the truth; nothing where it is right."""
+    if isinstance(found, SiloError):
+        return [] if truth.error and truth.error in str(found) else [f"error: {found}"]
+    if truth.error:
+        return [f"expected the error {truth.error!r}"]
     folder = os.path.realpath(base)
     pairs = {
         "BOM": (bom_of(found.entries, folder), dict(truth.bom)),

@@ -36,6 +36,8 @@ class Truth:
         what live FreeCAD answers where it knows, by its nature, other things than the file tells.
     live_0_20
         the same for FreeCAD 0.20 only.
+    error
+        there is no BOM, and this stands in the message.
     """
 
     bom: Mapping[str, Any]
@@ -45,6 +47,7 @@ class Truth:
     top: str = "top.FCStd"
     live: Truth | None = None
     live_0_20: Truth | None = None
+    error: str = ""
 
     def for_live(self, version: tuple[int, ...]) -> Truth:
         """What a FreeCAD of this version must answer."""
@@ -150,6 +153,15 @@ TRUTH: dict[str, Truth] = {
     "empty_assembly": _is({}, empty_bom=("top.FCStd#Top",)),
     "link_python": _is({BOLT: 1}),
     "deep_mix": _is({BOLT: 7}, consolidated=(BOLT,)),
+    "self_reference": _is({BOLT: 1}, in_document_link=("top.FCStd#Self",)),
+    "link_to_assembly_link": _is({SUB: (1, SUB_CONTENT)}, consolidated=(BOLT,)),
+    "link_to_array_element": _is({BOLT: 1}),
+    "link_into_sub_assembly": _is({BOLT: 1}),
+    "link_beside_the_assembly": _is({BOLT: 1}, beside_assembly=("top.FCStd#Loose",)),
+    "link_to_a_sheet": _is({BOLT: 1}, no_component=("top.FCStd#SheetLink",)),
+    "a2plus_part": _is({BOLT: 1}, foreign_component=("top.FCStd#Imported",)),
+    "assembly3_container": _is({BOLT: 2}, consolidated=(BOLT,)),
+    "two_models_in_one_file": Truth({}, error="holds 2 assemblies: Top (Top), Second (Second)"),
     # --- files ------------------------------------------------------------------------------------------
     "missing_file": _is({BOLT: 1}, missing_file=("top.FCStd#Lost1", "top.FCStd#Lost2")),
     "missing_file_below": _is({SUB: (1, {BOLT: 2})}, consolidated=(BOLT,), missing_file=("sub.FCStd#Plate",)),
