@@ -75,13 +75,18 @@ def same_document(a: object, b: object) -> bool:
 def object_name(obj: object) -> str:
     """The object's ``Name``; for an object that has none, something that tells it from any other."""
     name = getattr(obj, "Name", None)
-    return name if isinstance(name, str) and name else f"object-{id(obj):x}"
+    if isinstance(name, str) and (name or getattr(obj, "is_document_root", False)):
+        return name
+    return f"object-{id(obj):x}"
 
 
 def label_of(obj: object) -> str:
-    """The object's ``Label``, for people only."""
-    label = getattr(obj, "Label", None)
-    return label if isinstance(label, str) and label else object_name(obj)
+    """The object's ``Label``, for people only; its ``Name`` where it has none."""
+    for name in ("Label", "Name"):
+        text = getattr(obj, name, None)
+        if isinstance(text, str) and text:
+            return text
+    return "an unnamed object"
 
 
 def document_property(doc: object, name: str) -> Any:
@@ -98,6 +103,9 @@ def document_property(doc: object, name: str) -> Any:
 @dataclass(frozen=True, slots=True)
 class LinkProblem:
     """Why a link has no target. ``file`` and ``obj`` as the link records them ("" where unknown).
+
+    A relative ``file`` is relative to the folder of the document that holds the link, as FreeCAD writes it;
+    an empty one is that document itself.
 
     A reader that knows more than ``LinkedObject is None`` puts this on its link objects as ``LinkProblem``
     (:mod:`silo.fcstd` does); for live objects the walker is given a function that finds it out.

@@ -36,6 +36,7 @@ class FindingCode(StrEnum):
     UNSET_LINK = "unset_link"
     IN_DOCUMENT_LINK = "in_document_link"
     SUB_ELEMENT_LINK = "sub_element_link"
+    NO_COMPONENT = "no_component"
     SUPPRESSED = "suppressed"
     EXCLUDED = "excluded"
     MIRRORED = "mirrored"
@@ -44,6 +45,7 @@ class FindingCode(StrEnum):
     LOCAL_GEOMETRY = "local_geometry"
     FOREIGN_COMPONENT = "foreign_component"
     NO_CONTAINER = "no_container"
+    BESIDE_ASSEMBLY = "beside_assembly"
     STALE_ASSEMBLY_LINK = "stale_assembly_link"
     LOST_ASSEMBLY = "lost_assembly"
     EMPTY_BOM = "empty_bom"
@@ -76,6 +78,9 @@ class Finding:
     severity: Severity
     message: str
     where: tuple[Place, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "where", tuple(self.where))
 
     @property
     def blocks(self) -> bool:

@@ -65,7 +65,7 @@ def walk_entries(entries: Iterable[BomEntry]) -> Iterator[BomEntry]:
 def identity_findings(entries: Iterable[BomEntry]) -> tuple[Finding, ...]:
     """One UUID in two files ("copied identity"), or on two parts of one file ("shared identity")."""
     users: dict[str, dict[tuple[str, str], BomEntry]] = {}
-    for entry in walk_entries(entries):
+    for entry in sorted(walk_entries(entries), key=lambda entry: entry.key):
         if entry.silo_uuid:
             users.setdefault(entry.silo_uuid.lower(), {})[entry.key] = entry
     findings = []

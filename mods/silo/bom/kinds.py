@@ -7,12 +7,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from enum import Enum, auto
-from typing import Any
+from typing import Any, TypeVar
 
-from silo.bom.document import derived, own
+from silo.bom.document import derived, object_name, own
 from silo.bom.targets import is_assembly_link, is_link
+
+T = TypeVar("T", bound=Hashable)
 
 
 class Kind(Enum):
@@ -29,9 +31,37 @@ class Kind(Enum):
     NOTHING = auto()  # joints, sheets, sketches, datums, variables
 
 
-_NO_FOLDERS = ("Assembly::JointGroup", "Assembly::BomGroup", "Assembly::ViewGroup", "Assembly::SnapshotGroup")
+COMPONENTS = frozenset({Kind.LINK, Kind.ASSEMBLY_LINK})
+INLINE = frozenset({Kind.LINK_GROUP, Kind.CONTAINER, Kind.FOLDER})
+
+_NO_FOLDERS = (
+    "Assembly::JointGroup",
+    "Assembly::BomGroup",
+    "Assembly::ViewGroup",
+    "Assembly::SnapshotGroup",
+    "Assembly::SimulationGroup",
+)
 _NO_GEOMETRY = ("Part::Part2DObject", "Part::Datum", "PartDesign::SubShapeBinder", "App::DatumElement")
 _GEOMETRY = ("Part::Feature", "Mesh::Feature", "Points::Feature")
+# What a link may point at without meaning a component, in words for people. (A binder has a shape.)
+_NO_COMPONENTS = {
+    "Spreadsheet::Sheet": "a spreadsheet",
+    "App::VarSet": "a set of variables",
+    "Part::Part2DObject": "a sketch",
+    "Part::Datum": "a datum",
+    "App::DatumElement": "a datum",
+    "App::LocalCoordinateSystem": "a coordinate system",
+    "App::OriginFeature": "a datum",
+    "App::Origin": "an origin",
+    "App::MaterialObject": "a material",
+    "App::TextDocument": "a text",
+    "App::Annotation": "a note",
+    "App::AnnotationLabel": "a note",
+    "App::ImagePlane": "a picture",
+    "Image::ImagePlane": "a picture",
+    "TechDraw::DrawPage": "a drawing",
+    **dict.fromkeys(_NO_FOLDERS, "a group of joints or views"),
+}
 
 
 def has_own(obj: object, *names: str) -> bool:
@@ -72,6 +102,13 @@ def is_assembly3(obj: object) -> bool:
     return derived(obj, "Part::FeaturePython") and has_own(obj, "BuildShape", "Freeze", "Group")
 
 
+def no_component(obj: object) -> str:
+    """What a link's target is instead of a component ("a spreadsheet"); "" where it may well be one."""
+    if derived(obj, "App::FeaturePython") and (has_own(obj, "JointType") or has_own(obj, "ObjectToGround")):
+        return "a joint"
+    return next((words for name, words in _NO_COMPONENTS.items() if derived(obj, name)), "")
+
+
 def members(container: object) -> Iterable[Any]:
     """The objects that lie in a container, in document order."""
     if derived(container, "App::LinkGroup"):
@@ -80,6 +117,31 @@ def members(container: object) -> Iterable[Any]:
     if is_assembly3(container):
         return (getattr(group[-1], "Group", None) or ()) if group else ()
     return group
+
+
+def flattened(container: object, key: Callable[[Any], T]) -> Iterator[tuple[T, Any, Kind]]:
+    """Everything that lies in a container at any depth within its own file, each object once, with its key.
+
+    Inline parts, groups and folders come before what they hold. Links are not followed. ``key`` tells objects
+    apart.
+    """
+    seen: set[T] = set()
+    open_containers = [iter(members(container))]
+    while open_containers:
+        obj = next(open_containers[-1], None)
+        if obj is None:
+            open_containers.pop()
+            continue
+        if (name := key(obj)) in seen:
+            continue
+        seen.add(name)
+        kind = kind_of(obj)
+        # FreeCAD keeps the changed copies of copy-on-change links in a hidden group of this name.
+        if kind is Kind.LINK_GROUP and object_name(obj).startswith("CopyOnChangeGroup"):
+            continue
+        yield name, obj, kind
+        if kind in INLINE:
+            open_containers.append(iter(members(obj)))
 
 
 def is_container(obj: object) -> bool:

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The walker's notebook: what was seen, in plain words, each thing once however often it is met."""
+"""The walker's notebook: what was seen, in plain words, each thing once however often it is met.
+
+A finding reads the same whatever the order in which its objects were met: places and names are sorted.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,18 +19,15 @@ _Slot = tuple[FindingCode, str]
 _BROKEN_TEXT = {
     FindingCode.MISSING_FILE: "The file {file} is missing",
     FindingCode.MISSING_OBJECT: "{file} no longer holds the object {obj}",
-    FindingCode.UNREADABLE_FILE: "The file {file} cannot be read ({detail})",
+    FindingCode.UNREADABLE_FILE: "The file {file} cannot be read",
     FindingCode.LFS_POINTER: "{file} is a Git LFS pointer, not the file itself; fetch it with `git lfs pull`",
     FindingCode.OUTSIDE_ROOT: "{file} lies outside the folder that may be read",
     FindingCode.UNSET_LINK: "A link was never given a target",
     FindingCode.CYCLE: "A chain of links leads back to itself",
     FindingCode.BROKEN_LINK: "A link has lost its target",
+    FindingCode.LOST_ASSEMBLY: "{file} holds the assembly {obj}, which this FreeCAD is too old to load",
 }
-
-
-def place_of(obj: Any) -> Place:
-    """Where an object is."""
-    return Place(getattr(getattr(obj, "Document", None), "FileName", "") or "", object_name(obj))
+_BY_OBJECT = (FindingCode.MISSING_OBJECT, FindingCode.LOST_ASSEMBLY)
 
 
 def _names(labels: Sequence[str], most: int = 8) -> str:
@@ -39,80 +39,93 @@ def _names(labels: Sequence[str], most: int = 8) -> str:
 class _Note:
     severity: Severity
     message: str
-    where: list[Place] = field(default_factory=list)
-    users: list[str] = field(default_factory=list)
     tail: str = ""
+    users: dict[Place, str] = field(default_factory=dict)
 
-    def text(self) -> str:
-        if not self.tail:
-            return self.message
-        return f"{self.message}; {self.tail.format(users=_names(list(dict.fromkeys(self.users))))}."
+    def finding(self, code: FindingCode) -> Finding:
+        where = sorted(self.users)
+        message = self.message
+        if self.tail:
+            names = _names(list(dict.fromkeys(self.users[place] for place in where)))
+            message = f"{message}; {self.tail.format(users=names)}."
+        return Finding(code, self.severity, message, tuple(where))
 
 
 class Notes:
-    """Collects findings while walking; the same fact from several places becomes one finding."""
+    """Collects findings while walking; the same fact from several places becomes one finding.
 
-    def __init__(self) -> None:
+    ``path_of`` gives the file of an object, the same path for one file however it was opened.
+    """
+
+    def __init__(self, path_of: Callable[[Any], str]) -> None:
+        self._path_of = path_of
+        self.reading = ""  # the file that is being read; for objects that do not tell theirs
         self._notes: dict[_Slot, _Note] = {}
 
     def findings(self) -> tuple[Finding, ...]:
         """All findings, in the order in which they were first met."""
-        return tuple(
-            Finding(code, note.severity, note.text(), tuple(dict.fromkeys(note.where)))
-            for (code, _), note in self._notes.items()
-        )
+        return tuple(note.finding(code) for (code, _), note in self._notes.items())
 
     def any_blocking(self) -> bool:
         """True where a finding keeps the BOM from being synced."""
         return any(note.severity is Severity.ERROR for note in self._notes.values())
 
+    def _place(self, obj: Any) -> Place:
+        return Place(self._path_of(obj) or self.reading, object_name(obj))
+
     def _add(
         self, code: FindingCode, about: str, severity: Severity, message: str, obj: Any, tail: str = ""
     ) -> None:
-        note = self._notes.setdefault((code, about), _Note(severity, message, tail=tail))
-        note.where.append(place_of(obj))
-        note.users.append(label_of(obj))
+        note = self._notes.setdefault((code, about), _Note(severity, message, tail))
+        note.users.setdefault(self._place(obj), label_of(obj))
 
     def broken(self, link: Any, problem: LinkProblem | None) -> None:
         """One finding per missing file or object, naming what uses it."""
         problem = problem or LinkProblem(FindingCode.BROKEN_LINK)
         code = problem.code if problem.code in _BROKEN_TEXT else FindingCode.BROKEN_LINK
-        by_object = code is FindingCode.MISSING_OBJECT
-        about = f"{problem.file}#{problem.obj}" if by_object or not problem.file else problem.file
-        text = _BROKEN_TEXT[code].format(
-            file=problem.file or "a linked file",
-            obj=problem.obj or "that it is asked for",
-            detail=problem.detail or "unknown reason",
-        )
-        unset = code is FindingCode.UNSET_LINK
-        if not problem.file and not by_object:
-            about = str(place_of(link))
-        self._add(
-            code,
-            about,
-            Severity.WARNING if unset else Severity.ERROR,
-            text,
-            link,
-            "not counted: {users}" if unset else "used by {users}",
-        )
+        text = _BROKEN_TEXT[code]
+        if code is FindingCode.BROKEN_LINK and problem.file:
+            text = "{file} was not loaded"
+        text = text.format(file=problem.file or "the file", obj=problem.obj or "that it is asked for")
+        if problem.detail:
+            text += f" ({problem.detail})"
+        about = problem.file or str(self._place(link))
+        if code in _BY_OBJECT:
+            about = f"{about}#{problem.obj}"
+        if code is FindingCode.UNSET_LINK:
+            self._add(code, about, Severity.WARNING, text, link, "not counted: {users}")
+        else:
+            self._add(code, about, Severity.ERROR, text, link, "used by {users}")
 
     def cycle(self, link: Any, ring: Sequence[tuple[str, str]]) -> None:
-        path = " → ".join(f"{file}#{obj}" for file, obj in ring)
+        """``ring``: the assemblies from the one that is reached again to the one that reaches it."""
+        start = ring.index(min(ring))
+        path = " → ".join(str(Place(*key)) for key in (*ring[start:], *ring[:start], ring[start]))
         self._add(
             FindingCode.CYCLE,
-            str(sorted(set(ring))),
+            path,
             Severity.ERROR,
             f"An assembly contains itself: {path}",
             link,
             "the ring is closed by {users}",
         )
 
+    def loop(self, obj: Any) -> None:
+        self._add(
+            FindingCode.CYCLE,
+            self._path_of(obj),
+            Severity.ERROR,
+            f"{self._path_of(obj) or label_of(obj)} holds a group of links that contains itself",
+            obj,
+            "the ring is closed by {users}",
+        )
+
     def too_deep(self, obj: Any, levels: int) -> None:
         self._add(
             FindingCode.TOO_DEEP,
-            "",
+            str(levels),
             Severity.ERROR,
-            f"The assembly is nested more than {levels} levels deep; nothing below was read",
+            f"The assembly is nested more than {levels} levels deep; what lies below was not read",
             obj,
             "cut at {users}",
         )
@@ -170,6 +183,14 @@ class Notes:
             f"is a reference to {element} of a part, not a component",
         )
 
+    def no_component(self, link: Any, target: Any, words: str) -> None:
+        self._each(
+            FindingCode.NO_COMPONENT,
+            link,
+            Severity.INFO,
+            f"links to {label_of(target)}, {words}: no component, not counted",
+        )
+
     def in_document(self, link: Any, target: Any, *, holds_components: bool) -> None:
         if holds_components:
             text = (
@@ -192,17 +213,17 @@ class Notes:
         )
 
     def _each(self, code: FindingCode, obj: Any, severity: Severity, text: str) -> None:
-        self._add(code, str(place_of(obj)), severity, f"{label_of(obj)} {text}.", obj)
+        self._add(code, str(self._place(obj)), severity, f"{label_of(obj)} {text}.", obj)
 
     def local_geometry(self, container: Any, objects: Sequence[Any]) -> None:
         """One finding per assembly: what is modelled in its own file is no component."""
         if not objects:
             return
-        labels = [label_of(obj) for obj in objects]
+        labels = sorted(label_of(obj) for obj in objects)
         what = "object is" if len(labels) == 1 else "objects are"
         self._add(
             FindingCode.LOCAL_GEOMETRY,
-            str(place_of(container)),
+            str(self._place(container)),
             Severity.INFO,
             f"{len(labels)} {what} modelled in {label_of(container)} itself and not counted: "
             f"{_names(labels)}.",
@@ -224,5 +245,17 @@ class Notes:
         self._notes[FindingCode.EMPTY_BOM, ""] = _Note(
             Severity.WARNING,
             f"{head.label} holds no components that are linked from other files, so its BOM is empty.",
-            [Place(head.doc_path, head.object_name)],
+            users={Place(head.doc_path, head.object_name): head.label},
         )
+
+    def beside(self, links: Sequence[Any]) -> None:
+        """Links to other files that lie in the top document, but not in the assembly."""
+        for link in links:
+            self._add(
+                FindingCode.BESIDE_ASSEMBLY,
+                "",
+                Severity.WARNING,
+                "Components of other files lie in the document itself, beside the assembly",
+                link,
+                "not counted: {users}",
+            )

@@ -7,21 +7,19 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 from silo.bom.document import LinkProblem, derived, object_name, own, same_document
 from silo.bom.findings import FindingCode
+from silo.bom.paths import is_element_name, located, split_sub_name
 
 Inspect = Callable[[Any], "LinkProblem | None"]
 
-# FreeCAD's names of geometry in a sub-name; ";" and "?" begin mapped and missing element names.
-_ELEMENT = re.compile(r"(?:Face|Edge|Vertex|Wire|Shell|Solid|CompSolid|Compound)\d+$|[;?].*")
-
-# A longer chain of links is a loop or an attack.
+# A longer chain of links, or links inside the sub-names of links, is a loop or an attack.
 _MAX_HOPS = 256
+_MAX_NESTING = 16
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,16 +27,42 @@ class Target:
     """The end of a link. ``obj`` is None where ``problem`` says why.
 
     count
-        instances: every array on the way multiplies.
+        instances: every array on the way multiplies, an element of an array is one.
     element
         the sub-element ("Face1") where the link is a reference to geometry, not a component.
+    excluded
+        the target, or a link on the way to it, is marked by SiloBomExclude.
     """
 
     obj: Any
     count: int = 1
     mirrored: bool = False
     variant: bool = False
+    excluded: bool = False
     element: str = ""
+    problem: LinkProblem | None = None
+
+
+@dataclass(slots=True)
+class _Trail:
+    """What is left of one look-up, shared by the look-ups inside it."""
+
+    inspect: Inspect | None
+    hops: int = _MAX_HOPS
+    nesting: int = _MAX_NESTING
+
+
+class _EndlessError(Exception):
+    """The chain never ends; told as a finding, never raised to a caller."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Hop:
+    """Where one link leads. ``index`` is given where it means one element of the array ``obj``."""
+
+    obj: Any
+    element: str = ""
+    index: int | None = None
     problem: LinkProblem | None = None
 
 
@@ -64,6 +88,16 @@ def is_array(link: object) -> bool:
     return isinstance(count, int) and count > 0
 
 
+def first_of(linked: Any) -> Any:
+    """The object of a ``LinkedObject``, which is a tuple (object, sub-name) where there is a sub-name."""
+    return linked[0] if isinstance(linked, tuple) else linked
+
+
+def is_excluded(obj: object) -> bool:
+    """True where the object itself is marked as no part of any BOM."""
+    return own(obj, "SiloBomExclude") is True
+
+
 def _components(vector: Any) -> tuple[float, float, float] | None:
     try:
         if hasattr(vector, "x"):
@@ -79,62 +113,75 @@ def _negative(vector: Any) -> bool:
     return parts is not None and parts[0] * parts[1] * parts[2] < 0
 
 
-def is_mirrored(link: object) -> bool:
-    """True for a negative scale: an odd number of negative axes makes the other hand of a part."""
-    scales: Iterable[Any] = own(link, "ScaleList") or ()
-    if any(_negative(vector) for vector in scales):
+def is_mirrored(link: object, index: int | None = None) -> bool:
+    """True for a negative scale: an odd number of negative axes makes the other hand of a part.
+
+    index
+        of one element of an array; else any mirrored element tells.
+    """
+    scales = tuple(own(link, "ScaleList") or ())
+    if any(_negative(vector) for vector in (scales if index is None else scales[index : index + 1])):
         return True
-    vector = getattr(link, "ScaleVector", None)
-    if _negative(vector):
-        return True
-    scale = own(link, "Scale")
-    return isinstance(scale, int | float) and scale < 0 and _components(vector) in (None, (1.0, 1.0, 1.0))
-
-
-def _no_target(link: object, inspect: Inspect | None) -> LinkProblem:
-    known = getattr(link, "LinkProblem", None)
-    if not isinstance(known, LinkProblem) and inspect is not None:
-        known = inspect(link)
-    if isinstance(known, LinkProblem):
-        return known
-    return LinkProblem(FindingCode.BROKEN_LINK)
-
-
-def _copy_source(link: object) -> Any:
-    """The original of a copy-on-change link: ``LinkedObject`` is then a local copy with other parameters."""
-    source = own(link, "LinkCopyOnChangeSource")
-    return source[0] if isinstance(source, tuple) else source
+    # FreeCAD keeps Scale and ScaleVector in step; a reader may know only one of them.
+    vector, scale = own(link, "ScaleVector"), own(link, "Scale")
+    if vector is not None and _components(vector) != (1.0, 1.0, 1.0):
+        return _negative(vector)
+    return isinstance(scale, int | float) and scale < 0
 
 
 def resolve_target(link: object, inspect: Inspect | None = None) -> Target:
     """Follow ``link`` to the real part or assembly; a broken link gives a ``problem``, no exception."""
-    found = Target(obj=None, count=1)
+    try:
+        return _resolve(link, _Trail(inspect))
+    except _EndlessError:
+        return Target(None, problem=LinkProblem(FindingCode.CYCLE, obj=object_name(link)))
+
+
+def _resolve(link: object, trail: _Trail) -> Target:
+    found = Target(obj=None)
     current: Any = link
-    for _ in range(_MAX_HOPS):
+    index: int | None = None
+    while True:
         if is_link(current):
             found = replace(
                 found,
-                count=found.count * array_count(current),
-                mirrored=found.mirrored ^ is_mirrored(current),
+                count=found.count * (array_count(current) if index is None else 1),
+                mirrored=found.mirrored ^ is_mirrored(current, index),
             )
         elif not is_assembly_link(current) and not derived(current, "App::LinkElement"):
             return replace(found, obj=current)
-        source = _copy_source(current)
-        if source is not None:
-            found, following = replace(found, variant=True), source
-        else:
-            following = getattr(current, "LinkedObject", None)
-        if following is None:
-            return replace(found, obj=None, problem=_no_target(current, inspect))
-        if isinstance(following, tuple):
-            following, element = _follow_sub(following[0], following[1])
-            if following is None:
-                return replace(found, problem=_no_target_in(current, inspect, element))
-            found = replace(found, element=found.element or element)
-        elif source is None and _lost_its_source(current, following):
-            return replace(found, problem=LinkProblem(FindingCode.BROKEN_LINK, detail="copy without source"))
-        current = following
-    return replace(found, problem=LinkProblem(FindingCode.CYCLE, obj=object_name(link)))
+        trail.hops -= 1
+        if trail.hops < 0:
+            raise _EndlessError
+        hop, variant = _next_hop(current, trail)
+        if hop.problem is not None:
+            return replace(found, problem=hop.problem)
+        current, index = hop.obj, hop.index
+        found = replace(
+            found,
+            variant=found.variant or variant,
+            element=found.element or hop.element,
+            excluded=found.excluded or is_excluded(current),
+        )
+
+
+def _next_hop(link: Any, trail: _Trail) -> tuple[_Hop, bool]:
+    """Where a link leads, and whether it shows a variant (a changed copy) of that."""
+    linked = getattr(link, "LinkedObject", None)
+    source = first_of(own(link, "LinkCopyOnChangeSource"))
+    if source is not None:
+        # LinkedObject is then a local copy with other parameters (facts §1.2).
+        return _Hop(source), first_of(linked) is not source
+    if linked is None:
+        return _Hop(None, problem=_no_target(link, trail.inspect)), False
+    if isinstance(linked, tuple):
+        if linked[0] is None:
+            return _Hop(None, problem=_no_target(link, trail.inspect)), False
+        return _follow_sub(linked[0], linked[1], trail), False
+    if _lost_its_source(link, linked):
+        problem = LinkProblem(FindingCode.BROKEN_LINK, detail="the original of its changed copy is lost")
+        return _Hop(None, problem=problem), True
+    return _Hop(linked), False
 
 
 def _lost_its_source(link: object, target: object) -> bool:
@@ -144,52 +191,73 @@ def _lost_its_source(link: object, target: object) -> bool:
     )
 
 
-def _no_target_in(link: object, inspect: Inspect | None, missing: str) -> LinkProblem:
-    problem = _no_target(link, inspect)
-    if problem.code is not FindingCode.BROKEN_LINK:
-        return problem
-    return LinkProblem(FindingCode.MISSING_OBJECT, obj=missing)
+def _file_of(obj: object) -> str:
+    return getattr(getattr(obj, "Document", None), "FileName", "") or ""
 
 
-def _first(value: Any) -> str:
-    if isinstance(value, str):
-        return value
-    return next((str(part) for part in value or ()), "")
+def _no_target(link: object, inspect: Inspect | None) -> LinkProblem:
+    known = getattr(link, "LinkProblem", None)
+    if not isinstance(known, LinkProblem) and inspect is not None:
+        known = inspect(link)
+    if not isinstance(known, LinkProblem):
+        return LinkProblem(FindingCode.BROKEN_LINK)
+    if known.file:
+        return replace(known, file=located(known.file, _file_of(link)))
+    return replace(known, file=_file_of(link)) if known.code is FindingCode.MISSING_OBJECT else known
 
 
-def _follow_sub(start: Any, sub: Any) -> tuple[Any, str]:
-    """Follow a sub-name such as ``Inner.``, ``Sub.Bolt.`` or ``Face1`` from ``start``.
-
-    Returns the object and the sub-element ("" where the whole object is meant), or None and the name that
-    is not there. Sub-names are written by FreeCAD: object names end in a dot, geometry names do not.
-    """
-    *steps, last = _first(sub).split(".")
-    current = start
+def _follow_sub(start: Any, sub: Any, trail: _Trail) -> _Hop:
+    """Follow a sub-name such as ``Inner.``, ``Sub.Bolt.``, ``$Label.``, ``3.`` or ``Face1``."""
+    steps, element = split_sub_name(sub)
+    current, index = start, None
     for step in steps:
-        if not step or step.isdigit():  # "3." is an element of an array: the array's own target
+        if step.isdigit():
+            index = int(step)
             continue
-        current = _child(current, step)
-        if current is None:
-            return None, step
-    if not last:
-        return current, ""
-    if _ELEMENT.match(last) or (inner := _child(current, last)) is None:
-        return current, last
-    return inner, ""
+        hop = _child(current, step, trail)
+        if hop.problem is not None:
+            return hop
+        current, index = hop.obj, None
+    if (
+        element
+        and not is_element_name(element)
+        and (named := _child(current, element, trail).obj) is not None
+    ):
+        # FreeCAD writes object names with a dot behind; people and scripts forget it.
+        current, element = named, ""
+    return _Hop(current, element, index if is_link(current) else None)
 
 
-def _child(container: Any, name: str) -> Any:
-    holder = container
-    if is_link(holder) or is_assembly_link(holder):
-        holder = resolve_target(holder).obj
-    if holder is None:
-        return None
-    by_label = name.startswith("$")
-    wanted = name[1:] if by_label else name
-    for attribute in ("Group", "ElementList"):
-        for member in getattr(holder, attribute, None) or ():
-            if (getattr(member, "Label", None) if by_label else getattr(member, "Name", None)) == wanted:
+def _child(parent: Any, name: str, trail: _Trail) -> _Hop:
+    """The object ``name`` below ``parent``, as FreeCAD's ``getSubObject`` finds it."""
+    found = _member(parent, name)
+    if found is not None:
+        return _Hop(found)
+    holder = parent
+    if is_link(parent) or is_assembly_link(parent) or derived(parent, "App::LinkElement"):
+        trail.nesting -= 1
+        if trail.nesting < 0:
+            raise _EndlessError
+        target = _resolve(parent, trail)
+        trail.nesting += 1
+        if target.obj is None:
+            return _Hop(None, problem=target.problem)
+        holder = target.obj
+        found = _member(holder, name)
+    if found is None and not name.startswith("$"):
+        # Objects of a Body or a boolean are no members of a Group; the document knows them all the same.
+        look_up = getattr(getattr(holder, "Document", None), "getObject", None)
+        found = look_up(name) if callable(look_up) else None
+    if found is None:
+        missing = LinkProblem(FindingCode.MISSING_OBJECT, file=_file_of(holder), obj=name)
+        return _Hop(None, problem=missing)
+    return _Hop(found)
+
+
+def _member(holder: Any, name: str) -> Any:
+    attribute, wanted = ("Label", name[1:]) if name.startswith("$") else ("Name", name)
+    for property_name in ("Group", "ElementList"):
+        for member in own(holder, property_name) or ():
+            if getattr(member, attribute, None) == wanted:
                 return member
-    # Objects of a Body or a boolean are no members of a Group; the document knows them all the same.
-    look_up = getattr(getattr(holder, "Document", None), "getObject", None)
-    return None if by_label or not callable(look_up) else look_up(wanted)
+    return None
