@@ -6,8 +6,8 @@ The rules of this module:
 * a line is found by its part number; the numbers come from the server and compare as they are;
 * quantities compare as numbers: 12, 12.0 and "12" are equal;
 * a server line without ``source`` counts as ``assembly``;
-* a ``manual`` line, and one that is no component (``alternate``, ``reference``), belongs to people: it is
-  listed apart, never as removed or changed;
+* a ``manual`` line (or one of a source that we do not know), and one that is no component (``alternate``,
+  ``reference``), belongs to people: it is listed apart, never as removed or changed;
 * a component that exists as a manual line of the same quantity is there already (``unchanged``); with another
   quantity it is a conflict, for a person to decide.
 """
@@ -19,6 +19,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.model import BomChange, BomDiff, BomEntry, QuantityChange
 
 # Two quantities closer than this, relatively, are one: lengths pass through databases as floats.
@@ -37,7 +38,7 @@ def as_number(value: object) -> float | None:
         return None
     try:
         number = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return None
     return number if math.isfinite(number) else None
 
@@ -52,16 +53,16 @@ def same_quantity(a: object, b: object) -> bool:
 
 def _whole(value: float | None) -> float | None:
     # 12.0 is shown and sent as 12: a count reads as a count.
-    return int(value) if value is not None and value == int(value) else value
+    return int(value) if value is not None and value.is_integer() else value
 
 
 def _local(entry: BomEntry | Mapping[str, Any]) -> _Line | None:
     if isinstance(entry, BomEntry):
-        number, quantity = entry.part_number, float(entry.quantity)
+        number, quantity = entry.part_number, as_number(entry.quantity)
     else:
         number = entry.get("child_part_number") or entry.get("part_number")
-        quantity = as_number(entry.get("quantity")) or 0.0
-    return _Line(number, quantity) if number else None
+        quantity = as_number(entry.get("quantity"))
+    return _Line(number, quantity or 0.0) if number else None
 
 
 def _summed(lines: Iterable[_Line]) -> dict[str, float | None]:
@@ -76,10 +77,13 @@ def _summed(lines: Iterable[_Line]) -> dict[str, float | None]:
 
 
 def is_manual(line: Mapping[str, Any]) -> bool:
-    """True where a line belongs to people: source ``manual``, or a relation that is no component."""
+    """True where a line belongs to people: a relation that is no component, or any source but assembly.
+
+    A source that we do not know is somebody's; only what assemblies wrote may be rewritten by one.
+    """
     if (line.get("rel_type") or "component") != "component":
         return True
-    return (line.get("source") or "assembly") == "manual"
+    return (line.get("source") or "assembly") != "assembly"
 
 
 def diff_bom(
@@ -142,3 +146,28 @@ def _compare(
         manual=tuple(BomChange(n, q) for n, q in manual.items()),
         conflicts=tuple(conflicts),
     )
+
+
+def diff_findings(diff: BomDiff, parent: BomEntry | None = None) -> tuple[Finding, ...]:
+    """What a comparison leaves to a person: unreferenced lines in one finding, each conflict in one.
+
+    ``parent`` is the assembly that was compared.
+    """
+    where = (Place(parent.doc_path, parent.object_name),) if parent is not None else ()
+    findings = []
+    if diff.removed:
+        count, numbers = len(diff.removed), ", ".join(change.part_number for change in diff.removed)
+        items = "1 item in the Silo BOM is" if count == 1 else f"{count} items in the Silo BOM are"
+        message = f"{items} not referenced by components in this assembly. Nothing was deleted: {numbers}."
+        findings.append(Finding(FindingCode.UNREFERENCED, Severity.WARNING, message, where))
+    for change in diff.conflicts:
+        message = (
+            f"{change.part_number}: the assembly has {change.local_quantity:g}, a line kept by hand in the "
+            f"Silo BOM has {_told(change.remote_quantity)}. It stays as it is until somebody decides."
+        )
+        findings.append(Finding(FindingCode.CONFLICT, Severity.WARNING, message, where))
+    return tuple(findings)
+
+
+def _told(quantity: float | None) -> str:
+    return "no quantity" if quantity is None else f"{quantity:g}"

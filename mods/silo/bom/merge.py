@@ -62,7 +62,8 @@ def plan_merge(
 def apply_merge(lines: Sequence[Mapping[str, Any]], plan: MergePlan, when: str) -> list[dict[str, Any]]:
     """The lines after the merge: what people wrote on a line stays, nothing is deleted.
 
-    ``when`` is the time stamp written on newly unreferenced lines.
+    ``lines`` has at most one assembly line per number, as every server's key demands. ``when`` is the time
+    stamp written on newly unreferenced lines.
     """
     quantities = {change.part_number: change.local_quantity for change in plan.diff.quantity_changed}
     flag, unflag = set(plan.flag), set(plan.unflag)
@@ -71,7 +72,8 @@ def apply_merge(lines: Sequence[Mapping[str, Any]], plan: MergePlan, when: str) 
         after = dict(line)
         number = line["child_part_number"]
         if not is_manual(line):
-            after["quantity"] = quantities.get(number, line.get("quantity"))
+            if number in quantities:
+                after["quantity"] = quantities[number]
             if number in flag:
                 after["unreferenced_since"] = when
             if number in unflag:

@@ -13,6 +13,12 @@ from typing import Any
 from silo.bom.findings import Finding, FindingCode, Severity
 
 
+def _freeze(value: object, *names: str) -> None:
+    """Tuples of what was given: a caller may hand over any iterable, a frozen value holds a tuple."""
+    for name in names:
+        object.__setattr__(value, name, tuple(getattr(value, name)))
+
+
 @dataclass(frozen=True)
 class BomEntry:
     """One BOM line as the CAD model has it: a component and how often its parent contains it directly.
@@ -60,9 +66,7 @@ class BomEntry:
     document_label: str = field(default="", compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        # A caller may hand over any iterable; a frozen value holds a tuple.
-        object.__setattr__(self, "children", tuple(self.children))
-        object.__setattr__(self, "instances", tuple(self.instances))
+        _freeze(self, "children", "instances")
 
     @property
     def key(self) -> tuple[str, str]:
@@ -77,6 +81,9 @@ class Extraction:
     assembly: BomEntry
     entries: tuple[BomEntry, ...] = ()
     findings: tuple[Finding, ...] = ()
+
+    def __post_init__(self) -> None:
+        _freeze(self, "entries", "findings")
 
     @property
     def blocked(self) -> bool:
@@ -147,6 +154,9 @@ class BomDiff:
     unchanged: tuple[BomChange, ...] = ()
     manual: tuple[BomChange, ...] = ()
     conflicts: tuple[QuantityChange, ...] = ()
+
+    def __post_init__(self) -> None:
+        _freeze(self, *(f.name for f in fields(self)))
 
     @property
     def changes_server(self) -> bool:

@@ -7,8 +7,12 @@ import os.path
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from silo.bom.errors import InputError
 from silo.bom.findings import Finding, Place
 from silo.bom.model import BomDiff, BomEntry, Extraction, rows_as_dicts
+
+# A line takes about 1 kB of memory on its way to JSON or to a terminal.
+MOST_LINES = 500_000
 
 
 def relative(path: str, base: str) -> str:
@@ -57,8 +61,31 @@ def shorten(message: str, base: str) -> str:
     return message.replace(base.rstrip("/\\") + os.sep, "") if base else message
 
 
+def tree_size(entries: Iterable[BomEntry]) -> int:
+    """Lines of the tree written out in full. Nested assemblies share their values, so it may be huge."""
+    known: dict[int, int] = {}
+
+    def size(entry: BomEntry) -> int:
+        if id(entry) not in known:
+            known[id(entry)] = 1 + sum(map(size, entry.children))
+        return known[id(entry)]
+
+    return sum(map(size, entries))
+
+
+def check_tree_size(extraction: Extraction, most: int = MOST_LINES) -> None:
+    """Raises InputError where the tree has more lines than anybody could read, or memory could hold."""
+    lines = tree_size(extraction.entries)
+    if lines > most:
+        raise InputError(
+            f"The BOM tree of {extraction.assembly.label} has {lines:,} lines, more than the {most:,} that "
+            "can be shown. Use the flat list (--flat): each component once, with its total."
+        )
+
+
 def bom_json(extraction: Extraction, findings: Sequence[Finding] | None = None) -> dict[str, Any]:
-    """The whole BOM of an assembly."""
+    """The whole BOM of an assembly. Raises InputError where the tree is too large to be written out."""
+    check_tree_size(extraction)
     base = base_of(extraction)
     head = extraction.assembly
     return {

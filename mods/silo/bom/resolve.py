@@ -55,14 +55,14 @@ def resolve_with(entries: Sequence[BomEntry], known: Known) -> tuple[list[BomEnt
         if (before := done.get(id(entry))) is not None:
             return before
         item = known.get(entry.silo_uuid) if entry.silo_uuid else None
-        if item is None:
+        number = item.get("part_number") if item is not None else None
+        name = (item.get("name") or item.get("description") or number) if item is not None else None
+        if not number:
             missing.setdefault(entry.key, entry)
         children = several(entry.children)
-        number = item["part_number"] if item is not None else None
-        name = (item.get("name") or item.get("description") or number) if item is not None else None
-        result = (replace(entry, part_number=number, name=name, children=tuple(children)), item is not None)
-        done[id(entry)] = result
-        return result
+        told = replace(entry, part_number=number or None, name=name, children=tuple(children))
+        done[id(entry)] = (told, bool(number))
+        return done[id(entry)]
 
     def several(group: Iterable[BomEntry]) -> list[BomEntry]:
         return merge_lines(entry for entry, found in map(one, group) if found)
@@ -84,6 +84,8 @@ def merge_lines(entries: Iterable[BomEntry]) -> list[BomEntry]:
         lines[number] = replace(
             before,
             quantity=before.quantity + entry.quantity,
+            is_assembly=before.is_assembly or entry.is_assembly,
+            children=before.children or entry.children,
             consolidation_warning=before.consolidation_warning or entry.consolidation_warning,
             individual_links=before.individual_links + entry.individual_links,
             link_objects=before.link_objects + entry.link_objects,
@@ -107,17 +109,24 @@ def consolidation_message(entry: BomEntry) -> str:
 
 
 def consolidation_findings(entries: Iterable[BomEntry]) -> tuple[Finding, ...]:
-    """The consolidation warnings of a tree, each component once."""
-    return tuple(
-        Finding(
-            FindingCode.CONSOLIDATION,
-            Severity.WARNING,
-            consolidation_message(entry),
-            (Place(entry.doc_path, entry.object_name),),
-        )
-        for entry in walk_entries(entries)
+    """The consolidation warnings of a tree: for each assembly once, those of the top first.
+
+    ``where`` names the component and, below the top, the assembly that links it several times.
+    """
+    direct = tuple(entries)
+    findings = [_consolidation(entry) for entry in direct if entry.consolidation_warning]
+    findings += [
+        _consolidation(entry, assembly)
+        for assembly in walk_entries(direct)
+        for entry in assembly.children
         if entry.consolidation_warning
-    )
+    ]
+    return tuple(findings)
+
+
+def _consolidation(entry: BomEntry, assembly: BomEntry | None = None) -> Finding:
+    places = [Place(part.doc_path, part.object_name) for part in (entry, assembly) if part is not None]
+    return Finding(FindingCode.CONSOLIDATION, Severity.INFO, consolidation_message(entry), tuple(places))
 
 
 def unregistered_findings(unresolved: Iterable[BomEntry]) -> tuple[Finding, ...]:

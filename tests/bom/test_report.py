@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""A BOM as JSON: the shapes of the issue, relative paths, flat lists, and trees too large to write out."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+
+from silo.bom import BomEntry, Extraction, Finding, FindingCode, Place, Severity, diff_bom
+from silo.bom.errors import InputError
+from silo.bom.report import bom_json, diff_json, flat_counts, flat_json, relative, tree_size
+
+
+def entry(name: str, quantity: int = 1, *children: BomEntry, level: int = 1) -> BomEntry:
+    return BomEntry(
+        f"/proj/{name}.FCStd",
+        f"u-{name}",
+        quantity=quantity,
+        level=level,
+        object_name="Body",
+        label=name,
+        children=children,
+    )
+
+
+def extraction(*entries: BomEntry, findings: tuple[Finding, ...] = ()) -> Extraction:
+    head = BomEntry("/proj/top.FCStd", "u-top", object_name="Assembly", label="Top", is_assembly=True)
+    return Extraction(head, entries, findings)
+
+
+def test_the_json_of_the_command() -> None:
+    """The keys of the issue, quantities per one parent, paths from the top file's folder."""
+    finding = Finding(
+        FindingCode.MISSING_FILE,
+        Severity.ERROR,
+        "/proj/parts/b.FCStd is missing",
+        (Place("/proj/top.FCStd", "L"),),
+    )
+    found = extraction(entry("parts/sub", 2, entry("../lib/bolt", 4, level=2)), findings=(finding,))
+    told = json.loads(json.dumps(bom_json(found)))
+    assert (
+        told["assembly"] | {"doc_path": "top.FCStd", "object": "Assembly", "label": "Top"} == told["assembly"]
+    )
+    (line,) = told["entries"]
+    assert {key: line[key] for key in ("doc_path", "object", "label", "silo_uuid", "quantity", "level")} == {
+        "doc_path": "parts/sub.FCStd",
+        "object": "Body",
+        "label": "parts/sub",
+        "silo_uuid": "u-parts/sub",
+        "quantity": 2,
+        "level": 1,
+    }
+    assert (line["part_number"], line["name"], line["consolidation_warning"]) == (None, None, False)
+    assert [(c["doc_path"], c["quantity"], c["children"]) for c in line["children"]] == [
+        ("../lib/bolt.FCStd", 4, [])
+    ]
+    assert told["findings"] == [
+        {
+            "code": "missing_file",
+            "severity": "error",
+            "message": "parts/b.FCStd is missing",
+            "where": ["top.FCStd#L"],
+        }
+    ]
+
+
+def test_flat_quantities_are_multiplied_down_the_tree() -> None:
+    """Two gearboxes with four gears each are eight gears; sub-assemblies are listed as well."""
+    bolt = entry("bolt", 3, level=2)
+    found = extraction(entry("sub", 2, entry("gear", 4, level=2), bolt), entry("bolt", 5))
+    assert flat_json(found) == [
+        {"doc_path": "sub.FCStd", "object": "Body", "quantity": 2},
+        {"doc_path": "gear.FCStd", "object": "Body", "quantity": 8},
+        {"doc_path": "bolt.FCStd", "object": "Body", "quantity": 11},
+    ]
+
+
+@pytest.mark.parametrize(
+    ("path", "base", "told"),
+    [
+        ("/p/a.FCStd", "/p", "a.FCStd"),
+        ("/q/a.FCStd", "/p", "../q/a.FCStd"),
+        ("", "/p", ""),
+        ("/p/a.FCStd", "", "/p/a.FCStd"),
+    ],
+)
+def test_paths_are_told_relative_to_the_top_file(path: str, base: str, told: str) -> None:
+    """With ``/``; unsaved documents have no path."""
+    assert relative(path, base) == told
+
+
+def doubling(levels: int) -> BomEntry:
+    """A tree in which each assembly holds two others, which hold the same ones: 2^levels lines."""
+    below: tuple[BomEntry, ...] = ()
+    for level in range(levels, 0, -1):
+        below = (entry(f"a{level}", 1, *below, level=level), entry(f"b{level}", 1, *below, level=level))
+    return entry("root", 1, *below)
+
+
+def test_a_tree_that_nobody_could_read_is_refused() -> None:
+    """2^40 lines are counted, not written; the flat list has them all at once."""
+    found = extraction(doubling(40))
+    assert tree_size(found.entries) == 2**41 - 1
+    with pytest.raises(InputError, match="--flat"):
+        bom_json(found)
+    assert len(flat_json(found)) == 81
+    assert flat_counts(found.entries)["/proj/b40.FCStd", "Body"] == 2**39
+
+
+def test_a_diff_as_json() -> None:
+    """All six lists, as plain dicts."""
+    told: dict[str, Any] = diff_json(diff_bom([{"child_part_number": "P", "quantity": 2}], []))
+    assert set(told) == {"added", "quantity_changed", "removed", "unchanged", "manual", "conflicts"}
+    assert json.loads(json.dumps(told))["added"] == [{"part_number": "P", "quantity": 2}]
