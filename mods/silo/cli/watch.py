@@ -10,11 +10,13 @@ import sys
 from typing import TYPE_CHECKING
 
 from silo.api.activity import activity_text
+from silo.bom.errors import AuthError
 from silo.cli import common
 from silo.cli.common import Commands
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
+    from silo.api.events import ConnectionState
     from silo.api.sse import ServerEvent
 
 
@@ -37,10 +39,10 @@ def run(args: argparse.Namespace) -> int:
     """Print events until told to stop; the connection is made anew whenever it is lost."""
     from silo.api.events import EventListener
 
-    events: queue.Queue[ServerEvent | str] = queue.Queue()
+    events: queue.Queue[ServerEvent | ConnectionState] = queue.Queue()
     with common.client_of(args) as client:
         client.whoami()  # a wrong address or token is told at once, not retried for ever
-        listener = EventListener(client, on_event=events.put, on_state=lambda state: events.put(str(state)))
+        listener = EventListener(client, on_event=events.put, on_state=events.put)
         listener.start()
         try:
             return _print(args, client, events)
@@ -48,11 +50,17 @@ def run(args: argparse.Namespace) -> int:
             listener.stop()
 
 
-def _print(args: argparse.Namespace, client: SiloClient, events: queue.Queue[ServerEvent | str]) -> int:
+def _print(
+    args: argparse.Namespace, client: SiloClient, events: queue.Queue[ServerEvent | ConnectionState]
+) -> int:
+    from silo.api.events import Connection, ConnectionState
+
     shown = 0
     while args.count is None or shown < args.count:
         event = events.get()
-        if isinstance(event, str):
+        if isinstance(event, ConnectionState):
+            if event.kind in (Connection.REFUSED, Connection.UNSUPPORTED):
+                raise AuthError(f"the live connection ended: {event.message}")
             print(f"[{event}]", file=sys.stderr)
             continue
         if event.type == "heartbeat" or (args.item and event.item != args.item):
