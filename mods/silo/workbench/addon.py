@@ -6,7 +6,7 @@ from __future__ import annotations
 import traceback
 from typing import TYPE_CHECKING, Any
 
-from silo.workbench import host, qt
+from silo.workbench import host, qt, widgets
 from silo.workbench.activity import Action, Do
 from silo.workbench.pane import ActivityDock
 from silo.workbench.prefs import page_class
@@ -34,6 +34,7 @@ class AddOn:
     """One per FreeCAD. Made at start, so everything that costs time is made when it is first needed."""
 
     def __init__(self) -> None:
+        widgets.use_icons(host.icon)
         self.preferences = Preferences(host.parameters(GROUP))
         self.dock = ActivityDock(host.main_window(), self.act)
         self.relay = qt.Relay(self._bug)

@@ -239,6 +239,8 @@ def _event_words(kind: str, number: str, data: dict[str, Any]) -> tuple[str, str
     """Title and key of an event; the key of a revision is that of our own upload of it."""
     revision = data.get("revision_number", data.get("revision"))
     if kind == "revision.created" and isinstance(revision, int):
+        if revision == 1 and _text(data, "comment") in ("", "created"):
+            return "", ""  # An item is born with it, and that is told already.
         text = translate("Silo", "Revision {n} of {number}").replace("{n}", str(revision))
         return text.replace("{number}", number), _revision_key(number, revision)
     words = {

@@ -4,14 +4,14 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Callable
 from typing import Any
 
-from silo.bom.errors import SiloError
 from silo.workbench import widgets
 from silo.workbench.activity import Tone
 from silo.workbench.prefs_work import Findings, Wanted, in_use, keep_token, look, test
-from silo.workbench.qt import QtWidgets
+from silo.workbench.qt import QtCore, QtWidgets
 from silo.workbench.session import Session
 from silo.workbench.settings import ALLOW, HOLD, Preferences, read_known
 from silo.workbench.tokens import Keyring
@@ -41,7 +41,11 @@ class PreferencePage:
         self._preferences, self._session, self._changed = preferences, session, changed
         self._keyring = Keyring()
         self._alive = True
+        self._waiting = 0
         self.form = QtWidgets.QWidget()
+        self._breath = QtCore.QTimer(self.form)
+        self._breath.setInterval(15)
+        self._breath.timeout.connect(_breathe)
         self.form.setWindowTitle(translate("Silo", "Silo"))
         self.form.destroyed.connect(lambda _obj=None: self._gone())
         layout = QtWidgets.QVBoxLayout(self.form)
@@ -54,7 +58,9 @@ class PreferencePage:
 
     def _server_box(self) -> Any:
         box = QtWidgets.QGroupBox(translate("Silo", "Server"))
-        form = QtWidgets.QFormLayout(box)
+        layout = QtWidgets.QVBoxLayout(box)
+        form = QtWidgets.QFormLayout()
+        layout.addLayout(form)
         self.url = QtWidgets.QLineEdit()
         self.url.setObjectName("url")
         self.url.setPlaceholderText("https://silo.example.com")
@@ -73,14 +79,20 @@ class PreferencePage:
         form.addRow(translate("Silo", "Certificate authorities"), self._with_browse())
         self.in_use = widgets.label("", Tone.QUIET)
         self.in_use.setObjectName("in_use")
+        layout.addWidget(self.in_use)
+        layout.addLayout(self._test_row())
+        return box
+
+    def _test_row(self) -> Any:
         self.result = widgets.label("")
         self.result.setObjectName("result")
-        test_button = QtWidgets.QPushButton(translate("Silo", "Test the connection"))
-        test_button.setObjectName("test")
-        test_button.clicked.connect(lambda _checked=False: self.test())
-        form.addRow("", self.in_use)
-        form.addRow(test_button, self.result)
-        return box
+        button = QtWidgets.QPushButton(translate("Silo", "Test the connection"))
+        button.setObjectName("test")
+        button.clicked.connect(lambda _checked=False: self.test())
+        row = QtWidgets.QHBoxLayout()
+        row.addWidget(button)
+        row.addWidget(self.result, 1)
+        return row
 
     def _with_browse(self) -> Any:
         browse = QtWidgets.QPushButton("…")
@@ -140,16 +152,30 @@ class PreferencePage:
         self.missing.setCurrentIndex(max(self.missing.findData(self._preferences.text("MissingLinks")), 0))
         self.token.setText("")
         known = read_known(self._preferences)
-        self._session.aside(
+        self._ask(
             translate("Silo", "Reading the settings"),
-            lambda _control: look(known, self._keyring),
-            done=self._looked,
-            failed=lambda error: self._tell(str(error), Tone.ERROR),
+            lambda: look(known, self._keyring),
+            self._looked,
+        )
+
+    def _ask(self, title: str, work: Callable[[], Any], done: Callable[[Any], None]) -> None:
+        def finished(call: Callable[[], None]) -> None:
+            self._waiting -= 1
+            if self._alive:
+                if not self._waiting:
+                    self._breath.stop()
+                call()
+
+        self._waiting += 1
+        self._breath.start()
+        self._session.aside(
+            title,
+            lambda _control: work(),
+            done=lambda result: finished(lambda: done(result)),
+            failed=lambda error: finished(lambda: self._tell(str(error), Tone.ERROR)),
         )
 
     def _looked(self, found: Findings) -> None:
-        if not self._alive:
-            return
         self.in_use.setText(in_use(found.server, dict(os.environ)))
         if found.keyring and self.place.findData(KEYRING) < 0:
             text = translate("Silo", "the keyring of the system ({name})").replace("{name}", found.keyring)
@@ -189,7 +215,7 @@ class PreferencePage:
             translate("Silo", "Keeping the token"),
             lambda _control: keep_token(keyring, url, token),
             done=lambda _result: self._changed(),
-            failed=lambda error: self._tell(str(error), Tone.ERROR),
+            failed=lambda error: self._session.problem(error),
         )
 
     # -- testing ----------------------------------------------------------------------------------------
@@ -204,20 +230,21 @@ class PreferencePage:
             verify=(certificate or True) if self.verify.isChecked() else False,
         )
         known, keyring = read_known(self._preferences), self._keyring
-        self._session.aside(
+        self._ask(
             translate("Silo", "Testing the connection"),
-            lambda _control: test(wanted, known, keyring),
-            done=lambda text: self._tell(text, Tone.GOOD),
-            failed=self._failed,
+            lambda: test(wanted, known, keyring),
+            lambda text: self._tell(text, Tone.GOOD),
         )
 
-    def _failed(self, error: SiloError) -> None:
-        self._tell(str(error), Tone.ERROR)
-
     def _tell(self, text: str, tone: Tone) -> None:
-        if self._alive:
-            self.result.setText(text)
-            widgets.paint(self.result, tone)
+        self.result.setText(text)
+        widgets.paint(self.result, tone)
 
     def _gone(self) -> None:
         self._alive = False
+
+
+def _breathe() -> None:
+    # FreeCAD's preference window, when a Python command opens it, keeps Python's lock for as long as it is
+    # open (measured, 0.20 to 1.1), so no worker would get on: sleeping lets go of the lock.
+    time.sleep(0.003)

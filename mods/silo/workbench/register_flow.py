@@ -129,6 +129,9 @@ class RegisterFlow:
 
         def finished(_result: Any = None) -> None:
             self._with_dialog(path, lambda dialog: dialog.stopped())
+            # The numbers that were foretold are taken now.
+            for category in sorted({order.category for order in orders}):
+                self._number(path, category)
             self._send(path, registered)
 
         def failed(error: SiloError) -> None:

@@ -96,7 +96,7 @@ class Session:
         """Connect, where a server is configured; send what an earlier FreeCAD left behind."""
         self._live = live
         self._net.submit(
-            Job(translate("Silo", "Connecting"), self._connect, done=self._connected, failed=self._failed)
+            Job(translate("Silo", "Connecting"), self._connect, done=self._connected, failed=self.problem)
         )
 
     def settings_changed(self, known: Known, *, live: bool) -> None:
@@ -165,7 +165,7 @@ class Session:
                 translate("Silo", "Sending to Silo"),
                 run,
                 done=self._sent_all,
-                failed=self._failed,
+                failed=self.problem,
                 same_as=f"send {force}",
             )
         )
@@ -221,7 +221,7 @@ class Session:
             self._show(waiting=waiting)
             then()
 
-        self._disk.submit(Job(translate("Silo", "Outbox"), run, done=done, failed=self._failed))
+        self._disk.submit(Job(translate("Silo", "Outbox"), run, done=done, failed=self.problem))
 
     # -- anything else that asks the server -------------------------------------------------------------
 
@@ -300,7 +300,8 @@ class Session:
     def _busy(self, busy: Busy | None) -> None:
         self._show(busy=busy)
 
-    def _failed(self, error: SiloError) -> None:
+    def problem(self, error: SiloError) -> None:
+        """Show a problem that belongs to nothing else that is shown."""
         if error.code == "bad_config":
             self._show(reason=str(error))
         elif error.code != "cancelled":
