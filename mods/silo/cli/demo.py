@@ -18,6 +18,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
+from urllib.parse import quote
 
 from silo.api.activity import activity_text
 from silo.batch import source_document
@@ -127,6 +128,7 @@ class Demo:
     ) -> None:
         self.top, self.client, self.events, self.out, self.login_url = top, client, events, out, login_url
         self.step = 0
+        self.page = client.base_url
 
     def say(self, text: str) -> None:
         self.step += 1
@@ -215,14 +217,15 @@ class Demo:
 
     def _finish(self) -> None:
         number = resolve(common.read_assembly(str(self.top)), self.client).assembly.part_number or ""
-        page = self.client.web_url(f"/items/{number}/bom")
+        self.page = self.client.web_url(f"/items/{number}/bom")
         self.out.print()
-        self.out.print(f"The page where a person decides: {page}", markup=False)
+        self.out.print(f"The page where a person decides: {self.page}", markup=False)
 
     def stay(self) -> None:
         """Leave the server running to look at."""
         if self.login_url:
-            self.out.print(f"Log in here: {self.login_url}", markup=False)
+            path = self.page.removeprefix(self.client.base_url)
+            self.out.print(f"Look at it logged in: {self.login_url}?next={quote(path)}", markup=False)
         self.out.print("The server runs until Ctrl-C; its data is then removed.")
         try:
             while True:

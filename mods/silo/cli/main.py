@@ -13,7 +13,7 @@ import sys
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 
-from silo.bom.errors import ConflictError, RejectedError, RemoteError, SiloError
+from silo.bom.errors import CancelledError, ConflictError, RejectedError, RemoteError, SiloError
 
 OK, UNDONE, BAD_INPUT, REMOTE, CANCELLED = 0, 1, 2, 3, 130
 
@@ -70,6 +70,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         # The reader (head, less) has seen enough; that is no error. Nothing may be flushed any more.
         sys.stdout = None  # type: ignore[assignment]
         return OK
+    except CancelledError:
+        print("Cancelled.", file=sys.stderr)
+        return CANCELLED
     except SiloError as error:
         _tell(error)
         return REMOTE if isinstance(error, RemoteError | ConflictError) else BAD_INPUT
