@@ -4,7 +4,7 @@
 # The FreeCADs that the tests run in: the machine's own, and those of other Debian releases, each in a
 # root directory of its own below the user's cache.
 #
-#   scripts/freecad-roots.sh [build [SUITE…]]       build or complete the roots (default: trixie sid)
+#   scripts/freecad-roots.sh [build [SUITE…]]       build or complete roots (default: all that this machine lacks)
 #   scripts/freecad-roots.sh --list                 name, version, Python, command, dependency folder
 #   scripts/freecad-roots.sh run NAME COMMAND…      run a command of that root (freecadcmd, freecad, xvfb-run …)
 #   scripts/freecad-roots.sh remove NAME            delete a root
@@ -20,7 +20,9 @@ set -euo pipefail
 REPO=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd -P)
 CACHE=${SILO_FREECAD_ROOTS:-${XDG_CACHE_HOME:-$HOME/.cache}/silo-mod/freecad}
 SELF="$REPO/scripts/freecad-roots.sh"
-SUITES=(trixie sid)
+# Debian releases and the FreeCAD that each has; together all that the add-on must work in.
+SUITES=(bookworm trixie sid)
+declare -A FREECAD_OF=([bookworm]=0.20 [trixie]=1.0 [sid]=1.1)
 # Raise this when the recipe below changes: finished roots are then completed anew.
 RECIPE=1
 # The second line is what FreeCAD's window needs under Xvfb and what apt would only recommend.
@@ -39,7 +41,7 @@ cannot() { say "cannot: $*"; exit 3; }
 
 require_mounts() {
   [ "$(id -u)" = 0 ] || cannot "entering a root needs root rights (id is $(id -u))"
-  unshare --mount --propagation private true 2>/dev/null ||
+  unshare --mount --propagation private -- mount --bind / / 2>/dev/null ||
     cannot "this machine does not allow mount namespaces (a container without CAP_SYS_ADMIN?)"
 }
 
@@ -47,11 +49,17 @@ debian_mirror() {
   if [ -n "${SILO_DEBIAN_MIRROR:-}" ]; then echo "$SILO_DEBIAN_MIRROR"; return; fi
   command -v apt-get >/dev/null || cannot "no apt here to ask for a mirror; set SILO_DEBIAN_MIRROR"
   local mirror
-  # shellcheck disable=SC2016  # apt expands these, not the shell
-  mirror=$(apt-get indextargets --format '$(ORIGIN) $(COMPONENT) $(REPO_URI)' 'Created-By: Packages' 2>/dev/null |
-    awk '$1 == "Debian" && $2 == "main" && $3 ~ /^(https?|file):/ && $3 !~ /security/ { print $3; exit }')
-  [ -n "$mirror" ] || cannot "apt knows no Debian mirror (run apt-get update, or set SILO_DEBIAN_MIRROR)"
+  mirror=$(apts_mirror)
+  # Without package lists (a fresh image) apt does not know what its sources are.
+  if [ -z "$mirror" ] && apt-get -qq update >&2; then mirror=$(apts_mirror); fi
+  [ -n "$mirror" ] || cannot "apt knows no Debian mirror; set SILO_DEBIAN_MIRROR"
   echo "$mirror"
+}
+
+apts_mirror() {
+  # shellcheck disable=SC2016  # apt expands these, not the shell
+  apt-get indextargets --format '$(ORIGIN) $(COMPONENT) $(REPO_URI)' 'Created-By: Packages' 2>/dev/null |
+    awk '$1 == "Debian" && $2 == "main" && $3 ~ /^(https?|file):/ && $3 !~ /security/ && !n++ { print $3 }'
 }
 
 use_apts_proxy() {
@@ -177,6 +185,7 @@ build_one() {
     local answer
     answer=$(export FREECAD_USER_HOME="$CACHE/profiles/$suite" && ask_freecad in_root "$root" freecadcmd)
     [ -n "$answer" ] || { say "$suite: freecadcmd does not start"; return 1; }
+    case "$answer" in "${FREECAD_OF[$suite]:-}"*) ;; *) say "$suite has FreeCAD ${answer% *} now" ;; esac
     echo "$RECIPE $answer" >"$root/.silo-complete"
   fi
   install_dependencies "$(cut -d' ' -f3 "$root/.silo-complete")"
@@ -185,12 +194,20 @@ build_one() {
 
 own_freecad() { command -v freecadcmd || command -v FreeCADCmd || true; }
 
-build() {
-  local suite answer command failed=0
+own_answer() {
+  local command
   command=$(own_freecad)
-  if [ -n "$command" ]; then
-    answer=$(ask_freecad "$command")
-    if [ -n "$answer" ]; then install_dependencies "${answer#* }"; fi
+  if [ -n "$command" ]; then ask_freecad "$command" || true; fi
+}
+
+build() {
+  local suite answer failed=0
+  answer=$(own_answer)
+  if [ -n "$answer" ]; then install_dependencies "${answer#* }"; fi
+  if [ $# = 0 ]; then
+    for suite in "${SUITES[@]}"; do
+      case "$answer" in "${FREECAD_OF[$suite]}".*) ;; *) set -- "$@" "$suite" ;; esac
+    done
   fi
   for suite in "$@"; do
     local rc=0
@@ -206,12 +223,9 @@ build() {
 line() { printf '%s\t%s\t%s\t%s\t%s\n' "$1" "$2" "$3" "$4" "$CACHE/deps/py${3//./}"; }
 
 list() {
-  local command answer suite complete
-  command=$(own_freecad)
-  if [ -n "$command" ]; then
-    answer=$(ask_freecad "$command")
-    if [ -n "$answer" ]; then line own "${answer% *}" "${answer#* }" "$command"; fi
-  fi
+  local answer suite complete
+  answer=$(own_answer)
+  if [ -n "$answer" ]; then line own "${answer% *}" "${answer#* }" "$(own_freecad)"; fi
   for suite in "${SUITES[@]}"; do
     complete="$CACHE/$suite/.silo-complete"
     if [ -e "$complete" ]; then
@@ -221,7 +235,7 @@ list() {
 }
 
 case "${1:-build}" in
-  build) if [ $# -gt 0 ]; then shift; fi; if [ $# = 0 ]; then set -- "${SUITES[@]}"; fi; build "$@" ;;
+  build) if [ $# -gt 0 ]; then shift; fi; build "$@" ;;
   build-one) build_one "$2" ;;
   list | --list) list ;;
   run) shift; [ $# -ge 2 ] || { say "run NAME COMMAND…"; exit 2; }; run_in "$@" ;;
