@@ -126,7 +126,7 @@ def consolidation_findings(entries: Iterable[BomEntry]) -> tuple[Finding, ...]:
 
 def _consolidation(entry: BomEntry, assembly: BomEntry | None = None) -> Finding:
     places = [Place(part.doc_path, part.object_name) for part in (entry, assembly) if part is not None]
-    return Finding(FindingCode.CONSOLIDATION, Severity.INFO, consolidation_message(entry), tuple(places))
+    return Finding(FindingCode.CONSOLIDATION, Severity.WARNING, consolidation_message(entry), tuple(places))
 
 
 def unregistered_findings(unresolved: Iterable[BomEntry]) -> tuple[Finding, ...]:
