@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from silo.inertia.names import bare, could_be, plain, suggestions
+from silo.inertia.names import Suggester, bare, could_be, plain
 
 
 @pytest.mark.parametrize(
@@ -75,6 +75,14 @@ def test_never_the_same(left: str, right: str) -> None:
 
 def test_suggestions_need_equal_digits() -> None:
     """A near name is proposed only where every number in it agrees."""
-    assert suggestions("Hexbolt M4", ["Hex bolt M4", "Hex bolt M5", "nut"]) == ("Hex bolt M4",)
-    assert suggestions("M3x10", ["M3x12", "M3x100"]) == ()
-    assert suggestions("bracket_2", ["bracket_3", "bracket"]) == ()
+    assert Suggester(["Hex bolt M4", "Hex bolt M5", "nut"]).near("Hexbolt M4") == ("Hex bolt M4",)
+    assert Suggester(["M3x12", "M3x100"]).near("M3x10") == ()
+    assert Suggester(["bracket_3", "bracket"]).near("bracket_2") == ()
+
+
+def test_suggestions_end_with_their_budget() -> None:
+    """Thousands of parts that fit nothing must not take minutes."""
+    suggester = Suggester(["Hex bolt M4", "Hex nut M4"], budget=5)
+    assert suggester.near("Hexbolt M4") == ("Hex bolt M4",)
+    assert suggester.near("Hexbolt M4") == ("Hex bolt M4",)
+    assert suggester.near("Hexbolt M4") == ()

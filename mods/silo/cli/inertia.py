@@ -76,7 +76,8 @@ def run(args: argparse.Namespace) -> int:
     from silo.inertia.calculator import calculate
 
     # The small files first: a mistake in them should not cost the reading of the geometry.
-    table = shared.bom_parser(args).parse(args.bom) if args.bom else None
+    parser = shared.bom_parser(args)
+    table = parser.parse(args.bom) if args.bom else None
     task = _task(args)
     assembly = shared.read(args.assembly, args)
     report = calculate(assembly, table, task)

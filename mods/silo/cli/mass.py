@@ -50,7 +50,8 @@ def run(args: argparse.Namespace) -> int:
     from silo.inertia.links import Link, LinkMap
     from silo.inertia.massrule import Options
 
-    table = shared.bom_parser(args).parse(args.bom) if args.bom else None
+    parser = shared.bom_parser(args)
+    table = parser.parse(args.bom) if args.bom else None
     materials = shared.material_table(args)
     assembly = shared.read(args.top, args, object_name=args.assembly)
     name = assembly.name or "assembly"

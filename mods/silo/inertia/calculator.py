@@ -18,6 +18,7 @@ from silo.inertia.massrule import MassRule, Options
 from silo.inertia.matching import match
 from silo.inertia.materials import MaterialHit, MaterialTable, load_materials
 from silo.inertia.model import Assembly, Prototype
+from silo.inertia.names import Suggester
 from silo.inertia.products import leaf_products, sub_assemblies
 from silo.inertia.report import InertiaReport
 from silo.inertia.types import InertialProperties
@@ -61,9 +62,8 @@ def _run(
 ) -> InertiaReport:
     assembly = _with_stated_densities(assembly, task.materials)
     rows = table if table is not None else BomTable(())
-    rule = MassRule(
-        task.materials, task.options, tuple(dict.fromkeys(r.name for r in rows.rows)), table is not None
-    )
+    suggester = Suggester(row.name for row in rows.rows)
+    rule = MassRule(task.materials, task.options, suggester, table is not None)
 
     def density(row: BOMEntry, product: object) -> float | None:
         found = rule.density_of(row.material)

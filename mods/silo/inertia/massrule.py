@@ -9,14 +9,14 @@ default (or of zero) only where the user asks for it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from silo.inertia.codes import Decided, MassCode, Rule, Source
 from silo.inertia.matching import Match
 from silo.inertia.materials import MaterialHit, MaterialTable
 from silo.inertia.model import Prototype
-from silo.inertia.names import suggestions
+from silo.inertia.names import Suggester
 
 ROUNDING_LIMIT = 0.02
 """A quantum above this share of the mass is told."""
@@ -82,11 +82,11 @@ class Decision:
 
 @dataclass(frozen=True, eq=False)
 class MassRule:
-    """Decides for one product after the other. ``names``: all BOM names, to propose one of them."""
+    """Decides for one product after the other. ``suggester``: knows all BOM names, to propose some."""
 
     materials: MaterialTable
     options: Options = field(default_factory=Options)
-    names: Sequence[str] = ()
+    suggester: Suggester = field(default_factory=lambda: Suggester(()))
     has_bom: bool = True
 
     def density_of(self, material: str | None) -> float | None:
@@ -206,7 +206,7 @@ class MassRule:
         stated = prototype.step_density
         base = Decision(source=Source.DEFAULT_DENSITY)
         message = "Part not found in BOM" if self.has_bom else "There is no BOM"
-        alike = suggestions(prototype.name, self.names) if self.has_bom else ()
+        alike = self.suggester.near(prototype.name) if self.has_bom else ()
         if alike:
             message += ", which has " + ", ".join(f"“{name}”" for name in alike)
         if self.options.step_density and stated is not None:

@@ -77,12 +77,28 @@ def digits(name: str) -> tuple[str, ...]:
     return tuple(re.findall(r"\d+", name))
 
 
-def suggestions(name: str, candidates: Iterable[str], limit: int = 3) -> tuple[str, ...]:
-    """Names a person may have meant: alike by rapidfuzz, all digits equal. For messages only."""
-    from rapidfuzz import fuzz, process
+class Suggester:
+    """Names a person may have meant: alike by rapidfuzz, all digits equal. For messages only.
 
-    fitting = [c for c in dict.fromkeys(candidates) if digits(c) == digits(name)]
-    found = process.extract(
-        name, fitting, scorer=fuzz.WRatio, processor=plain, limit=limit, score_cutoff=SUGGEST_FROM
-    )
-    return tuple(choice for choice, _, _ in found)
+    ``budget``: comparisons before it falls silent; proposals are a courtesy, and must not take minutes for a
+    BOM of thousands that fits nothing.
+    """
+
+    def __init__(self, candidates: Iterable[str], budget: int = 1_000_000) -> None:
+        self._by_digits: dict[tuple[str, ...], dict[str, str]] = {}
+        for name in candidates:
+            self._by_digits.setdefault(digits(name), {}).setdefault(plain(name), name)
+        self._budget = budget
+
+    def near(self, name: str, limit: int = 3) -> tuple[str, ...]:
+        """Up to ``limit`` names, the nearest first."""
+        fitting = self._by_digits.get(digits(name), {})
+        self._budget -= len(fitting)
+        if not fitting or self._budget < 0:
+            return ()
+        from rapidfuzz import fuzz, process
+
+        found = process.extract(
+            plain(name), fitting.keys(), scorer=fuzz.WRatio, limit=limit, score_cutoff=SUGGEST_FROM
+        )
+        return tuple(fitting[choice] for choice, _, _ in found)

@@ -51,12 +51,18 @@ class MaterialTable:
 
     layers: Sequence[Sequence[Material]]
     cards: Callable[[], Sequence[Material]] = field(default=lambda: ())
+    _known: dict[str, MaterialHit | MaterialMiss] = field(default_factory=dict, init=False, repr=False)
 
     def find(self, text: str) -> MaterialHit | MaterialMiss:
         """The material that ``text`` names: equal first, then whole words, then FreeCAD's cards by name.
 
         Never by parts of words, and never by likeness.
         """
+        if text not in self._known:
+            self._known[text] = self._look_up(text)
+        return self._known[text]
+
+    def _look_up(self, text: str) -> MaterialHit | MaterialMiss:
         tokens = words(text)
         if not tokens:
             return MaterialMiss("it names nothing")

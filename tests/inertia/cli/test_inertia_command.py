@@ -1,0 +1,259 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""``silo-mod inertia`` on the example arm: results, files, frames, exit codes."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import os
+import pty
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import jsonschema_rs
+import numpy as np
+import pytest
+
+Run = Callable[..., Any]
+SCHEMA = Path(__file__).parents[3] / "docs" / "inertia-schema.json"
+
+
+def by_name(rows: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
+    return {row["name"]: row for row in rows}
+
+
+def test_the_example_by_hand(run: Run, arm: Path) -> None:
+    """Masses by the rule, from dimensions in the generator: BOM, material, share, zero."""
+    ran = run("inertia", arm / "arm.step", "--bom", arm / "bom.csv", "--json")
+    assert ran.code == 0
+    data = ran.json()
+    links = by_name(data["links"])
+    assert list(links) == ["base_link", "upper_arm", "forearm", "gripper"]
+    base = by_name(links["base_link"]["parts"])
+    column = math.pi * (0.045**2 - 0.035**2) * 0.08 * 2700
+    assert base["Base plate"]["mass"] == 0.688
+    assert base["Column"]["mass"] == pytest.approx(column, rel=1e-9)
+    assert base["Column"]["source"] == "material"
+    assert base["Driver board"]["mass"] == pytest.approx(0.06 * 0.04 * 0.004 * 1850, rel=1e-9)
+    assert base["Servo case"]["mass"] + 2 * base["Servo horn"]["mass"] == pytest.approx(0.165)
+    assert base["Servo horn"]["quantity"] == 2
+    assert base["Servo case"]["source"] == "sub_assembly_mass"
+    expected = 0.688 + column + 0.165 + 0.01776 + 4 * 0.002
+    assert links["base_link"]["mass"] == pytest.approx(expected, rel=1e-9)
+    assert data["total"]["mass"] == pytest.approx(sum(link["mass"] for link in links.values()))
+    assert sorted({w["code"] for w in data["warnings"]}) == [
+        "mass_rounded", "no_mass_no_material", "row_unused", "sub_assembly_mass_shared",
+    ]  # fmt: skip
+
+
+def test_json_fits_the_schema(run: Run, arm: Path) -> None:
+    """What the command prints is what the docs promise."""
+    schema = json.loads(SCHEMA.read_text("utf-8"))
+    data = run("inertia", arm / "arm.step", "--bom", arm / "bom.csv", "--json").json()
+    assert list(jsonschema_rs.validator_for(schema).iter_errors(data)) == []
+
+
+def test_urdf_of_the_example_is_what_the_command_writes(run: Run, arm: Path) -> None:
+    """The committed file does not rot, and a second run changes no byte."""
+    before = (arm / "arm.urdf").read_bytes()
+    ran = run("inertia", arm / "arm.step", "--bom", arm / "bom.csv", "--urdf", arm / "arm.urdf")
+    assert ran.code == 0
+    assert "wrote the inertia of base_link, upper_arm, forearm, gripper" in ran.err
+    assert numbers_of((arm / "arm.urdf").read_text()) == pytest.approx(numbers_of(before.decode()), rel=1e-9)
+    again = (arm / "arm.urdf").read_bytes()
+    run("inertia", arm / "arm.step", "--bom", arm / "bom.csv", "--urdf", arm / "arm.urdf")
+    assert (arm / "arm.urdf").read_bytes() == again
+
+
+def numbers_of(text: str) -> list[float]:
+    import re
+
+    return [float(n) for n in re.findall(r'[" ](-?[\d.]+(?:e-?\d+)?)(?=[" ])', text)]
+
+
+def test_the_generator_makes_the_committed_step(run: Run, arm: Path, tmp_path: Path) -> None:
+    """Masses, centres and tensors of a freshly generated arm are those of the committed file."""
+    fresh = tmp_path / "fresh.step"
+    subprocess.run([sys.executable, arm / "make_arm.py", fresh], check=True, capture_output=True)
+    old = run("inertia", arm / "arm.step", "--bom", arm / "bom.csv", "--json").json()
+    new = run("inertia", fresh, "--bom", arm / "bom.csv", "--json").json()
+    for left, right in zip(old["links"], new["links"], strict=True):
+        assert left["mass"] == pytest.approx(right["mass"], rel=1e-9)
+        assert np.allclose(left["inertia"], right["inertia"], rtol=1e-8, atol=1e-12)
+
+
+def test_mujoco_loads_the_example(run: Run, arm: Path) -> None:
+    """The strict consumer takes the URDF, and the arm weighs what the report says."""
+    mujoco = pytest.importorskip("mujoco")
+    run("inertia", arm / "arm.step", "--bom", arm / "bom.csv", "--urdf", arm / "arm.urdf")
+    data = run("inertia", arm / "arm.step", "--bom", arm / "bom.csv", "--json").json()
+    text = (arm / "arm.urdf").read_text()
+    floating = '<link name="world"/><joint name="w" type="floating"><parent link="world"/>'
+    floating += '<child link="base_link"/></joint>'
+    model = mujoco.MjModel.from_xml_string(
+        text.replace('<link name="base_link">', floating + '<link name="base_link">')
+    )
+    assert sum(model.body_mass) == pytest.approx(data["total"]["mass"])
+    state = mujoco.MjData(model)
+    mujoco.mj_forward(model, state)
+    # At position zero the whole stands as in the STEP file, so that the centres agree as well.
+    assert state.subtree_com[0] == pytest.approx(data["total"]["com"], abs=1e-9)
+
+
+def test_frames(run: Run, arm: Path) -> None:
+    """The same link in the assembly's, its own and the URDF's frame: the centre moves, the moments stay."""
+    found = {}
+    for frame in ("assembly", "own", "urdf"):
+        urdf = ["--urdf", arm / "arm.urdf", "--urdf-out", arm / "out.urdf"] if frame == "urdf" else []
+        ran = run("inertia", arm / "arm.step", "--bom", arm / "bom.csv", "--json", "--frame", frame, *urdf)
+        found[frame] = by_name(ran.json()["links"])["forearm"]
+    assert found["assembly"]["com"][2] - found["own"]["com"][2] == pytest.approx(0.42)
+    assert found["own"]["com"] == pytest.approx(found["urdf"]["com"])
+    for link in found.values():
+        assert link["principal_moments"] == pytest.approx(found["assembly"]["principal_moments"])
+    assert "assembly frame" in found["assembly"]["frame"]["description"]
+    assert "URDF" in found["urdf"]["frame"]["description"]
+
+
+def test_link_map_and_loose_parts(run: Run, arm: Path) -> None:
+    """Two links by patterns, the rest given to a third."""
+    (arm / "map.yaml").write_text("links:\n  arm: [upper_arm, forearm]\n  hand: ['gripper/**']\n", "utf-8")
+    common = ["inertia", arm / "arm.step", "--bom", arm / "bom.csv", "--json", "--links", arm / "map.yaml"]
+    data = run(*common).json()
+    assert [link["name"] for link in data["links"]] == ["arm", "hand"]
+    assert {part["path"].split("/")[0] for part in data["unclaimed"]} == {"base_link"}
+    loose = run(*common, "--loose", "base").json()
+    assert [link["name"] for link in loose["links"]] == ["arm", "hand", "base"]
+    assert loose["unclaimed"] == []
+
+
+def test_reports_of_every_kind(run: Run, arm: Path) -> None:
+    """JSON, CSV and Markdown by suffix, beside the table on the terminal."""
+    files = [arm / f"report{suffix}" for suffix in (".json", ".csv", ".md")]
+    options = [word for file in files for word in ("--report", file)]
+    ran = run("inertia", arm / "arm.step", "--bom", arm / "bom.csv", *options)
+    assert ran.code == 0
+    assert "Servo case" in ran.out
+    assert "whole assembly" in ran.out
+    assert json.loads(files[0].read_text("utf-8"))["format"] == "silo-inertia/1"
+    assert len(list(csv.reader(files[1].read_text("utf-8").splitlines()))) == 20
+    assert "## Warnings" in files[2].read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"), [("urdf", "<inertia ixx"), ("sdf", "<ixx>"), ("mjcf", "fullinertia")]
+)
+def test_snippets(run: Run, arm: Path, kind: str, words: str) -> None:
+    """To paste: the elements, and nothing else on standard output."""
+    ran = run("inertia", arm / "arm.step", "--bom", arm / "bom.csv", "--snippet", kind)
+    assert ran.out.count(words) == 4
+    assert ran.out.startswith("<")
+
+
+def test_strict_and_allow(run: Run, arm: Path) -> None:
+    """Any warning is a failure, unless it is allowed by its code."""
+    command = ["inertia", arm / "arm.step", "--bom", arm / "bom.csv", "--strict"]
+    ran = run(*command)
+    assert ran.code == 1
+    assert "mass_rounded" in ran.err
+    allowed = ["mass_rounded", "no_mass_no_material", "row_unused", "sub_assembly_mass_shared"]
+    assert run(*command, *(word for code in allowed for word in ("--allow", code))).code == 0
+
+
+def test_bom_and_material_options_reach_the_calculation(run: Run, arm: Path) -> None:
+    """Renamed columns, decimal comma, grams, a table of one's own, the default density."""
+    (arm / "ours.csv").write_text("Kurztext;Gew.;Stoff\nPalm;100,5;\nFinger;;house blend\n", "utf-8")
+    (arm / "mat.csv").write_text("name,density\nhouse blend,2000\n", "utf-8")
+    ran = run(
+        "inertia", arm / "arm.step", "--bom", arm / "ours.csv", "--json",
+        "--column", "name=Kurztext", "--column", "mass=Gew.", "--column", "material=Stoff", "--decimal", ",",
+        "--mass-unit", "g", "--materials", arm / "mat.csv", "--default-density", "500",
+    )  # fmt: skip
+    gripper = by_name(by_name(ran.json()["links"])["gripper"]["parts"])
+    assert gripper["Palm"]["mass"] == pytest.approx(0.1005)
+    assert gripper["Finger"]["density"] == 2000
+    assert gripper["Camera"]["density"] == 500
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--bom", "none.csv"], "none.csv"),
+        (["--links", "none.yaml"], "none.yaml"),
+        (["--urdf", "none.urdf"], "none.urdf"),
+        (["--report", "out.docx"], ".json, .csv, .md"),
+        (["--report", "nowhere/out.json"], "no folder"),
+        (["--preview", "out.jpg"], ".glb and .png"),
+        (["--frame", "urdf"], "needs --urdf"),
+        (["--urdf-out", "x.urdf"], "needs --urdf"),
+        (["--default-density", "0"], "above 0"),
+        (["--column", "mass"], "ROLE=HEADER"),
+        (["--materials", "none.csv"], "none.csv"),
+    ],
+)
+def test_mistakes_are_one_plain_sentence(
+    run: Run, arm: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], message: str
+) -> None:
+    """Told before the geometry is read, exit code 2, no trace."""
+    monkeypatch.chdir(arm)
+    ran = run("inertia", "arm.step", *words)
+    assert ran.code == 2
+    assert message in ran.err
+    assert len(ran.err.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize("data", [b"", b"not a step file", b"ISO-10303-21;\nHEADER;\n"])
+def test_bad_geometry_is_one_plain_sentence(run: Run, arm: Path, data: bytes) -> None:
+    """Case 17 through the command: empty, foreign, cut off."""
+    (arm / "bad.step").write_bytes(data)
+    ran = run("inertia", arm / "bad.step")
+    assert ran.code == 2
+    assert "bad.step" in ran.err
+    assert "Traceback" not in ran.err
+
+
+def test_a_urdf_of_another_robot_is_refused(run: Run, arm: Path) -> None:
+    """None of its links is ours: nothing is written, and both lists are named."""
+    other = arm / "other.urdf"
+    other.write_text('<robot name="r"><link name="torso"/></robot>', "utf-8")
+    ran = run("inertia", arm / "arm.step", "--bom", arm / "bom.csv", "--urdf", other)
+    assert ran.code == 2
+    assert "torso" in ran.err
+    assert "base_link" in ran.err
+    assert other.read_text("utf-8") == '<robot name="r"><link name="torso"/></robot>'
+
+
+def test_ctrl_c_is_a_plain_sentence(arm: Path) -> None:
+    """Cancelled while reading: exit 130, one line, no trace, no child left behind."""
+    # A terminal of its own makes the progress bar appear: it says when the reading has begun.
+    parent, child = pty.openpty()
+    process = subprocess.Popen(
+        [sys.executable, "-m", "silo.cli.main", "inertia", str(arm / "arm.step"), "--no-cache"],
+        stdout=subprocess.PIPE,
+        stderr=child,
+        start_new_session=True,
+    )
+    os.close(child)
+    seen = b""
+    deadline = time.monotonic() + 60
+    while b"arm.step" not in seen and time.monotonic() < deadline:
+        seen += os.read(parent, 4096)
+    process.send_signal(signal.SIGINT)
+    out, _ = process.communicate(timeout=60)
+    rest = b""
+    try:
+        while piece := os.read(parent, 4096):
+            rest += piece
+    except OSError:  # the terminal's other end is closed: all was read
+        pass
+    os.close(parent)
+    assert process.returncode == 130
+    assert out == b""
+    assert b"Cancelled." in rest
+    assert b"Traceback" not in seen + rest

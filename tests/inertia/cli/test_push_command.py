@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""``--push`` against a real embedded server: properties, revisions, the roll-up."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from silo.api.client import SiloClient
+from silo_server.run import running_server
+
+Run = Callable[..., Any]
+
+
+@pytest.fixture
+def client(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[SiloClient]:
+    """A running server that the environment names."""
+    token = "silo_" + "c1" * 20
+    with running_server(f"sqlite:///{tmp_path / 'silo.db'}", token=token) as server:
+        monkeypatch.setenv("SILO_API_URL", server.base_url)
+        monkeypatch.setenv("SILO_API_TOKEN", token)
+        with SiloClient(server.base_url, token) as found:
+            yield found
+
+
+def item_for(client: SiloClient, name: str, category: str, **properties: Any) -> str:
+    return client.create_item("kindred-rd", category, name, name=name, properties=properties).part_number
+
+
+def test_push_writes_properties_once_and_the_roll_up_uses_them(
+    run: Run, arm: Path, client: SiloClient
+) -> None:
+    """A BOM with the server's numbers: the items get masses, the assembly's roll-up adds them up."""
+    category = next(iter(client.categories()))
+    plate = item_for(client, "Base plate", category, finish="painted")
+    column = item_for(client, "Column", category)
+    top = client.create_item("kindred-rd", category, "Arm", name="Arm", item_type="assembly").part_number
+    bom = arm / "silo.csv"
+    bom.write_text(
+        "Part number,Name,Quantity,Material,Mass\n"
+        f"{plate},Base plate,1,,0.688 kg\n{column},Column,1,Aluminum,\n",
+        "utf-8",
+    )
+    ran = run("inertia", arm / "arm.step", "--bom", bom, "--push", "--json")
+    assert ran.code == 0
+    assert "2 items written" in ran.err
+    assert "Not written: Camera" in ran.err
+    found = client.get_item(plate)
+    assert found.properties["finish"] == "painted"
+    assert found.properties["mass_kg"] == 0.688
+    assert found.properties["volume_m3"] == pytest.approx(2.5463e-4, rel=1e-3)
+    assert found.properties["com_m"] == pytest.approx([0, 0, 0.005], abs=1e-9)
+    newest = client.revisions(plate)[0]
+    assert newest.comment == "Mass properties from arm.step and silo.csv"
+    again = run("inertia", arm / "arm.step", "--bom", bom, "--push", "--json")
+    assert "0 items written, 2 had these numbers already" in again.err
+    assert client.revisions(plate)[0].revision_number == newest.revision_number
+    rolled = roll_up(client, top, {plate: 1, column: 2})
+    assert rolled["total_mass_kg"] == pytest.approx(0.688 + 2 * client.get_item(column).properties["mass_kg"])
+
+
+def roll_up(client: SiloClient, top: str, children: dict[str, int]) -> Any:
+    """The server's own mass of an assembly."""
+    from silo.api.wire import MergeEntry, MergeRequest
+
+    entries = [MergeEntry(child_part_number=number, quantity=count) for number, count in children.items()]
+    client.merge_bom(top, MergeRequest(entries=entries))
+    return client._get("its mass", "items", top, "bom", "mass").mapping()
+
+
+def test_dry_run_asks_no_server(run: Run, arm: Path) -> None:
+    """The plan, without a server anywhere."""
+    ran = run("inertia", arm / "arm.step", "--bom", arm / "bom.csv", "--push", "--dry-run", "--json")
+    assert ran.code == 0
+    assert "F02-0001  Base plate: 0.688 kg" in ran.err
+    assert "Not written: Cable duct" in ran.err
+
+
+def test_unknown_items_are_told(run: Run, arm: Path, client: SiloClient) -> None:
+    """Exit 1, with their numbers."""
+    ran = run("inertia", arm / "arm.step", "--bom", arm / "bom.csv", "--push", "--json")
+    assert ran.code == 1
+    assert "Unknown to the server" in ran.err
+    assert "F02-0001" in ran.err

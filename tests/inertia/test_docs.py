@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The page about mass and inertia names what the program has."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from pathlib import Path
+
+import pytest
+
+from silo.cli import inertia, mass
+from silo.inertia.bom import BomCode
+from silo.inertia.codes import Decided, MassCode, Rule, Source
+from silo.inertia.model import GeometryCode
+
+DOCS = Path(__file__).parents[2] / "docs"
+PAGE = (DOCS / "inertia.md").read_text("utf-8")
+
+
+@pytest.mark.parametrize("code", [*MassCode, *BomCode, *GeometryCode, *Source, *Rule], ids=str)
+def test_every_code_is_documented(code: str) -> None:
+    """A warning that nobody can look up helps nobody."""
+    if code == Rule.NONE:
+        return
+    assert f"`{code}`" in PAGE
+
+
+def test_every_option_of_the_page_exists() -> None:
+    """Options named in the text are those of the commands."""
+    parser = argparse.ArgumentParser()
+    commands = parser.add_subparsers()
+    inertia.register(commands)
+    mass.register(commands)
+    known = {option for one in commands.choices.values() for option in one._option_string_actions}
+    named = set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", PAGE))
+    assert named <= known, named - known
+    assert Decided.ORDER in PAGE
+
+
+def test_links_of_the_page_lead_somewhere() -> None:
+    """Relative links point at files."""
+    for target in re.findall(r"\]\(([^)#]+)\)", PAGE):
+        if "://" not in target:
+            assert (DOCS / target).exists(), target
+
+
+def test_the_python_example_runs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """What the page shows is what the library does."""
+    arm = DOCS.parent / "examples" / "arm"
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    (tmp_path / "arm.step").write_bytes((arm / "arm.step").read_bytes())
+    (tmp_path / "link.step").write_bytes((arm / "arm.step").read_bytes())
+    (tmp_path / "bom.csv").write_bytes((arm / "bom.csv").read_bytes())
+    (tmp_path / "map.yaml").write_text("links: {upper_arm: [upper_arm]}\n", "utf-8")
+    (block,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    names: dict[str, object] = {}
+    exec(compile(block, "docs/inertia.md", "exec"), names)
+    report = names["report"]
+    assert report.link_properties["upper_arm"].mass > 1  # type: ignore[attr-defined]
