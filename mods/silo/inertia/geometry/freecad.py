@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""FreeCAD documents: the shapes inside FCStd files, placed as FreeCAD places them, measured by the same engine."""
+"""FreeCAD documents: the shapes in FCStd files, placed as FreeCAD places them, measured as all others."""
 
 from __future__ import annotations
 

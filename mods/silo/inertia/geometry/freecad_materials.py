@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """What an FCStd file says of an object's material.
 
-Two ways: FreeCAD >= 1.0 gives each shape a ``ShapeMaterial``, of which the file holds the id only, so that the
-density is in the cards of an installed FreeCAD; and any version may link a material object (``Material``),
-which carries name and density itself.
+Two ways: FreeCAD >= 1.0 gives each shape a ``ShapeMaterial``, of which the file holds the id only, so that
+the density is in the cards of an installed FreeCAD; and any version may link a material object
+(``Material``), which carries name and density itself.
 """
 
 from __future__ import annotations
@@ -64,8 +64,8 @@ def _from_card(uuid: str) -> Material:
     text = _card(uuid)
     if text is None:
         return Material(
-            problem=f"its material (id {uuid}) is in no material library found on this machine; install FreeCAD, "
-            "or name its cards in FREECAD_MATERIALS"
+            problem=f"its material (id {uuid}) is in no material library found on this machine; install "
+            "FreeCAD, or name the folder of its cards in FREECAD_MATERIALS"
         )
     name = _NAME.search(text)
     density = _inherited_density(text, depth=0)

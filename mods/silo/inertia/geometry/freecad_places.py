@@ -44,7 +44,7 @@ def placement(obj: Any, name: str = "Placement") -> Floats:
 
 
 def placed(numbers: Floats) -> Floats:
-    """(4, 4) from x y z and the quaternion x y z w (FreeCAD's order); the identity where it is no rotation."""
+    """(4, 4) from x y z and the quaternion x y z w, as FreeCAD orders it; identity where it is none."""
     x, y, z, w = numbers[3:7]
     norm = x * x + y * y + z * z + w * w
     matrix = np.eye(4)
@@ -61,7 +61,7 @@ def placed(numbers: Floats) -> Floats:
 
 
 def link_placement(link: Any) -> Floats:
-    """A link's own placement; FreeCAD keeps ``Placement`` and ``LinkPlacement`` equal where there are both."""
+    """A link's own placement; FreeCAD keeps ``Placement`` and ``LinkPlacement`` equal where both exist."""
     names = getattr(link, "PropertiesList", ())
     return placement(link, "Placement" if "Placement" in names else "LinkPlacement")
 

@@ -14,6 +14,7 @@ operands of a cut), and of that the visible, where any is.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -105,7 +106,7 @@ class Walk:
     # --- products ------------------------------------------------------------------------------------------
 
     def product(self, obj: Any, copies: Any = None) -> str:
-        """The key of the product that ``obj`` is, in its own axes. ``copies``: a flexible AssemblyLink of it."""
+        """The key of the product ``obj``, in its own axes; ``copies``: a flexible AssemblyLink of it."""
         self.documents.add(_file(obj))
         key = self._key(obj)
         if copies is not None:
@@ -157,7 +158,7 @@ class Walk:
 
     def _key(self, obj: Any) -> str:
         path = _file(obj)
-        return f"{path.removeprefix(self.base).lstrip('/')}#{object_name(obj)}"
+        return f"{_relative(path, self.base)}#{object_name(obj)}"
 
     def _name(self, obj: Any) -> str:
         document = getattr(obj, "Document", None)
@@ -192,9 +193,7 @@ class Walk:
             seen.add(name)
             kind = kind_of(member)
             if own(member, "Suppressed") is True or own(member, "SiloBomExclude") is True:
-                self.note(
-                    "not_counted", f"{label_of(member)} is suppressed or excluded, and has no mass here"
-                )
+                self.note("not_counted", f"{label_of(member)} is suppressed or excluded: no mass")
             elif kind is Kind.FOLDER:
                 yield from self._flat(member, seen)
             elif kind in (Kind.LOCAL, Kind.FOREIGN):
@@ -301,7 +300,7 @@ class Walk:
             else:
                 self.note(
                     "in_document",
-                    f"{label_of(link)} links within its own document: it has a mass, and is no line of the BOM",
+                    f"{label_of(link)} links within its own document: it has a mass, but no line in the BOM",
                 )
 
 
@@ -309,6 +308,13 @@ def _metres(matrix: Floats) -> Floats:
     result = matrix.copy()
     result[:3, 3] *= 1e-3
     return result
+
+
+def _relative(path: str, base: str) -> str:
+    try:
+        return os.path.relpath(path, base).replace("\\", "/")
+    except ValueError:  # another drive
+        return path
 
 
 def _file(obj: Any) -> str:

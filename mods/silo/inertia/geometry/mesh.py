@@ -17,6 +17,9 @@ from silo.inertia.model import SolidProps
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
+PICTURE_TRIANGLES = 120_000
+"""The most triangles that are kept of one prototype; a populated circuit board has millions."""
+
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
@@ -133,3 +136,23 @@ def is_inside(inner: Mesh, outer: Mesh) -> bool:
     """True where ``inner`` begins inside ``outer`` (their surfaces are taken not to cross)."""
     point = inner.vertices[inner.faces[0]].mean(axis=0)
     return abs(winding_number(outer, point)) > 0.5
+
+
+def simplified(mesh: Mesh, most: int) -> Mesh:
+    """The mesh for a picture, with about ``most`` triangles at most: near vertices made one (clustering).
+
+    Its volume is not to be trusted any more; small meshes are left as they are.
+    """
+    cells = 512
+    while len(mesh) > most and cells >= 8:
+        low = mesh.vertices.min(axis=0)
+        grid = np.floor((mesh.vertices - low) / max(float(mesh.extents.max()) / cells, 1e-12)).astype(
+            np.int64
+        )
+        code = (grid[:, 0] * (cells + 1) + grid[:, 1]) * (cells + 1) + grid[:, 2]
+        _, first, place = np.unique(code, return_index=True, return_inverse=True)
+        faces = place.reshape(-1)[mesh.faces]
+        flat = (faces[:, 0] == faces[:, 1]) | (faces[:, 1] == faces[:, 2]) | (faces[:, 2] == faces[:, 0])
+        mesh = Mesh(mesh.vertices[first], np.unique(faces[~flat], axis=0))
+        cells //= 2
+    return mesh

@@ -8,34 +8,45 @@ Rules of this module, each found on real files:
 * Integrated with the solid moved to the origin: from afar the tensor is the difference of huge numbers.
 * A negative volume is a reversed shell. Its sign is turned, and said.
 * The tessellation is integrated as well, by other code. Where both disagree the geometry is bad.
+* A solid that stands in a product fifty times (the pins of a connector) is measured once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from OCP.Bnd import Bnd_Box
-from OCP.BRep import BRep_Tool
-from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepGProp import BRepGProp
-from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.gp import gp_Trsf, gp_Vec
 from OCP.GProp import GProp_GProps
-from OCP.TopAbs import TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
 
 from silo.inertia.core import combine_arrays, place
 from silo.inertia.geometry import occt
-from silo.inertia.geometry.mesh import Floats, Mesh, is_inside, joined, mesh_solid, mesh_volume
+from silo.inertia.geometry.mesh import (
+    PICTURE_TRIANGLES,
+    Floats,
+    Mesh,
+    is_inside,
+    joined,
+    mesh_solid,
+    mesh_volume,
+    simplified,
+)
+from silo.inertia.geometry.tessellate import (
+    MM,
+    box,
+    cross_check,
+    in_metres,
+    tessellated,
+    triangles,
+    trsf_matrix,
+    xyz,
+)
 from silo.inertia.model import GeometryCode, GeometryProblem, SolidProps
-
-MM = 1e-3
-"""The kernel counts in mm."""
 
 MESH_TOLERANCE = 0.02
 """|V_mesh - V_brep| / V above this is bad geometry: all valid parts of 280 real ones stay below 0.7 %."""
@@ -43,17 +54,14 @@ MESH_TOLERANCE = 0.02
 CONVERGED = 1e-6
 """The integration's own error estimate above this says that it did not reach its tolerance."""
 
+SMALL = 0.1
+"""Size of a solid in sizes of its product, below which its picture may be coarse."""
+
 NEAR = 50.0
 """Distance from the origin, in sizes of the solid, up to where integrating from there costs no digits."""
 
 FAR_AWAY = 1e4
 """Distance from the origin, in sizes of the solid, from where coordinates themselves lose digits."""
-
-_LEVELS = ((0.005, 0.3), (0.002, 0.2), (0.001, 0.12))
-"""Linear deflection (in diagonals of the box) and angle (rad): the first is enough for a picture and for most
-parts; the finer ones make sure before a part is accused."""
-
-_SUSPICIOUS = 0.008
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,18 +90,25 @@ class Measured:
 def measure(shapes: list[Any], *, eps: float, mesh_check: bool) -> Measured:
     """All solids of ``shapes``, in their common axes."""
     problems: list[GeometryProblem] = []
-    found = [solid for shape in shapes for solid in occt.solids_of(shape)]
     pairs: list[tuple[SolidProps, Mesh | None]] = []
+    known: dict[tuple[int, Any], _Bare] = {}
+    found = [solid for shape in shapes for solid in occt.solids_of(shape)]
+    picture = _Picture.of(shapes, len(found)) if mesh_check else None
     for number, solid in enumerate(found, start=1):
-        props, mesh = _solid(solid, eps, mesh_check, _noter(problems, number, len(found)))
-        if props is not None:
-            pairs.append((props, mesh))
+        # The kernel's shared body of equal solids; kept in _Bare, so that its id stays its own.
+        body = solid.TShape()
+        key = (id(body), solid.Orientation())
+        if key not in known:
+            known[key] = _measured(solid.Located(TopLoc_Location()), body, eps, picture)
+            where = f"solid {number} of {len(found)}: " if len(found) > 1 else ""
+            problems += [GeometryProblem(code, where + message) for code, message in known[key].notes]
+        pairs += _placed(known[key], trsf_matrix(solid.Location().Transformation()))
+    solids = _without_cavities(pairs, problems)
     meshes = [mesh for _, mesh in pairs if mesh is not None]
     bare = [] if found else [shape for shape in shapes if occt.faces_of(shape)]
     if mesh_check and bare:
-        meshes = [_tessellated(shape, *_LEVELS[0])[0] for shape in bare]
-    solids = _without_cavities(pairs, problems)
-    whole = joined(meshes) if meshes else None
+        meshes = [tessellated(shape)[0] for shape in bare]
+    whole = simplified(joined(meshes), PICTURE_TRIANGLES) if meshes else None
     wires = any(occt.has_edges(shape) for shape in shapes)
     return Measured(solids, tuple(problems), whole, bool(found or bare), wires)
 
@@ -136,62 +151,88 @@ def _minus(body: SolidProps, cavity: SolidProps) -> SolidProps:
     return SolidProps(rest.mass, rest.com, rest.inertia, body.reversed)
 
 
-Note = Callable[[GeometryCode, str], None]
+@dataclass(frozen=True, slots=True)
+class _Picture:
+    """What a product's picture asks of one solid's mesh: the product's size [mm], and triangles at most."""
+
+    size: float
+    triangles: int
+
+    @classmethod
+    def of(cls, shapes: list[Any], solids: int) -> _Picture:
+        """Each solid may have four times its share, for most need less."""
+        share = 4 * PICTURE_TRIANGLES // max(solids, 1)
+        return cls(max((box(shape)[1] for shape in shapes), default=0.0), max(share, 500))
 
 
-def _noter(problems: list[GeometryProblem], number: int, count: int) -> Note:
-    where = f"solid {number} of {count}: " if count > 1 else ""
-
-    def note(code: GeometryCode, message: str) -> None:
-        problems.append(GeometryProblem(code, where + message))
-
-    return note
+Notes = list[tuple[GeometryCode, str]]
 
 
-def _solid(solid: Any, eps: float, mesh_check: bool, note: Note) -> tuple[SolidProps | None, Mesh | None]:
+@dataclass(frozen=True, eq=False)
+class _Bare:
+    """One solid in the axes of its bare geometry; ``props`` None where it has no volume."""
+
+    body: Any
+    props: SolidProps | None
+    mesh: Mesh | None
+    notes: Notes
+
+
+def _measured(solid: Any, body: Any, eps: float, picture: _Picture | None) -> _Bare:
+    notes: Notes = []
     if not all(occt.has_surface(face) for face in occt.faces_of(solid)):
-        return _triangulated_solid(solid, note)
-    props = _integrated(solid, eps, note)
+        return _Bare(body, *_triangulated_solid(solid, notes), notes)
+    props = _integrated(solid, eps, notes)
     if not BRepCheck_Analyzer(solid).IsValid():
-        note(GeometryCode.INVALID_SHAPE, "the geometry kernel's own check finds this shape invalid")
-    mesh = _cross_checked(solid, props, note) if mesh_check else None
-    return props, mesh
+        notes.append((GeometryCode.INVALID_SHAPE, "the geometry kernel's own check finds this shape invalid"))
+    mesh = _checked_mesh(solid, props, picture, notes) if picture is not None else None
+    return _Bare(body, props, mesh, notes)
 
 
-def _integrated(solid: Any, eps: float, note: Note) -> SolidProps | None:
-    # The kernel integrates in the axes of the bare geometry and applies the location afterwards. So do we,
-    # but with our own algebra; only the bare geometry's distance from its origin can cost digits.
-    location = trsf_matrix(solid.Location().Transformation())
-    bare = solid.Located(TopLoc_Location())
-    centre, size = _box(bare)
+def _placed(bare: _Bare, location: Floats) -> list[tuple[SolidProps, Mesh | None]]:
+    """The solid where it stands, with our own algebra; empty where it has no volume."""
+    if bare.props is None:
+        return []
+    props, mesh = bare.props, bare.mesh
+    if np.array_equal(location, np.eye(4)):
+        return [(props, mesh)]
+    matrix = in_metres(location)
+    volumes, coms, units = place([props.volume_m3], [props.com_m], [props.inertia_unit], [matrix])
+    if mesh is not None:
+        mirrored = np.linalg.det(matrix[:3, :3]) < 0
+        faces = mesh.faces[:, ::-1] if mirrored else mesh.faces
+        mesh = Mesh(mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3], faces)
+    return [(SolidProps(float(volumes[0]), coms[0], units[0], props.reversed), mesh)]
+
+
+def _integrated(solid: Any, eps: float, notes: Notes) -> SolidProps | None:
+    centre, size = box(solid)
     distance = float(np.linalg.norm(centre))
     if distance > NEAR * size > 0:
-        bare = _rebuilt(bare, -centre)
+        solid = _rebuilt(solid, -centre)
     else:
         centre = np.zeros(3)
     system = GProp_GProps()
-    error = float(BRepGProp.VolumeProperties_s(bare, system, eps, False, False))
+    error = float(BRepGProp.VolumeProperties_s(solid, system, eps, False, False))
     volume = float(system.Mass())
     if not np.isfinite(volume) or volume == 0.0:
-        note(GeometryCode.INVALID_SHAPE, "the solid has no volume that can be computed; it is left out")
+        notes.append(
+            (GeometryCode.INVALID_SHAPE, "the solid has no volume that can be computed; it is left out")
+        )
         return None
     if error > CONVERGED:
-        note(
-            GeometryCode.NOT_CONVERGENT,
-            f"the volume integration stopped at a relative error of {error:.1g}, wanted {eps:.1g}",
-        )
+        message = f"the volume integration stopped at a relative error of {error:.1g}, wanted {eps:.1g}"
+        notes.append((GeometryCode.NOT_CONVERGENT, message))
     if distance > FAR_AWAY * size > 0:
-        note(
-            GeometryCode.BAKED,
+        message = (
             f"the geometry lies {distance * MM:.3g} m from its own origin, {distance / size:.0f} times its "
-            "size; its coordinates have lost digits",
+            "size; its coordinates have lost digits"
         )
+        notes.append((GeometryCode.BAKED, message))
     if volume < 0:
-        note(
-            GeometryCode.NEGATIVE_VOLUME,
-            f"the solid is inside out (volume {volume * MM**3:.6g} m3); its sign was turned",
-        )
-    return _props(system, centre, location)
+        message = f"the solid is inside out (volume {volume * MM**3:.6g} m3); its sign was turned"
+        notes.append((GeometryCode.NEGATIVE_VOLUME, message))
+    return _props(system, centre)
 
 
 def _rebuilt(shape: Any, offset: Floats) -> Any:
@@ -200,120 +241,40 @@ def _rebuilt(shape: Any, offset: Floats) -> Any:
     return BRepBuilderAPI_Transform(shape, step, True).Shape()
 
 
-def _props(system: GProp_GProps, centre: Floats, location: Floats) -> SolidProps:
+def _props(system: GProp_GProps, centre: Floats) -> SolidProps:
     volume = float(system.Mass())
     sign = -1.0 if volume < 0 else 1.0
-    com, tensor = system.CentreOfMass(), system.MatrixOfInertia()
+    tensor = system.MatrixOfInertia()
     inertia = np.array([[tensor.Value(i, j) for j in (1, 2, 3)] for i in (1, 2, 3)])
-    volumes, coms, units = place(
-        [sign * volume * MM**3],
-        [(np.array(_xyz(com)) + centre) * MM],
-        [sign * inertia * MM**5],
-        [in_metres(location)],
-    )
-    return SolidProps(float(volumes[0]), coms[0], units[0], reversed=volume < 0)
+    com = (np.array(xyz(system.CentreOfMass())) + centre) * MM
+    return SolidProps(sign * volume * MM**3, com, sign * inertia * MM**5, reversed=volume < 0)
 
 
-def _triangulated_solid(solid: Any, note: Note) -> tuple[SolidProps | None, Mesh | None]:
+def _triangulated_solid(solid: Any, notes: Notes) -> tuple[SolidProps | None, Mesh | None]:
     """A solid whose faces are triangles without surfaces (AP242 tessellated): its polyhedron is exact."""
-    mesh, missing = _triangles(solid)
+    mesh, missing = triangles(solid)
     if missing or not len(mesh) or mesh_volume(mesh) == 0.0:
-        note(
-            GeometryCode.INVALID_SHAPE,
-            "the solid mixes triangles and surfaces, or has neither; it is left out",
-        )
+        message = "the solid mixes triangles and surfaces, or has neither; it is left out"
+        notes.append((GeometryCode.INVALID_SHAPE, message))
         return None, mesh if len(mesh) else None
     props = mesh_solid(mesh)
-    note(GeometryCode.READER, "the solid is given as triangles; its volume is that of the triangles")
+    notes.append((GeometryCode.READER, "the solid is given as triangles, and measured as such"))
     if props.reversed:
-        note(GeometryCode.NEGATIVE_VOLUME, "the solid's triangles look inwards; its sign was turned")
+        message = "the solid's triangles look inwards; its sign was turned"
+        notes.append((GeometryCode.NEGATIVE_VOLUME, message))
     return props, mesh
 
 
-def _cross_checked(solid: Any, props: SolidProps | None, note: Note) -> Mesh:
-    """The solid's mesh for the picture; a note where its volume is not the solid's."""
-    picture: Mesh | None = None
-    for level in _LEVELS:
-        mesh, missing = _tessellated(solid, *level)
-        if picture is None and (not missing or level is _LEVELS[-1]):
-            picture = mesh
-        deviation = _deviation(mesh, props) if props is not None else 0.0
-        if not missing and deviation < _SUSPICIOUS:
-            break
-    if deviation > MESH_TOLERANCE:
-        note(
-            GeometryCode.MESH_MISMATCH,
-            f"its surface mesh encloses a volume that differs by {deviation:.1%}: the geometry is bad, "
-            "and so may be its mass",
+def _checked_mesh(solid: Any, props: SolidProps | None, picture: _Picture, notes: Notes) -> Mesh:
+    small = box(solid)[1] < SMALL * picture.size
+    check = cross_check(solid, props.volume_m3 if props is not None else None, small=small)
+    if check.deviation is not None and check.deviation > MESH_TOLERANCE:
+        message = (
+            f"its surface mesh encloses a volume that differs by {check.deviation:.1%}: the geometry is bad, "
+            "and so may be its mass"
         )
-    elif missing:
-        note(GeometryCode.MESH_MISMATCH, f"{missing} of its faces cannot be meshed; the check is incomplete")
-    return picture if picture is not None else mesh
-
-
-def _deviation(mesh: Mesh, props: SolidProps) -> float:
-    return abs(abs(mesh_volume(mesh)) - props.volume_m3) / props.volume_m3
-
-
-def _tessellated(shape: Any, linear: float, angle: float) -> tuple[Mesh, int]:
-    from OCP.BRepTools import BRepTools
-
-    size = _box(shape)[1]
-    BRepTools.Clean_s(shape)
-    BRepMesh_IncrementalMesh(shape, max(linear * size, 1e-7), False, angle, False)
-    return _triangles(shape)
-
-
-def _triangles(shape: Any) -> tuple[Mesh, int]:
-    """The triangles that lie on a shape's faces, and how many faces have none."""
-    parts: list[Mesh] = []
-    missing = 0
-    for face in occt.faces_of(shape):
-        located = TopLoc_Location()
-        triangulation = BRep_Tool.Triangulation_s(face, located)
-        if triangulation is None:
-            missing += 1
-            continue
-        parts.append(_face_mesh(triangulation, located, face.Orientation() == TopAbs_REVERSED))
-    return joined(parts), missing
-
-
-def _face_mesh(triangulation: Any, located: Any, backwards: bool) -> Mesh:
-    node, triangle = triangulation.Node, triangulation.Triangle
-    points = np.array([_xyz(node(i)) for i in range(1, triangulation.NbNodes() + 1)])
-    faces = np.array([triangle(i).Get() for i in range(1, triangulation.NbTriangles() + 1)]) - 1
-    if not located.IsIdentity():
-        matrix = trsf_matrix(located.Transformation())
-        points = points @ matrix[:3, :3].T + matrix[:3, 3]
-    return Mesh(points * MM, faces[:, ::-1] if backwards else faces)
-
-
-def _xyz(point: Any) -> tuple[float, float, float]:
-    return point.X(), point.Y(), point.Z()
-
-
-def _box(shape: Any) -> tuple[Floats, float]:
-    """Middle (3,) and diagonal [mm] of the shape's box."""
-    box = Bnd_Box()
-    BRepBndLib.Add_s(shape, box)
-    if box.IsVoid():
-        return np.zeros(3), 0.0
-    low, high = np.array(_xyz(box.CornerMin())), np.array(_xyz(box.CornerMax()))
-    return (low + high) / 2, float(np.linalg.norm(high - low))
-
-
-def trsf_matrix(trsf: Any) -> Floats:
-    """A kernel transformation as (4, 4), lengths in mm as the kernel has them."""
-    matrix = np.eye(4)
-    value = trsf.Value
-    for i in range(3):
-        for j in range(4):
-            matrix[i, j] = value(i + 1, j + 1)
-    return matrix
-
-
-def in_metres(matrix: Floats) -> Floats:
-    """The same (4, 4) placement(s), the translation in m instead of mm."""
-    result = matrix.copy()
-    result[..., :3, 3] *= MM
-    return result
+        notes.append((GeometryCode.MESH_MISMATCH, message))
+    elif check.deviation is None and check.missing:
+        message = f"{check.missing} of its faces cannot be meshed, so its volume could not be cross-checked"
+        notes.append((GeometryCode.MESH_MISMATCH, message))
+    return simplified(check.picture, picture.triangles)

@@ -28,7 +28,7 @@ from silo.inertia.geometry.graph import Child, Node
 from silo.inertia.geometry.names import clean, is_generic
 from silo.inertia.geometry.part21 import scan
 from silo.inertia.geometry.products import WANTED, ProductFacts, Products, read_products
-from silo.inertia.geometry.solids import MM, in_metres, trsf_matrix
+from silo.inertia.geometry.tessellate import MM, in_metres, trsf_matrix
 
 
 @dataclass(frozen=True, eq=False)
