@@ -201,7 +201,7 @@ def test_only_marked_entries_are_told() -> None:
     """One link, or one array, needs no advice."""
     marked = entry("bolt", consolidation_warning=True, individual_links=3, link_objects=3)
     (finding,) = consolidation_findings([entry("plate"), marked])
-    assert (finding.code, finding.severity) == (FindingCode.CONSOLIDATION, Severity.INFO)
+    assert (finding.code, finding.severity) == (FindingCode.CONSOLIDATION, Severity.WARNING)
     assert finding.where[0].doc_path == "/v/bolt.FCStd"
 
 
