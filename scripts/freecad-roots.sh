@@ -239,7 +239,7 @@ case "${1:-build}" in
   build-one) build_one "$2" ;;
   list | --list) list ;;
   run) shift; [ $# -ge 2 ] || { say "run NAME COMMAND…"; exit 2; }; run_in "$@" ;;
-  remove) shift; [ -n "${1:-}" ] || { say "remove NAME"; exit 2; }
-    rm -rf --one-file-system "${CACHE:?}/$1" "$CACHE/bin/$1" "$CACHE/profiles/$1" ;;
+  remove) shift; [ -n "${FREECAD_OF[${1:-none}]:-}" ] || { say "remove one of: ${SUITES[*]}"; exit 2; }
+    rm -rf --one-file-system "${CACHE:?}/$1" "${CACHE:?}/bin/$1" "${CACHE:?}/profiles/$1" ;;
   *) sed -n '3,/^set/p' "$SELF" | sed -n 's/^# \{0,1\}//p'; exit 2 ;;
 esac

@@ -10,7 +10,7 @@ Started with its arguments in the environment (FreeCAD would open anything else 
 written there one JSON object per line as they are finished: that is how ``silo-mod … --via freecad`` asks.
 Otherwise they are synced with the server of ``SILO_API_URL`` and ``SILO_API_TOKEN`` (or the configuration).
 
-Exit codes: 0 done, 1 something was left undone, 2 bad arguments, 3 the server cannot be used.
+Exit codes: 0 done, 1 something was left undone, 2 bad arguments, 3 no server is named or can be reached.
 """
 
 from __future__ import annotations
@@ -22,6 +22,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
+
+if sys.version_info < (3, 11):  # noqa: UP036  (FreeCAD brings its own Python, whatever ours is)
+    sys.exit(f"Silo needs Python 3.11 or newer; this FreeCAD has {sys.version.split()[0]}")
 
 if __name__ == "__main__":
     # Run by path: this very copy of the package is meant, also where an installed add-on was loaded at start.
@@ -102,12 +105,15 @@ def _extractions(tops: list[str], assembly: str | None) -> Iterator[tuple[str, E
     from silo.workbench import host, live
 
     for top in tops:
+        found: Extraction | SiloError
         try:
-            yield top, live.read_checked(top, assembly)
+            found = live.read_checked(top, assembly)
         except SiloError as error:
-            yield top, error
-        # The next file starts from nothing: no half loaded parts of this one, and no memory held.
+            found = error
+        # The next file starts from nothing: no half loaded parts of this one, and no memory held. Before the
+        # result is told, so that what FreeCAD may die of in closing is this file's fault, not the next one's.
         host.close_all()
+        yield top, found
 
 
 def _write_lines(job: Job, out: TextIO) -> int:
