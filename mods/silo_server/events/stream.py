@@ -16,7 +16,6 @@ HEADERS = {
     "cache-control": "no-store",
     "x-accel-buffering": "no",  # nginx passes every event on at once
 }
-HELLO = b": connected\nretry: 2000\n\n"
 HEARTBEAT = b"event: heartbeat\ndata: {}\n\n"
 
 
@@ -77,7 +76,7 @@ class EventStream(Response):
         hub = self._hub
         cursor, reset = await hub.place(self._last)
         # The first bytes tell proxies and clients that the stream stands.
-        await _send(send, HELLO + (_reset(cursor) if reset else b""))
+        await _send(send, _hello(cursor) + (_reset(cursor) if reset else b""))
         beats = hub.beats
         while not hub.closed:
             batch = await hub.take(cursor)
@@ -97,6 +96,11 @@ class EventStream(Response):
     def _payload(self, batch: Batch) -> bytes:
         frames = b"".join(frame.payload for frame in batch.frames if self._filter.passes(frame))
         return _reset(batch.cursor) + frames if batch.reset else frames
+
+
+def _hello(cursor: int) -> bytes:
+    # With the id a listener that is cut off before its first event can ask for what it missed.
+    return f": connected\nid: {cursor}\nretry: 2000\n\n".encode()
 
 
 def _reset(cursor: int) -> bytes:

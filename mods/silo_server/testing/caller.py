@@ -197,6 +197,9 @@ class EventReader:
             if line == "" and "event" in fields:
                 number = fields.get("id")
                 return Event(int(number) if number else None, fields["event"], json.loads(fields["data"]))
+            if line == "":
+                fields.clear()  # the greeting: an id, and no event
+                continue
             name, _, value = line.partition(": ")
             fields[name] = value
 
