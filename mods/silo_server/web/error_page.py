@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Errors as pages in plain words, for browsers; the words are those that the JSON has."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Awaitable, Callable
+from typing import Any, cast
+
+import anyio.to_thread
+from fastapi import FastAPI, Request
+from sqlalchemy.exc import SQLAlchemyError
+from starlette.responses import Response
+
+from silo_server.middleware import SECURITY_HEADERS
+from silo_server.routes.context import find_actor
+from silo_server.values import Actor
+from silo_server.web.guard import LoginNeededError
+from silo_server.web.render import page
+
+Handler = Callable[[Request, Exception], Awaitable[Response]]
+
+TITLES = {
+    400: "That did not work",
+    401: "Please log in",
+    403: "Not allowed",
+    404: "Not found",
+    405: "Not found",
+    409: "Something else is in the way",
+    412: "The BOM changed in between",
+    413: "Too large",
+    429: "Too many attempts",
+    503: "Not possible at the moment",
+}
+
+
+def install(app: FastAPI) -> None:
+    """Give browsers pages where the handlers that ``app`` has give JSON."""
+    for kind, handler in list(app.exception_handlers.items()):
+        if kind is not LoginNeededError:
+            app.add_exception_handler(kind, _for_browsers(cast(Handler, handler)))
+
+
+def wants_page(request: Request) -> bool:
+    """True for a browser that shows a page; the API and programs get JSON."""
+    return not request.url.path.startswith("/api/") and "text/html" in request.headers.get("accept", "")
+
+
+def _for_browsers(handler: Handler) -> Handler:
+    async def answer(request: Request, error: Exception) -> Response:
+        plain = await handler(request, error)
+        return await error_page(request, plain) if wants_page(request) else plain
+
+    return answer
+
+
+async def error_page(request: Request, plain: Response) -> Response:
+    """The page for an error that was answered as JSON."""
+    told: dict[str, Any] = json.loads(bytes(plain.body))
+    response = page(
+        request,
+        "error.html",
+        await anyio.to_thread.run_sync(_actor, request),
+        status=plain.status_code,
+        title=TITLES.get(plain.status_code, "The server made a mistake"),
+        message=_sentence(plain.status_code, told["message"], request),
+        problems=told.get("problems", [])[:50],
+        path=told.get("path", []),
+    )
+    for name in ("retry-after",):
+        if name in plain.headers:
+            response.headers[name] = plain.headers[name]
+    # A fault is answered outside of the middleware that adds these otherwise.
+    response.headers.update(SECURITY_HEADERS)
+    return response
+
+
+def _sentence(status: int, message: str, request: Request) -> str:
+    if message.startswith(("Not Found:", "Method Not Allowed:")):
+        return f"There is no page {request.url.path}."
+    return message[:1].upper() + message[1:] + ("" if message.endswith((".", "?", "!")) else ".")
+
+
+def _actor(request: Request) -> Actor | None:
+    try:
+        return find_actor(request)
+    except SQLAlchemyError:
+        return None

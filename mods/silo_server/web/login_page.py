@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The way in and out: the login form, the one-time link, log out."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request
+from starlette.datastructures import FormData
+from starlette.responses import RedirectResponse, Response
+
+from silo.bom.errors import AuthError
+from silo_server.errors import TooManyAttemptsError
+from silo_server.routes.auth import set_session_cookie
+from silo_server.routes.context import SESSION_COOKIE, ServerDep, client_address, find_actor
+from silo_server.services import logins
+from silo_server.web.forms import Form, back, text
+from silo_server.web.guard import Reader
+from silo_server.web.render import page
+
+router = APIRouter(include_in_schema=False)
+
+START = "/"
+Next = Annotated[str, Query(max_length=500)]
+
+
+def local_path(target: str) -> str:
+    """``target`` where it is a path of this server, else the start page: nobody is sent elsewhere."""
+    plain = target.startswith("/") and not target.startswith(("//", "/\\"))
+    return target if plain and target.isprintable() else START
+
+
+@router.get("/login")
+def login_form(request: Request, next: Next = START) -> Response:
+    """The login form; who is logged in already goes on."""
+    if find_actor(request) is not None:
+        return back(local_path(next))
+    return page(request, "login.html", None, target=local_path(next), problem="")
+
+
+@router.post("/login")
+def log_in(request: Request, server: ServerDep, form: Form) -> Response:
+    """Begin a session and go on to ``next``."""
+    target = local_path(text(form, "next"))
+    try:
+        session = logins.log_in(
+            server.db, text(form, "username", 200), _password(form), client_address(request)
+        )
+    except (AuthError, TooManyAttemptsError) as error:
+        return page(request, "login.html", None, status=error.status_hint, target=target, problem=str(error))
+    return _with_session(request, server, session, target)
+
+
+@router.get("/login/link/{secret}")
+def use_link(request: Request, server: ServerDep, secret: str, next: Next = START) -> Response:
+    """Begin a session by a one-time link; one that was used already leads on where the session lives."""
+    target = local_path(next)
+    try:
+        session = logins.use_login_link(server.db, secret, client_address(request))
+    except AuthError as error:
+        if find_actor(request) is not None:
+            return back(target)
+        return page(request, "login.html", None, status=401, target=target, problem=str(error))
+    return _with_session(request, server, session, target)
+
+
+@router.post("/logout")
+def log_out(server: ServerDep, caller: Reader) -> Response:
+    """End the session."""
+    logins.log_out(server.db, caller)
+    response = RedirectResponse("/login", 303)
+    response.delete_cookie(SESSION_COOKIE)
+    return response
+
+
+def _password(form: FormData) -> str:
+    # Spaces at the ends belong to a password.
+    value = form.get("password")
+    return value[:200] if isinstance(value, str) else ""
+
+
+def _with_session(request: Request, server: ServerDep, session: logins.NewSession, target: str) -> Response:
+    response = back(target)
+    set_session_cookie(response, server, session, request)
+    return response
