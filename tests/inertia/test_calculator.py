@@ -48,7 +48,7 @@ def test_compute_from_step_with_bom_fills_the_report() -> None:
 
 
 def test_a_plain_dict_will_do() -> None:
-    """The spec's Dict[part_name, BOMEntry]: priority mass, material, zero; the rest default density and told."""
+    """The spec's Dict[part_name, BOMEntry]: priority mass, material, zero, else the default, told."""
     entries = {
         "Base plate": BOMEntry("Base plate", None, 1.0),
         "Column": BOMEntry("Column", "steel", None),

@@ -455,3 +455,33 @@ def test_scaled_placement_is_exact_and_told(assemble: Fixture, compute: Fixture,
     report = compute(asm, HEAD + "1,1,,steel,,x\n2,1,,steel,,y\n")
     assert report.total.mass == pytest.approx(9 * 7850 * V)
     assert codes(report) == ["scaled"]
+
+
+def test_a_row_without_children_stands_for_what_is_listed_nowhere(
+    assemble: Fixture, compute: Fixture, part: Fixture, codes: Fixture
+) -> None:
+    """A bolt in the motor has a row of its own; the rest of the motor's mass is the rotor's."""
+    asm = assemble(("arm/motor/rotor", cube("rotor", 0.02)), ("arm/motor/bolt", cube("bolt")))
+    report = compute(asm, HEAD + "1,1,,,0.900 kg,motor\n2,1,,,0.010 kg,bolt\n")
+    assert part(report, "rotor").mass == pytest.approx(0.89)
+    assert part(report, "bolt").mass == pytest.approx(0.01)
+    assert codes(report, "rotor") == ["sub_assembly_mass_shared"]
+
+
+def test_a_mass_without_any_solid_is_spread_evenly_and_told(
+    assemble: Fixture, compute: Fixture, part: Fixture, at: Fixture
+) -> None:
+    """A bought unit of which the file has no solid at all."""
+    asm = assemble(("arm/unit/a", shape_only("a"), at(0, 0, 0)), ("arm/unit/b", shape_only("b"), at(1, 0, 0)))
+    report = compute(asm, HEAD + "1,1,,,0.800 kg,unit\n")
+    assert part(report, "a").mass == pytest.approx(0.4)
+    assert report.links["arm"].props.com == pytest.approx([0.5, 0, 0])
+    assert "as points" in report.warnings[0].message
+
+
+def test_the_order_of_sub_assemblies_does_not_matter(assemble: Fixture, compute: Fixture) -> None:
+    """The innermost row with a mass wins; the outer one is then compared."""
+    asm = assemble(("arm/unit/motor/rotor", cube("rotor")), ("arm/unit/case", cube("case")))
+    rows = "1,1,,,2.000 kg,unit\n1.1,1,,,0.900 kg,motor\n1.2,1,,,1.100 kg,case\n"
+    report = compute(asm, HEAD + rows)
+    assert report.total.mass == pytest.approx(2.0)
