@@ -7,6 +7,7 @@ import json
 import os
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from silo.api.client import SiloClient
 from silo.api.config import resolve_server
@@ -28,6 +29,8 @@ class Online:
     entry, sent, state
         told of a box to show, of a commit that arrived (with lines for the report view), and of the
         connection (kind, reason); from any thread.
+    make_client
+        makes the client of a server; :class:`SiloClient` unless told otherwise.
     """
 
     def __init__(
@@ -38,7 +41,9 @@ class Online:
         entry: Callable[[Entry], None],
         sent: Callable[[Sent, tuple[str, ...]], None],
         state: Callable[[str, str], None],
+        make_client: Callable[[Server], Any] | None = None,
     ) -> None:
+        self._make_client = make_client or _client
         folder = folder or data_folder()
         self._entry, self._sent, self._state = entry, sent, state
         self.sending = Sending(spool, Outbox(folder / "outbox.sqlite3"), tell=self._tell)
@@ -124,6 +129,10 @@ class Online:
     def _tell(self, sent: Sent) -> None:
         self._entry(entries.of_sent(sent, self.client.web_url))
         self._sent(sent, entries.console_lines(sent))
+
+
+def _client(server: Server) -> SiloClient:
+    return SiloClient(server.url, server.token or None, verify=server.verify)
 
 
 def file_server() -> object | None:

@@ -109,27 +109,30 @@ class Sending:
 
         Never raises for what the server or the network does: the report's ``stopped_by`` says it.
         """
-        stopped: SiloError | None = None
         with self.spool.forwarding() as mine:
             if not mine:
                 return SendReport(busy=True)
             for commit in self.spool.waiting():
                 if commit.key in self._refused and not force:
                     continue
-                try:
-                    control.check()
-                    control.progress(commit.snapshot.label)
-                    self._forward(commit, client)
-                except SiloError as error:
-                    if _concerns_all(error):
-                        stopped = error
-                        break
-                    self._refused[commit.key] = str(error)
-                    continue
-                # At once: a person who commits ten files sees the first one arrive, not nothing for long.
-                self._send(client, control, force=True)
-        report = self._send(client, control, force=force)
-        return replace(report, stopped_by=stopped) if stopped is not None else report
+                stopped = self._hand_over(commit, client, control)
+                if stopped is not None:
+                    return SendReport(stopped_by=stopped)
+        return self._send(client, control, force=force)
+
+    def _hand_over(self, commit: Commit, client: SendApi, control: Control) -> SiloError | None:
+        """Bring one commit as far as it goes; the error that makes it useless to go on with the others."""
+        try:
+            control.check()
+            control.progress(commit.snapshot.label)
+            self._forward(commit, client)
+        except SiloError as error:
+            if _concerns_all(error):
+                return error
+            self._refused[commit.key] = str(error)
+            return None
+        # At once: a person who commits ten files sees the first one arrive, not nothing for long.
+        return self._send(client, control, force=True).stopped_by
 
     def waiting(self) -> tuple[Waiting, ...]:
         """What is not sent yet, oldest first."""

@@ -67,6 +67,10 @@ class Session:
         the server settings of the preferences; replaced by :meth:`settings_changed`.
     store
         the keyring; asked in a worker only.
+    folder
+        where commits and outbox are kept; the user's data folder unless told otherwise.
+    make_client
+        makes the client of a server; for tests.
     """
 
     def __init__(
@@ -77,7 +81,9 @@ class Session:
         *,
         told: Told | None = None,
         folder: Path | None = None,
+        make_client: Callable[[Server], Any] | None = None,
     ) -> None:
+        self._make_client = make_client
         self._deliver, self._told, self._folder = deliver, told or Told(), folder
         self._known, self._store = known, store
         self.shown = Shown()
@@ -121,6 +127,7 @@ class Session:
                 entry=lambda entry: self._deliver(lambda: self.add(entry)),
                 sent=lambda sent, lines: self._deliver(lambda: self._arrived(sent, lines)),
                 state=lambda kind, reason: self._deliver(lambda: self._connection(kind, reason)),
+                make_client=self._make_client,
             )
         return self._online
 

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Texts of others, made safe to show."""
+
+from __future__ import annotations
+
+import unicodedata
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from silo.workbench import words
+from silo.workbench.words import counted, plain, quantity
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("Base plate", "Base plate"),
+        ("\x1b[31mred\x1b[0m", "[31mred [0m"),
+        ("one\ntwo\ttabbed", "one two tabbed"),
+        ("a\u202egnp.exe", "a gnp.exe"),
+        ("zero\u200bwidth", "zero width"),
+        ("  wide   blanks ", "wide blanks"),
+        ("<b>bold</b>", "<b>bold</b>"),
+        ("", ""),
+    ],
+)
+def test_text_of_others_is_one_visible_line(text: str, shown: str) -> None:
+    """Control and direction characters become blanks; markup stays what it is: text."""
+    assert plain(text) == shown
+
+
+def test_long_text_is_cut_and_says_so() -> None:
+    """A label of a million letters costs no more than a long one."""
+    assert plain("x" * 1_000_000, 10) == "x" * 9 + "…"
+
+
+def test_text_of_exactly_the_limit_is_whole() -> None:
+    """The mark of a cut stands only where something was cut."""
+    assert plain("x" * 10, 10) == "x" * 10
+
+
+@given(st.text(max_size=300), st.integers(min_value=2, max_value=80))
+def test_whatever_comes_out_is_short_and_harmless(text: str, most: int) -> None:
+    """No length and no character escapes."""
+    shown = plain(text, most)
+    assert len(shown) <= most
+    assert not any(unicodedata.category(c) in ("Cc", "Cf", "Zl", "Zp", "Cs", "Co") for c in shown)
+
+
+def test_one_and_many() -> None:
+    """A count of one has its own sentence."""
+    assert counted(1, "{n} part", "{n} parts") == "1 part"
+    assert counted(2, "{n} part", "{n} parts") == "2 parts"
+    assert counted(0, "{n} part", "{n} parts") == "0 parts"
+
+
+def test_quantities_are_written_short() -> None:
+    """12, never 12.0; unknown is a question mark."""
+    assert [quantity(v) for v in (12.0, 0.5, None)] == ["12", "0.5", "?"]
+
+
+def test_texts_are_translated_by_what_freecad_offers() -> None:
+    """Outside FreeCAD the text stays as it is."""
+    assert words.translate("Silo", "Sync") == "Sync"
+    words.use(lambda context, text: f"{context}:{text[::-1]}")
+    try:
+        assert words.translate("Silo", "Sync") == "Silo:cnyS"
+    finally:
+        words.use(lambda _context, text: text)
