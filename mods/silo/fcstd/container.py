@@ -33,7 +33,9 @@ _CENTRAL_MARK = b"PK\x01\x02"
 _LOCAL_MARK = b"PK\x03\x04"
 _END_MARK = b"PK\x05\x06"
 _LFS_MARK = b"version https://git-lfs.github.com/spec/"
-_TAIL = END.size + 0xFFFF
+_SMALL, _USUAL_TAIL, _TAIL = 1 << 16, 1 << 13, END.size + 0xFFFF
+# Without O_NONBLOCK, opening a named pipe waits until somebody writes to it.
+_FLAGS = os.O_RDONLY | sum(getattr(os, name, 0) for name in ("O_NONBLOCK", "O_BINARY", "O_CLOEXEC"))
 _ENCRYPTED = 0x1 | 0x40 | 0x2000
 STORED, _DEFLATED = 0, 8
 
@@ -109,9 +111,6 @@ class ContainerFile:
         self.state = FileState(0, 0, 0, 0)
         try:
             self.state = self._regular_file()
-            length = min(self.state.size, _TAIL)
-            window_at = self.state.size - length
-            self._window, self._window_at = self._read(window_at, length), window_at
             self.directory = self._directory()
         except BaseException:
             os.close(self._descriptor)
@@ -140,18 +139,27 @@ class ContainerFile:
     def packed(self, entry: Entry, most: int) -> bytes:
         """The packed bytes of an entry, at most ``most``."""
         self._check(entry, most)
-        return self._read(self.data_offset(entry), entry.packed)
+        # With the local header in one go: its extra field is seldom longer than the directory's.
+        length = LOCAL.size + len(entry.name) + entry.packed + 64
+        whole = self._read(entry.offset, max(0, min(length, self.directory.offset - entry.offset)))
+        begin = self._data_at(entry, whole)
+        data = whole[begin : begin + entry.packed]
+        return data if len(data) == entry.packed else self._read(entry.offset + begin, entry.packed)
 
     def data_offset(self, entry: Entry) -> int:
-        """Where an entry's packed bytes begin; the local header must be that of the same entry."""
-        header = self._read(entry.offset, LOCAL.size)
-        fields = LOCAL.unpack(header)
-        name_at = entry.offset + LOCAL.size
-        begin: int = name_at + fields[9] + fields[10]
-        if fields[0] != _LOCAL_MARK or begin + entry.packed > self.directory.offset:
+        """Where an entry's packed bytes begin in the file."""
+        return entry.offset + self._data_at(entry, self._read(entry.offset, LOCAL.size + len(entry.name)))
+
+    def _data_at(self, entry: Entry, local: bytes) -> int:
+        """Where the data begins, from the local header; which must be that of the same entry."""
+        if len(local) < LOCAL.size or not local.startswith(_LOCAL_MARK):
             raise self._error("it is damaged: an entry lies outside its place")
-        if self._read(name_at, fields[9]) != entry.name:
+        fields = LOCAL.unpack_from(local)
+        if local[LOCAL.size : LOCAL.size + fields[9]] != entry.name:
             raise self._error("it is damaged: its directory and its entries disagree")
+        begin: int = LOCAL.size + fields[9] + fields[10]
+        if entry.offset + begin + entry.packed > self.directory.offset:
+            raise self._error("it is damaged: an entry lies outside its place")
         return begin
 
     def read(self, offset: int, length: int) -> bytes:
@@ -175,15 +183,27 @@ class ContainerFile:
         return FileState.of(status)
 
     def _directory(self) -> Directory:
+        size = self.state.size
+        # A small file is read at once. Of a larger one the end, where FreeCAD's comment of 16 bytes stands;
+        # the longest comment that a zip may have is looked for after that.
+        for most in (_SMALL,) if size <= _SMALL else (_USUAL_TAIL, _TAIL):
+            begin = max(0, size - most)
+            self._window, self._window_at = self._read(begin, size - begin), begin
+            if (found := self._end_record()) is not None:
+                return self._directory_at(*found)
+        raise self._no_container()
+
+    def _end_record(self) -> tuple[int, tuple[int, ...]] | None:
+        """The last end record that fits with its comment: where it is, and its fields."""
         window = self._window
         position = window.rfind(_END_MARK)
         while position >= 0:
             if position + END.size <= len(window):
                 fields = END.unpack_from(window, position)
                 if position + END.size + fields[7] <= len(window):
-                    return self._directory_at(self._window_at + position, fields)
+                    return self._window_at + position, fields
             position = window.rfind(_END_MARK, 0, position)
-        raise self._no_container()
+        return None
 
     def _directory_at(self, end: int, fields: tuple[int, ...]) -> Directory:
         _, disk, first_disk, here, count, size, offset, _ = fields
@@ -235,12 +255,8 @@ def _reason(error: Exception) -> str:
 
 
 def _open(path: str) -> int:
-    # Without O_NONBLOCK, opening a named pipe waits until somebody writes to it.
-    flags = (
-        os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
-    )
     try:
-        return os.open(path, flags)
+        return os.open(path, _FLAGS)
     except (FileNotFoundError, NotADirectoryError) as error:
         raise FcstdError(path, "there is no such file", FindingCode.MISSING_FILE) from error
     except (OSError, ValueError) as error:

@@ -34,7 +34,7 @@ _DOUBLES, _FLOATS = Struct("<3d"), Struct("<3f")
 class FcstdDocument:
     """One FCStd file. ``FileName`` is absolute and without symlinks.
 
-    Document properties (``Uid``, ``Meta``, ``Comment``, own ones of FreeCAD >= 0.21) are
+    Document properties (``Company``, ``Id``, ``Comment``, own ones of FreeCAD >= 0.21) are
     attributes.
     """
 
@@ -66,6 +66,16 @@ class FcstdDocument:
     def ProgramVersion(self) -> str:
         """The FreeCAD that wrote the file, such as ``1.0R39319 (Git)``."""
         return self._xml.attribute("ProgramVersion")
+
+    @cached_property
+    def Uid(self) -> str:
+        """FreeCAD's id of the document; a copy of the file has the same."""
+        return self._text("Uid")
+
+    @cached_property
+    def LastModifiedDate(self) -> str:
+        """When FreeCAD saved it, as it says (UTC, seconds); links record it as their ``stamp``."""
+        return self._text("LastModifiedDate")
 
     @property
     def Meta(self) -> Mapping[str, str]:
@@ -182,6 +192,10 @@ class FcstdDocument:
     def _value(self, name: str) -> Any:
         value = self.properties.value(name)
         return value if isinstance(value, str | int | float | dict | tuple) else ABSENT
+
+    def _text(self, name: str) -> str:
+        value = self._value(name)
+        return value if isinstance(value, str) else ""
 
     def _object(self, name: str, kind: str) -> FcstdObject:
         known = self._objects.get(name)

@@ -47,6 +47,8 @@ class FcstdObject:
     Document: FcstdDocument
     properties: Properties
     """The table of what the file holds, for those that want to see more than values."""
+    PropertiesList: tuple[str, ...]
+    """The names of the properties that the file holds (FreeCAD lists its transient ones as well)."""
 
     def __init__(self, document: FcstdDocument, name: str, type_id: str) -> None:
         self.Document = document
@@ -58,11 +60,6 @@ class FcstdObject:
     def isDerivedFrom(self, type_name: str, /) -> bool:
         """As FreeCAD: the type of the object itself, never of a link's target; False for unknown names."""
         return type_name in ancestors(self.TypeId)
-
-    @property
-    def PropertiesList(self) -> tuple[str, ...]:
-        """The names of the properties that the file holds (FreeCAD lists its transient ones as well)."""
-        return self.properties.names
 
     @property
     def Label(self) -> str:
@@ -84,26 +81,25 @@ class FcstdObject:
 
     def __getattr__(self, name: str) -> Any:
         mine = self.__dict__
-        properties = mine.get("properties")
-        if properties is None:
+        if "properties" not in mine:
             self._load()
             if name in mine:
                 return mine[name]
-            properties = self.properties
-        piece = properties.piece(name)
-        if piece is None:
+        properties: Properties = mine["properties"]
+        if name not in properties.numbers:
             raise AttributeError(name)
         # The file does not change while it is open, so the next access need not come here.
-        value = mine[name] = self._value(name, piece)
+        value = mine[name] = self._value(name, properties.piece(name))
         return value
 
     def _load(self) -> None:
         mine = self.__dict__
         properties = mine["properties"] = self.Document.properties_of(self)
+        mine["PropertiesList"] = properties.names
         known = self.Document.values
         for name, piece in properties.kept.items():
-            if (value := known.get(piece, ABSENT)) is not ABSENT:
-                mine[name] = value
+            if piece in known:
+                mine[name] = known[piece]
 
     def __repr__(self) -> str:
         return f"<{self.TypeId} {self.Name} of {self.Document.FileName}>"

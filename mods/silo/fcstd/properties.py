@@ -19,7 +19,7 @@ from silo.fcstd.xmltext import XmlText
 
 _CUT = b'<Property name="'
 _CLOSING = b"</Property>"
-_COUNT = b'<Properties Count="'
+_PROPERTIES = b'<Properties Count="'
 
 # A piece in FreeCAD's own form whose value is one element, empty or with empty elements in it; nearly all
 # that a BOM asks for. Nothing that expat would read in another way: no references, no white space to
@@ -51,14 +51,15 @@ class Shape(NamedTuple):
     prefixes: tuple[bytes, ...]
     numbers: dict[str, int]
     kept: tuple[tuple[str, int], ...]
+    opening: bytes  # the counted start tag
 
     @classmethod
-    def of(cls, names: Iterable[str]) -> Shape:
+    def of(cls, names: Iterable[str], opening: bytes) -> Shape:
         """The shape of these names, which must differ."""
         listed = tuple(names)
         numbers = {name: number for number, name in enumerate(listed, start=1)}
         prefixes = (b"", *(f'{name}"'.encode() for name in listed))
-        return cls(listed, prefixes, numbers, tuple((n, numbers[n]) for n in listed if n in _KEPT))
+        return cls(listed, prefixes, numbers, tuple((n, numbers[n]) for n in listed if n in _KEPT), opening)
 
 
 class Properties:
@@ -84,17 +85,16 @@ class Properties:
         self.names, self.numbers = shape.names, shape.numbers
         self.kept = {name: pieces[number] for name, number in shape.kept}
 
-    def piece(self, name: str) -> bytes | None:
-        """The bytes of a property, None where there is no such property. Equal bytes, equal value."""
+    def piece(self, name: str) -> bytes:
+        """The bytes of a property that is one of ``names``. Equal bytes, equal value."""
         piece = self.kept.get(name)
-        if piece is None and (number := self.numbers.get(name)) is not None:
-            piece = (self._careful_cut()[1] if self._careful else self._cut())[number]
+        if piece is None:
+            piece = (self._careful_cut()[1] if self._careful else self._cut())[self.numbers[name]]
         return piece
 
     def value(self, name: str) -> Any:
         """The value, ABSENT where there is no such property or it has no plain value."""
-        piece = self.piece(name)
-        return ABSENT if piece is None else value_of(self._node(piece))
+        return value_of(self._node(self.piece(name))) if name in self.numbers else ABSENT
 
     def _cut(self) -> list[bytes]:
         begin, end = self._span
@@ -102,17 +102,23 @@ class Properties:
 
     def _quick_shape(self, pieces: list[bytes], kind: str) -> Shape | None:
         count = len(pieces) - 1
-        before = pieces[0]
-        at = before.find(_COUNT) + len(_COUNT)
-        if at < len(_COUNT) or before[at : before.find(b'"', at)] != b"%d" % count:
-            return None
         shapes = self._xml.shared.shapes
         shape = shapes.get((kind, count))
-        if shape is None or not all(map(bytes.startswith, pieces, shape.prefixes)):
-            names = [piece.partition(b'"')[0] for piece in pieces[1:]]
-            if b"&" in b"".join(names) or len(set(names)) != count:
-                return None
-            shape = shapes[kind, count] = Shape.of(self._xml.decode(name) for name in names)
+        if (
+            shape is not None
+            and pieces[0].endswith(shape.opening)
+            and all(map(bytes.startswith, pieces, shape.prefixes))
+        ):
+            return shape
+        # FreeCAD counts its properties; another number means that some are written in another form.
+        at = pieces[0].find(_PROPERTIES)
+        opening = pieces[0][max(at, 0) :]
+        names = [piece.partition(b'"')[0] for piece in pieces[1:]]
+        if not opening.startswith(b'%b%d"' % (_PROPERTIES, count)) or b"&" in b"".join(names):
+            return None
+        if len(set(names)) != count:
+            return None
+        shape = shapes[kind, count] = Shape.of((self._xml.decode(name) for name in names), opening)
         return shape
 
     def _careful_cut(self) -> tuple[Shape, list[bytes]]:
@@ -122,7 +128,7 @@ class Properties:
             spans = careful.index_properties(element, self._xml.limits.depth)
         except Malformed as error:
             raise self._xml.error(str(error)) from error
-        return Shape.of(spans), [b"", *(element[first:last] for first, last in spans.values())]
+        return Shape.of(spans, b""), [b"", *(element[first:last] for first, last in spans.values())]
 
     def _node(self, piece: bytes) -> Node:
         if (found := _CANONICAL.match(piece)) is not None:

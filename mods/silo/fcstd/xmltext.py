@@ -70,7 +70,7 @@ class XmlText:
     def __init__(self, path: str, entry: Entry, packed: bytes, limits: Limits, shared: Shared) -> None:
         self.path, self.limits, self.shared = path, limits, shared
         self._entry, self._packed = entry, packed
-        self._inflater: Inflater = self._new_inflater()
+        self._inflater: Inflater
         self._text: bytes | None = b""
         self._known = 0
         self._head: Head | None = None
