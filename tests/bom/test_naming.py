@@ -47,6 +47,12 @@ def test_the_name_comes_from_the_documents_label() -> None:
     assert proposed_name(entry("", "")) == "Unnamed component"
 
 
+def test_a_label_that_is_only_the_files_name_gives_way() -> None:
+    """FreeCAD makes the document's label from the file's name: the object's own label says more."""
+    assert proposed_name(entry("Base Plate", "x")) == "Base Plate"
+    assert proposed_name(entry("Body001", "x")) == "x"
+
+
 def test_a_file_of_several_components_is_crowded() -> None:
     """Counted over the whole tree, each component once."""
     one, two = entry(), BomEntry("/v/x.FCStd", object_name="Other")
@@ -63,7 +69,12 @@ def test_the_type_is_the_documents() -> None:
 
 @pytest.mark.parametrize(
     ("document", "is_assembly", "category"),
-    [("M8 bolt", False, "F01"), ("Housing", False, "M01"), ("Gearbox", True, "A01")],
+    [
+        ("M8 bolt", False, "F01"),
+        ("MainBolts", False, "F01"),
+        ("Housing", False, "M01"),
+        ("Gearbox", True, "A01"),
+    ],
 )
 def test_the_category_fits_the_name_and_the_type(document: str, is_assembly: bool, category: str) -> None:
     """Words of the name against the schema's, else the general part; assemblies only into theirs."""

@@ -6,6 +6,7 @@ Only a proposal: a person confirms it, or says ``--yes``. Part numbers are made 
 
 from __future__ import annotations
 
+import os.path
 import re
 import unicodedata
 from collections import Counter
@@ -17,6 +18,8 @@ from silo.bom.model import BomEntry
 
 _SUFFIX = re.compile(r"\.fcstd$", re.IGNORECASE)
 _WORD = re.compile(r"[^\W\d_]{3,}")
+# BasePlate is two words.
+_HUMP = re.compile(r"(?<=[a-z])(?=[A-Z])")
 # Labels that FreeCAD gives by itself say nothing of the part.
 _GENERIC = re.compile(
     r"(?:body|part|assembly|model|unnamed|link|compound|solid|fusion|cut)[ _]?\d*$", re.IGNORECASE
@@ -49,9 +52,15 @@ def crowded_files(entries: Iterable[BomEntry]) -> frozenset[str]:
 
 
 def proposed_name(entry: BomEntry, *, shares_file: bool = False) -> str:
-    """The document's label (spec §2), or the object's where its file gives several components."""
+    """The document's label (spec §2), or the object's where that says more.
+
+    FreeCAD makes a document's label from its file's name; only one that a person chose (it differs) stands
+    before an object's own label. Where a file gives several components, the object's label tells them apart.
+    """
     of_document, of_object = clean_name(entry.document_label), clean_name(entry.label)
-    if shares_file and of_object and not _GENERIC.match(of_object):
+    stem = clean_name(os.path.splitext(os.path.basename(entry.doc_path))[0])
+    chosen = of_document not in ("", stem)
+    if of_object and not _GENERIC.match(of_object) and (shares_file or not chosen):
         return of_object
     return of_document or of_object or "Unnamed component"
 
@@ -63,7 +72,7 @@ def display_name(entry: BomEntry) -> str:
 
 
 def _stems(text: str) -> set[str]:
-    words = {word.casefold() for word in _WORD.findall(text)}
+    words = {word.casefold() for word in _WORD.findall(_HUMP.sub(" ", text))}
     return {word[:-1] if word.endswith("s") and len(word) > 3 else word for word in words}
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from silo.bom.diff import diff_bom
 from silo.bom.model import BomDiff
+from silo.bom.naming import display_name
 from silo.bom.report import base_of, diff_json, finding_json, relative
 from silo.bom_sync import Resolved, assemblies, blocking, names_of, resolve, server_lines
 from silo.cli import common
@@ -70,7 +71,14 @@ def _show(
     out = show.console()
     for one, diff in compared:
         head = one.assembly
-        out.print(show.entry_text(head, base) if head.part_number else f"{head.label} (no part number yet)")
-        out.print(show.diff_table(diff, names))
+        if head.part_number:
+            out.print(show.entry_text(head, base))
+        else:
+            name = show.plain(display_name(head))
+            out.print(
+                f"{name}: no part number yet, so nothing to compare with (silo-mod register)", markup=False
+            )
+        if head.part_number or diff.added:
+            out.print(show.diff_table(diff, names))
         out.print()
     out.print(show.findings_text(whole.findings, base))
