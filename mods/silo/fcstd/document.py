@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 from struct import Struct
 from typing import TYPE_CHECKING, Any, cast
@@ -90,7 +90,7 @@ class FcstdDocument:
     def Objects(self) -> tuple[FcstdObject, ...]:
         """All objects, in document order."""
         self.complete()
-        return tuple(self._object(name, kind) for name, kind in self._xml.head.types.items())
+        return self.members(self._xml.head.types)
 
     @property
     def PropertiesList(self) -> tuple[str, ...]:
@@ -152,6 +152,11 @@ class FcstdDocument:
         if span is None:
             raise self._xml.error(f"does not hold the data of the object {obj.Name!r}")
         return Properties(self._xml, span, obj.TypeId)
+
+    def members(self, names: Iterable[str]) -> tuple[FcstdObject, ...]:
+        """The objects of these names, without those that are not there."""
+        types = self._xml.head.types
+        return tuple(self._object(name, types[name]) for name in names if name in types)
 
     def resolve(self, ref: Ref) -> FcstdObject | None:
         """The object that a link means, None where it is unset or broken."""

@@ -123,8 +123,7 @@ class FcstdObject:
         if isinstance(value, Ref):
             return _with_subs(self.Document.resolve(value), value)
         if isinstance(value, LocalList):
-            found = map(self.Document.getObject, value.names)
-            return tuple(target for target in found if target is not None)
+            return self.Document.members(value.names)
         if isinstance(value, RefList):
             return tuple(self._members(value.refs))
         if isinstance(value, SideEntry):

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from silo.fcstd import careful
 from silo.fcstd.careful import Malformed, Node, Span
-from silo.fcstd.values import ABSENT, value_of
+from silo.fcstd.values import ABSENT, LocalList, value_of
 from silo.fcstd.xmltext import XmlText
 
 _CUT = b'<Property name="'
@@ -30,6 +30,13 @@ _CANONICAL = re.compile(
     rb'((?:<\w+(?: [\w:.-]+="[^"<&\r\n\t]*")*/>\s*)*)</\3>)'
     rb"\s*</Property>\s*(?:</Properties>\s*(?:</Object>)?)?\Z"
 )
+# The same for a list of links, which may be long.
+_MEMBERS = re.compile(
+    rb'[^"&]+" type="App::PropertyLinkList"[^<]*<LinkList count="\d+">'
+    rb'((?:\s*<Link value="[^"<&\r\n\t]*"/>)*)\s*</LinkList>'
+    rb"\s*</Property>\s*(?:</Properties>\s*(?:</Object>)?)?\Z"
+)
+_MEMBER = re.compile(r'"([^"]*)"')
 _CHILD = re.compile(r"<(\w+)([^<]*)/>")
 _ATTRIBUTE = re.compile(r' ([\w:.-]+)="([^"]*)"')
 
@@ -62,6 +69,9 @@ class Shape(NamedTuple):
         return cls(listed, prefixes, numbers, tuple((n, numbers[n]) for n in listed if n in _KEPT), opening)
 
 
+_NOTHING = Shape.of((), b"")
+
+
 class Properties:
     """The property table of one element of a document's XML. Reading may raise FcstdError."""
 
@@ -69,19 +79,22 @@ class Properties:
 
     def __init__(self, xml: XmlText, span: Span | None, kind: str) -> None:
         self._xml, self._span = xml, span or (0, 0)
-        self.names: tuple[str, ...] = ()
-        self.numbers: dict[str, int] = {}
-        self.kept: dict[str, bytes] = {}
         self._careful = xml.is_careful
-        if span is not None:  # a foreign document may have no properties of its own
-            self._begin(kind)
-
-    def _begin(self, kind: str) -> None:
-        pieces = self._cut()
-        shape = None if self._careful else self._quick_shape(pieces, kind)
-        if shape is None:
-            self._careful = True
+        if span is None:  # a foreign document may have no properties of its own
+            shape, pieces = _NOTHING, [b""]
+        elif self._careful:
             shape, pieces = self._careful_cut()
+        else:
+            pieces = xml.text[span[0] : span[1]].split(_CUT)
+            known = xml.shared.shapes.get((kind, len(pieces)))
+            if (
+                known is not None
+                and pieces[0].endswith(known.opening)
+                and all(map(bytes.startswith, pieces, known.prefixes))
+            ):
+                shape = known
+            else:
+                shape, pieces = self._other_shape(pieces, kind)
         self.names, self.numbers = shape.names, shape.numbers
         self.kept = {name: pieces[number] for name, number in shape.kept}
 
@@ -94,32 +107,30 @@ class Properties:
 
     def value(self, name: str) -> Any:
         """The value, ABSENT where there is no such property or it has no plain value."""
-        return value_of(self._node(self.piece(name))) if name in self.numbers else ABSENT
+        if name not in self.numbers:
+            return ABSENT
+        piece = self.piece(name)
+        if (members := _MEMBERS.match(piece)) is not None:
+            return LocalList(tuple(_MEMBER.findall(self._xml.decode(members[1]))))
+        return value_of(self._node(piece))
 
     def _cut(self) -> list[bytes]:
         begin, end = self._span
         return self._xml.text[begin:end].split(_CUT)
 
-    def _quick_shape(self, pieces: list[bytes], kind: str) -> Shape | None:
+    def _other_shape(self, pieces: list[bytes], kind: str) -> tuple[Shape, list[bytes]]:
         count = len(pieces) - 1
-        shapes = self._xml.shared.shapes
-        shape = shapes.get((kind, count))
-        if (
-            shape is not None
-            and pieces[0].endswith(shape.opening)
-            and all(map(bytes.startswith, pieces, shape.prefixes))
-        ):
-            return shape
-        # FreeCAD counts its properties; another number means that some are written in another form.
         at = pieces[0].find(_PROPERTIES)
         opening = pieces[0][max(at, 0) :]
         names = [piece.partition(b'"')[0] for piece in pieces[1:]]
-        if not opening.startswith(b'%b%d"' % (_PROPERTIES, count)) or b"&" in b"".join(names):
-            return None
-        if len(set(names)) != count:
-            return None
-        shape = shapes[kind, count] = Shape.of((self._xml.decode(name) for name in names), opening)
-        return shape
+        # FreeCAD counts its properties; another number means that some are written in another form.
+        counted = opening.startswith(b'%b%d"' % (_PROPERTIES, count))
+        if not counted or b"&" in b"".join(names) or len(set(names)) != count:
+            self._careful = True
+            return self._careful_cut()
+        shape = Shape.of((self._xml.decode(name) for name in names), opening)
+        self._xml.shared.shapes[kind, len(pieces)] = shape
+        return shape, pieces
 
     def _careful_cut(self) -> tuple[Shape, list[bytes]]:
         begin, end = self._span

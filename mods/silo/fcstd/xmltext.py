@@ -27,10 +27,10 @@ if TYPE_CHECKING:
 
 _ATTRIBUTES = rb'((?:\s+[\w:.-]+="[^"<]*")*)\s*'
 _HEAD = re.compile(
-    rb"<\?xml([^?<>]*)\?>\s*(?:<!--[^-]*(?:-[^-]+)*-->\s*)?<Document" + _ATTRIBUTES + rb">", re.DOTALL
+    rb"""<\?xml version=["']1.0["'] encoding=["'](?:utf-8|UTF-8|us-ascii)["']\s*\?>\s*"""
+    rb"(?:<!--[^-]*(?:-[^-]+)*-->\s*)?<Document" + _ATTRIBUTES + rb">"
 )
 _ATTRIBUTE = re.compile(rb'\s([\w:.-]+)="([^"&]*)"')
-_UTF8 = re.compile(rb"""encoding=["'](?:utf-8|us-ascii)["']""", re.IGNORECASE)
 _OBJECTS = re.compile(rb'<Objects Count="(\d{1,9})"' + _ATTRIBUTES + rb">")
 _OBJECT_TYPE = re.compile(rb'<Object type="([^"&]+)" name="([^"&]+)"')
 _OBJECT_DATA = re.compile(rb"</Objects>\s*<ObjectData" + _ATTRIBUTES + rb">")
@@ -172,7 +172,7 @@ class XmlText:
 
     def _find_head(self, whole: bool = False) -> None:
         text = self._begin(whole)
-        if (opening := _HEAD.match(text)) is None or not _UTF8.search(opening[1]) or b"&" in opening[2]:
+        if (opening := _HEAD.match(text)) is None or b"&" in opening[1]:
             raise _Unexpected
         begins = opening.end()
         while (end := text.find(b"</Objects>", begins)) < 0:
@@ -183,7 +183,7 @@ class XmlText:
             text = self._extend()
         _refuse_markup(text, begins)
         at = text.find(b"<Objects", begins)
-        self._head = Head(opening[2], self._quick_types(text, at, end), _only_properties(text, begins, at))
+        self._head = Head(opening[1], self._quick_types(text, at, end), _only_properties(text, begins, at))
         self._position = data.end()
 
     def _quick_types(self, text: bytes, begin: int, end: int) -> dict[str, str]:
