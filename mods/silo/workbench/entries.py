@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterable
+from datetime import datetime
 from typing import Any
 
 from silo.api.sse import MERGE, ServerEvent
@@ -42,6 +43,8 @@ def of_sent(sent: Sent, page: Page, now: float | None = None) -> Entry:
         icon="silo-bom" if sent.status in (Status.MERGED, Status.BLOCKED) else "silo-commit",
     )
 
+
+_JUST_NOW_S = 120.0
 
 _WEIGHT = {
     Tone.QUIET: 0,
@@ -226,13 +229,22 @@ def of_merge(merge: MergeEvent, page: Page, when: float, event_id: str | None = 
     return Entry(
         key=f"sync:{merge.sync_id}" if merge.sync_id else f"event:{event_id}:{MERGE}",
         title=translate("Silo", "BOM Updated: {number}").replace("{number}", merge.item),
-        when=merge.timestamp.timestamp() if merge.timestamp is not None else when,
+        when=_moment(merge.timestamp, when),
         tone=Tone.WARNING if any(badge.tone is Tone.WARNING for badge in told) else Tone.PLAIN,
         who=merge.user,
         badges=told,
         actions=_view(merge.resolve_url or f"/items/{merge.item}/bom", page),
         icon="silo-bom",
     )
+
+
+def _moment(told: datetime | None, now: float) -> float:
+    """When an event happened: as the server says where it is an old one, else now.
+
+    Servers tell whole seconds, and their clocks are a little off: just now, the order of arrival is truer.
+    """
+    stamp = told.timestamp() if told is not None else now
+    return stamp if abs(stamp - now) > _JUST_NOW_S else now
 
 
 def _event_words(kind: str, number: str, data: dict[str, Any]) -> tuple[str, str]:

@@ -82,7 +82,7 @@ class PreviewFlow:
         )
         dialog = PreviewDialog(taken.label or name, wishes, host.main_window())
         self._open[taken.path] = dialog
-        dialog.destroyed.connect(lambda _obj=None: self._open.pop(taken.path, None))
+        dialog.finished.connect(lambda _result: self._open.pop(taken.path, None))
         dialog.show()
         return dialog
 

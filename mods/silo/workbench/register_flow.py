@@ -79,7 +79,7 @@ class RegisterFlow:
             taken.label, wishes, host.main_window(), asks=self._preferences.flag("AskRegister")
         )
         self._open[taken.path] = dialog
-        dialog.destroyed.connect(lambda _obj=None: self._open.pop(taken.path, None))
+        dialog.finished.connect(lambda _result: self._open.pop(taken.path, None))
         dialog.show()
 
     def _with_dialog(self, path: str, call: Callable[[RegisterDialog], None]) -> None:

@@ -1,0 +1,239 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Helpers for scripts that run inside FreeCAD with a window (see ``window.py``)."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import FreeCAD as App
+import FreeCADGui as Gui
+from PySide import QtCore, QtGui
+
+try:
+    from PySide import QtWidgets
+except ImportError:
+    QtWidgets = QtGui
+
+FOLDER = Path(os.environ["SILO_TEST_FOLDER"])
+VAULT = FOLDER / "vault"
+WAIT_S = 60
+
+_told: dict[str, Any] = {}
+
+
+def run(story: Callable[[], None]) -> None:
+    """Run the story once FreeCAD's window stands, then end FreeCAD; a failed one ends it with 1."""
+
+    def go() -> None:
+        code = 0
+        try:
+            wait(lambda: addon() is not None)
+            story()
+        except BaseException:  # noqa: BLE001  # whatever it is, the test has to hear of it
+            code = 1
+            (FOLDER / "trace.txt").write_text(traceback.format_exc())
+        sys.stdout.flush()
+        os._exit(code)
+
+    QtCore.QTimer.singleShot(500, go)
+
+
+def tell(**values: Any) -> None:
+    """Write results; they are on disk at once, FreeCAD may be killed after."""
+    _told.update(values)
+    part = FOLDER / "told.part"
+    part.write_text(json.dumps(_told))
+    part.rename(FOLDER / "told.json")
+
+
+def ask(name: str) -> Any:
+    """Have the test do something (``Window.answers``) and wait for what it says."""
+    question = FOLDER / "asked" / f"{time.monotonic_ns()}.question"
+    part = question.with_suffix(".new")
+    part.write_text(name)
+    part.rename(question)
+    answer = question.with_suffix(".answer")
+    wait(answer.exists)
+    return json.loads(answer.read_text())
+
+
+def wait(reached: Callable[[], Any], seconds: float = WAIT_S) -> Any:
+    """Let FreeCAD work until something is so; what it is then. An error after ``seconds``."""
+    end = time.monotonic() + seconds
+    while True:
+        QtWidgets.QApplication.processEvents(QtCore.QEventLoop.ProcessEventsFlag.AllEvents, 20)
+        found = reached()
+        if found:
+            return found
+        if time.monotonic() > end:
+            import inspect
+
+            raise TimeoutError(f"not reached in {seconds} s: {inspect.getsource(reached).strip()}\n{state()}")
+        # Worker threads want their turn too.
+        time.sleep(0.005)
+
+
+def state() -> str:
+    """What the add-on shows, for messages."""
+    session = addon().session if addon() is not None else None
+    if session is None:
+        return "no add-on"
+    shown = session.shown
+    return f"{shown.connection} {shown.reason!r} busy={shown.busy} waiting={shown.waiting}\n" + "\n".join(
+        pane()
+    )
+
+
+def addon() -> Any:
+    """The add-on, once FreeCAD has loaded it."""
+    from silo.workbench import start
+    from silo.workbench.addon import AddOn
+
+    return next((kept for kept in start._kept if isinstance(kept, AddOn)), None)
+
+
+def settled() -> bool:
+    """Nothing is under way any more."""
+    one = addon()
+    return bool(one.session.idle and not one.commits.running and one.session.shown.busy is None)
+
+
+def pane() -> list[str]:
+    """The boxes of the pane as text, newest first."""
+    from silo.workbench.activity import entry_text
+
+    return [entry_text(entry) for entry in addon().session.shown.activity.entries]
+
+
+def boxes(title: str) -> list[str]:
+    """The boxes whose title begins so."""
+    return [text for text in pane() if text.startswith(title)]
+
+
+def labels(widget: Any) -> list[str]:
+    """All visible texts of a widget: what a person reads."""
+    return [
+        label.text() for label in widget.findChildren(QtWidgets.QLabel) if label.isVisible() and label.text()
+    ]
+
+
+def press(widget: Any, text: str) -> None:
+    """Press the first visible button with this text."""
+    for button in widget.findChildren(QtWidgets.QPushButton):
+        if button.isVisible() and button.text() == text:
+            button.click()
+            return
+    texts = [b.text() for b in widget.findChildren(QtWidgets.QPushButton) if b.isVisible()]
+    raise AssertionError(f"no button {text!r}; there are {texts}")
+
+
+@contextmanager
+def dialog(name: str, answer: Callable[[Any], None]) -> Iterator[None]:
+    """While a modal dialog of this object name comes up inside, answer it."""
+    met: list[Any] = []
+
+    def look() -> None:
+        found = QtWidgets.QApplication.activeModalWidget()
+        if found is None or found.objectName() != name:
+            QtCore.QTimer.singleShot(50, look)
+            return
+        try:
+            answer(found)
+            met.append(True)
+        except BaseException as problem:  # noqa: BLE001  # raised again below, in the story
+            met.append(problem)
+            found.reject()
+
+    QtCore.QTimer.singleShot(50, look)
+    yield
+    wait(lambda: met)
+    if met[0] is not True:
+        raise met[0]
+
+
+# --- documents -------------------------------------------------------------------------------------------
+
+
+def part(name: str, label: str = "") -> Any:
+    """A part document with a box, saved; gives the box."""
+    doc = App.newDocument(name)
+    box = doc.addObject("Part::Box", "Box")
+    box.Label = label or name
+    doc.recompute()
+    doc.saveAs(str(VAULT / f"{name}.FCStd"))
+    unmark(doc)
+    return box
+
+
+def assembly(name: str, *links: tuple[str, Any, int]) -> Any:
+    """An assembly document as Assembly4 makes it (every FreeCAD knows it), saved; gives the assembly.
+
+    links
+        (name, target, element count; 0 for a plain link).
+    """
+    doc = App.newDocument(name)
+    made = doc.addObject("App::Part", "Assembly")
+    made.Type = "Assembly"
+    doc.saveAs(str(VAULT / f"{name}.FCStd"))
+    for link_name, target, count in links:
+        link(made, link_name, target, count)
+    doc.recompute()
+    doc.save()
+    unmark(doc)
+    return made
+
+
+def link(container: Any, name: str, target: Any, count: int = 0) -> Any:
+    """A link in an assembly."""
+    made = container.Document.addObject("App::Link", name)
+    made.LinkedObject = target
+    container.addObject(made)
+    if count:
+        made.ElementCount = count
+    return made
+
+
+def unmark(doc: Any) -> None:
+    """Take away the mark of unsaved edits, as FreeCAD's own save command does."""
+    view = Gui.getDocument(doc.Name)
+    try:
+        view.Modified = False
+    except AttributeError:
+        App.setActiveDocument(doc.Name)
+        Gui.runCommand("Std_Save")
+
+
+def modified(doc: Any) -> bool:
+    """True while FreeCAD shows unsaved edits."""
+    return bool(Gui.getDocument(doc.Name).Modified)
+
+
+def register(*documents: Any) -> dict[str, str]:
+    """Items for documents, made from outside; their identities are written and saved. Name → part number."""
+    from silo.api.client import SiloClient
+
+    numbers = {}
+    with SiloClient(os.environ["SILO_API_URL"], os.environ["SILO_API_TOKEN"]) as client:
+        for doc in documents:
+            kind, category = ("assembly", "A01") if doc.getObject("Assembly") else ("part", "M01")
+            item = client.create_item("kindred-rd", category, doc.Label, item_type=kind)
+            doc.Meta = {"SiloUUID": item.id}
+            doc.save()
+            unmark(doc)
+            numbers[doc.Name] = item.part_number
+    return numbers
+
+
+def close_all() -> None:
+    """Close all documents."""
+    for name in list(App.listDocuments()):
+        if name in App.listDocuments():
+            App.closeDocument(name)

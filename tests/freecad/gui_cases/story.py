@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Inside FreeCAD: a designer's day. Commit with changed sub-assemblies, preview, server gone and back."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import Any
+
+sys.path.insert(0, os.environ["SILO_TEST_CASES"])
+
+from inside import (
+    App,
+    Gui,
+    addon,
+    ask,
+    assembly,
+    boxes,
+    dialog,
+    labels,
+    link,
+    modified,
+    pane,
+    part,
+    press,
+    register,
+    run,
+    settled,
+    tell,
+    wait,
+)
+
+
+def commit(document: Any, comment: str = "", seen: list[list[str]] | None = None) -> None:
+    """Commit by the command, answering the dialog as a person does."""
+
+    def answer(found: Any) -> None:
+        if seen is not None:
+            tree = found.files
+            items = [tree.topLevelItem(i) for i in range(tree.topLevelItemCount())]
+            seen.extend([[item.text(0), item.text(1)] for item in items])
+        found.comment.setPlainText(comment)
+        found.commit.click()
+
+    App.setActiveDocument(document.Name)
+    with dialog("SiloCommitDialog", answer):
+        Gui.runCommand("Origin_Commit")
+
+
+def make() -> dict[str, Any]:
+    plate, bolt, cover = part("BasePlate"), part("Bolt"), part("Cover")
+    gearbox = assembly("Gearbox", ("Cover", cover, 0), ("Bolts", bolt, 6))
+    top = assembly(
+        "Top", ("Plate", plate, 0), ("Gearbox1", gearbox, 0), ("Gearbox2", gearbox, 0), ("Bolt1", bolt, 0)
+    )
+    return {"plate": plate, "bolt": bolt, "cover": cover, "gearbox": gearbox, "top": top}
+
+
+def story() -> None:
+    one = addon()
+    one.preferences.set("AskRegister", False)
+    made = make()
+    docs = {name: obj.Document for name, obj in made.items()}
+    numbers = register(*(docs[name] for name in ("plate", "bolt", "gearbox", "top")))
+    tell(numbers=numbers)
+    wait(lambda: one.session.shown.connection == "online")
+
+    # 1. Everything is dirty: sub-assembly and part below the top.
+    made["gearbox"].Document.getObject("Bolts").ElementCount = 8
+    made["plate"].Length = 50
+    link(made["top"], "Bolt2", made["bolt"])
+    docs["top"].recompute()
+    seen: list[list[str]] = []
+    commit(docs["top"], "wider plate", seen)
+    wait(lambda: boxes("BOM Updated: " + numbers["Top"]) and settled())
+    tell(
+        dialog=seen,
+        first=pane(),
+        still_modified=[doc.Label for doc in docs.values() if modified(doc)],
+        dock_visible=one.dock.isVisible(),
+        active=App.ActiveDocument.Name,
+    )
+
+    # 2. The same again: nothing is posted.
+    events = len(pane())
+    commit(docs["top"])
+    wait(lambda: settled() and len(pane()) > events)
+    tell(second=pane()[0])
+
+    # 3. What a person reads in the dock.
+    one.dock.show_and_raise()
+    wait(lambda: any("BOM Updated" in text for text in labels(one.dock)))
+    tell(dock=labels(one.dock))
+
+    # 4. Somebody else merges: the pane hears of it.
+    tell(other=ask("other merge"))
+    wait(lambda: sum(1 for text in pane() if "1 unreferenced" in text) >= 1)
+    tell(heard=pane()[0])
+
+    # 5. The server goes; a commit waits; the server comes back; it arrives by itself.
+    ask("server down")
+    wait(lambda: one.session.shown.connection == "offline")
+    docs["top"].removeObject("Bolt2")
+    made["plate"].Length = 60
+    docs["top"].recompute()
+    commit(docs["top"], "offline")
+    wait(lambda: len(one.session.shown.waiting) >= 2 and settled())
+    wait(lambda: any("waits to be sent" in t or "wait to be sent" in t for t in labels(one.dock)))
+    tell(offline=labels(one.dock), waiting=[w.title for w in one.session.shown.waiting])
+    before = len(boxes("BOM Updated: " + numbers["Top"]))
+    ask("server up")
+    press(one.dock, "Try again")
+    wait(lambda: len(boxes("BOM Updated: " + numbers["Top"])) > before and settled())
+    wait(lambda: not one.session.shown.waiting)
+    tell(after=pane()[0], connection=one.session.shown.connection)
+    preview(one, docs["top"])
+
+
+def preview(one: Any, top: Any) -> None:
+    """6. The preview: what differs, then Sync."""
+    top.getObject("Gearbox2").ElementCount = 3
+    App.setActiveDocument(top.Name)
+    Gui.runCommand("Silo_BOM")
+    window = wait(lambda: next(iter(one.previews._open.values()), None))
+    wait(lambda: window._preview is not None)
+    tell(preview=rows(window.table), preview_text=labels(window), can_sync=window.sync_button.isEnabled())
+    window.sync_button.click()
+    wait(lambda: settled() and window._preview is not None and not window._preview.top.diff.changes_server)
+    tell(preview_after=rows(window.table))
+    item = window.table.topLevelItem(0)
+    window.table.setCurrentItem(item)
+    window.show_button.click()
+    tell(selected=[obj.Name for obj in Gui.Selection.getSelection(top.Name)])
+    window.close()
+    wait(lambda: not one.previews._open)
+
+
+def rows(tree: Any) -> list[list[str]]:
+    """The rows of a tree, opened all the way down."""
+    found: list[list[str]] = []
+
+    def walk(item: Any, depth: int) -> None:
+        found.append([str(depth), *(item.text(column) for column in range(5))])
+        for number in range(item.childCount()):
+            walk(item.child(number), depth + 1)
+
+    for number in range(tree.topLevelItemCount()):
+        walk(tree.topLevelItem(number), 0)
+    return found
+
+
+run(story)

@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Runs a script inside FreeCAD with a window (Xvfb): the add-on in ``Mod``, and a real server."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from freecad_cases import machines
+from freecad_cases.machines import REPOSITORY, FreeCAD
+
+from silo.api.client import SiloClient
+from silo_server.run import RunningServer, running_server
+
+TOKEN = "silo_" + "0123456789abcdef" * 2
+TIMEOUT_S = 180
+SCRIPTS = Path(__file__).parent
+
+# No start page (it needs a browser engine) and no notification area (FreeCAD 1.0 deadlocks in it without a
+# screen); facts §6.5.
+_SEED = """<?xml version="1.0" encoding="UTF-8" standalone="no" ?>
+<FCParameters><FCParamGroup Name="Root"><FCParamGroup Name="BaseApp"><FCParamGroup Name="Preferences">
+ <FCParamGroup Name="General"><FCText Name="AutoloadModule">NoneWorkbench</FCText></FCParamGroup>
+ <FCParamGroup Name="NotificationArea"><FCBool Name="NotificationAreaEnabled" Value="0"/></FCParamGroup>
+ <FCParamGroup Name="Mod">%s</FCParamGroup>
+</FCParamGroup></FCParamGroup></FCParamGroup></FCParameters>
+"""
+
+
+class Server:
+    """An embedded server that can go away and come back at the same address, with the same data."""
+
+    def __init__(self, folder: Path) -> None:
+        self._database = f"sqlite:///{folder / 'silo.db'}"
+        self._stack = ExitStack()
+        self._running: RunningServer | None = None
+        self._port = 0
+        self.url = ""
+
+    def up(self) -> None:
+        self._running = self._stack.enter_context(
+            running_server(self._database, token=TOKEN, port=self._port)
+        )
+        self.url = self._running.base_url
+        self._port = int(self.url.rsplit(":", 1)[1])
+
+    def down(self) -> None:
+        self._stack.close()
+        self._running = None
+
+    @contextmanager
+    def client(self) -> Iterator[SiloClient]:
+        with SiloClient(self.url, TOKEN) as client:
+            yield client
+
+
+@dataclass
+class Window:
+    """One FreeCAD's home, kept over several runs, with the server that it talks to.
+
+    answers
+        name → function: what the script inside may ask of the test (``inside.ask``).
+    """
+
+    freecad: FreeCAD
+    folder: Path
+    server: Server
+    answers: dict[str, Callable[[], Any]] = field(default_factory=dict)
+
+    @property
+    def vault(self) -> Path:
+        """Where the documents are."""
+        return self.folder / "vault"
+
+    @property
+    def home(self) -> Path:
+        return self.folder / "home"
+
+    def prepare(self, *, dependencies: bool = True, preferences: str = "") -> None:
+        """A fresh profile with the add-on in ``Mod``."""
+        self.freecad.profile(self.home, dependencies=dependencies)
+        (self.home / "user.cfg").write_text(_SEED % preferences)
+        (self.home / "Mod").mkdir()
+        (self.home / "Mod" / "Silo").symlink_to(REPOSITORY, target_is_directory=True)
+        self.vault.mkdir()
+        (self.folder / "asked").mkdir()
+
+    def environment(self) -> dict[str, str]:
+        """Everything of the user's is in the test's folder."""
+        return {
+            "FREECAD_USER_HOME": str(self.home),
+            "XDG_DATA_HOME": str(self.folder / "data"),
+            "XDG_CONFIG_HOME": str(self.folder / "config"),
+            "XDG_RUNTIME_DIR": str(self.folder / "runtime"),
+            "SILO_API_URL": self.server.url,
+            "SILO_API_TOKEN": TOKEN,
+            "SILO_TEST_FOLDER": str(self.folder),
+            "SILO_TEST_CASES": str(SCRIPTS),
+        }
+
+    def run(self, script: str, *, env: Mapping[str, str] | None = None, code: int = 0) -> dict[str, Any]:
+        """Run a script; gives what it wrote by ``inside.tell``.
+
+        code
+            how FreeCAD is to end; -9 where the script kills it.
+        """
+        (self.folder / "runtime").mkdir(mode=0o700, exist_ok=True)
+        told = self.folder / "told.json"
+        told.unlink(missing_ok=True)
+        log = self.folder / "freecad.log"
+        command = [
+            self.freecad.sibling("xvfb-run"),
+            *("-a", "-s", "-screen 0 1600x1000x24"),
+            self.freecad.command.replace("freecadcmd", "freecad"),
+            str(SCRIPTS / script),
+        ]
+        if self.freecad.name != "own":
+            # The wrapper enters the root; inside it, both programs have their plain names.
+            command[-2] = "freecad"
+        with log.open("wb") as output, self._answering():
+            process = subprocess.Popen(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                cwd=self.folder,
+                env={**os.environ, **self.environment(), **(env or {})},
+                start_new_session=True,
+            )
+            try:
+                ended = process.wait(TIMEOUT_S)
+            except subprocess.TimeoutExpired:
+                os.killpg(process.pid, signal.SIGKILL)
+                raise AssertionError(f"FreeCAD did not end\n{self._report(log)}") from None
+        wanted = {code, 128 - code if code < 0 else code}
+        assert ended in wanted, f"FreeCAD ended with {ended}\n{self._report(log)}"
+        found = json.loads(told.read_text()) if told.exists() else {}
+        assert isinstance(found, dict)
+        return found
+
+    def _report(self, log: Path) -> str:
+        trace = self.folder / "trace.txt"
+        return (trace.read_text() if trace.exists() else "") + log.read_text(errors="replace")[-3000:]
+
+    @contextmanager
+    def _answering(self) -> Iterator[None]:
+        """Do what the script inside asks for, while it runs."""
+        over = threading.Event()
+        thread = threading.Thread(target=self._answer, args=(over,))
+        thread.start()
+        try:
+            yield
+        finally:
+            over.set()
+            thread.join()
+
+    def _answer(self, over: threading.Event) -> None:
+        folder = self.folder / "asked"
+        while not over.wait(0.05):
+            for question in folder.glob("*.question"):
+                name = question.read_text()
+                question.unlink()
+                result = self.answers[name]()
+                part = question.with_suffix(".part")
+                part.write_text(json.dumps(result))
+                part.rename(question.with_suffix(".answer"))
+
+
+@contextmanager
+def window(version: str, folder: Path) -> Iterator[Window]:
+    """A FreeCAD of this version with a running server; skips loudly where the machine has none."""
+    freecad = machines.need(version)
+    if shutil.which(freecad.sibling("xvfb-run")) is None:
+        machines.miss("xvfb-run is not installed")
+    server = Server(folder)
+    server.up()
+    try:
+        yield Window(
+            freecad, folder, server, {"server down": server.down, "server up": server.up, "pause": _pause}
+        )
+    finally:
+        server.down()
+
+
+def _pause() -> None:
+    time.sleep(0.1)
