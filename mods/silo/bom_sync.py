@@ -26,7 +26,7 @@ from silo.bom.findings import Finding, FindingCode, Severity
 from silo.bom.identity import walk_entries
 from silo.bom.links import extract, extract_bom_links
 from silo.bom.merge import MergePlan, plan_merge
-from silo.bom.model import BomEntry, Extraction
+from silo.bom.model import BomDiff, BomEntry, Extraction
 from silo.bom.resolve import (
     ItemLookup,
     consolidation_findings,
@@ -37,6 +37,9 @@ from silo.bom.resolve import (
 )
 
 __all__ = [
+    "BomDiff",
+    "BomEntry",
+    "Extraction",
     "Outcome",
     "Resolved",
     "Status",
@@ -44,6 +47,7 @@ __all__ = [
     "diff_bom",
     "extract",
     "extract_bom_links",
+    "plan_merge",
     "resolve",
     "resolve_part_numbers",
     "sync",

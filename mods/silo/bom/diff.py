@@ -19,7 +19,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from silo.bom.findings import Finding, FindingCode, Place, Severity
+from silo.bom.findings import Finding, Place
 from silo.bom.model import BomChange, BomDiff, BomEntry, QuantityChange
 
 # Two quantities closer than this, relatively, are one: lengths pass through databases as floats.
@@ -56,12 +56,12 @@ def _whole(value: float | None) -> float | None:
     return int(value) if value is not None and value.is_integer() else value
 
 
-def _local(entry: BomEntry | Mapping[str, Any]) -> _Line | None:
-    if isinstance(entry, BomEntry):
-        number, quantity = entry.part_number, as_number(entry.quantity)
-    else:
+def _local(entry: Any) -> _Line | None:
+    if isinstance(entry, Mapping):
         number = entry.get("child_part_number") or entry.get("part_number")
         quantity = as_number(entry.get("quantity"))
+    else:  # a BomEntry, or whatever names these two as it does
+        number, quantity = entry.part_number, as_number(entry.quantity)
     return _Line(number, quantity or 0.0) if number else None
 
 
@@ -153,21 +153,4 @@ def diff_findings(diff: BomDiff, parent: BomEntry | None = None) -> tuple[Findin
 
     ``parent`` is the assembly that was compared.
     """
-    where = (Place(parent.doc_path, parent.object_name),) if parent is not None else ()
-    findings = []
-    if diff.removed:
-        count, numbers = len(diff.removed), ", ".join(change.part_number for change in diff.removed)
-        items = "1 item in the Silo BOM is" if count == 1 else f"{count} items in the Silo BOM are"
-        message = f"{items} not referenced by components in this assembly. Nothing was deleted: {numbers}."
-        findings.append(Finding(FindingCode.UNREFERENCED, Severity.WARNING, message, where))
-    for change in diff.conflicts:
-        message = (
-            f"{change.part_number}: the assembly has {change.local_quantity:g}, a line kept by hand in the "
-            f"Silo BOM has {_told(change.remote_quantity)}. It stays as it is until somebody decides."
-        )
-        findings.append(Finding(FindingCode.CONFLICT, Severity.WARNING, message, where))
-    return tuple(findings)
-
-
-def _told(quantity: float | None) -> str:
-    return "no quantity" if quantity is None else f"{quantity:g}"
+    return diff.findings_at((Place(parent.doc_path, parent.object_name),) if parent is not None else ())

@@ -66,10 +66,11 @@ def own(obj: object, name: str, default: Any = None) -> Any:
 
 def same_document(a: object, b: object) -> bool:
     """True where both are one document: the same object, or two objects of one file."""
-    if a is b or a == b:
+    if a is b:
         return True
-    path = getattr(a, "FileName", "")
-    return bool(path) and path == getattr(b, "FileName", "")
+    path, other = getattr(a, "FileName", ""), getattr(b, "FileName", "")
+    # Saved documents are told apart by their files: plain objects that hold each other compare for ever.
+    return bool(path == other) if path and other else a == b
 
 
 def object_name(obj: object) -> str:

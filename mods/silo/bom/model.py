@@ -1,22 +1,39 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """The values that travel: BOM entries, and what a comparison with the server says of them.
 
-All are frozen. Where a value was found (labels, paths of people) never takes part in equality.
+All are frozen. Equality is that of the spec's fields and the component's key; where a value was found
+(labels, places) and what follows from the component itself takes no part in it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Any, TypeVar
 
-from silo.bom.findings import Finding, FindingCode, Severity
+from silo.bom.findings import Finding, FindingCode, Place, Severity
+
+T = TypeVar("T")
+
+
+class Frozen(tuple[T, ...]):
+    """A tuple that also equals a list of equal items: the spec's values hold lists, ours cannot change."""
+
+    __slots__ = ()
+
+    def __eq__(self, other: object) -> bool:
+        return tuple.__eq__(self, tuple(other) if isinstance(other, list) else other)
+
+    def __ne__(self, other: object) -> bool:
+        return not self == other
+
+    __hash__ = tuple.__hash__
 
 
 def _freeze(value: object, *names: str) -> None:
     """Tuples of what was given: a caller may hand over any iterable, a frozen value holds a tuple."""
     for name in names:
-        object.__setattr__(value, name, tuple(getattr(value, name)))
+        object.__setattr__(value, name, Frozen(getattr(value, name)))
 
 
 @dataclass(frozen=True)
@@ -59,7 +76,7 @@ class BomEntry:
     consolidation_warning: bool = False
     object_name: str = ""
     label: str = field(default="", compare=False)
-    is_assembly: bool = False
+    is_assembly: bool = field(default=False, compare=False)
     individual_links: int = field(default=0, compare=False)
     link_objects: int = field(default=0, compare=False)
     instances: tuple[str, ...] = field(default=(), compare=False, repr=False)
@@ -167,6 +184,31 @@ class BomDiff:
     def drifted(self) -> bool:
         """True where CAD and server differ in any way a check should report."""
         return bool(self.added or self.removed or self.quantity_changed or self.conflicts)
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What the comparison leaves to a person; :meth:`findings_at` tells the place too."""
+        return self.findings_at(())
+
+    def findings_at(self, where: Iterable[Place]) -> tuple[Finding, ...]:
+        """Unreferenced lines in one finding, each conflict in one. ``where``: the assembly compared."""
+        places = tuple(where)
+        found = []
+        if self.removed:
+            count, numbers = len(self.removed), ", ".join(change.part_number for change in self.removed)
+            items = "1 item in the Silo BOM is" if count == 1 else f"{count} items in the Silo BOM are"
+            message = (
+                f"{items} not referenced by components in this assembly. Nothing was deleted: {numbers}."
+            )
+            found.append(Finding(FindingCode.UNREFERENCED, Severity.WARNING, message, places))
+        for change in self.conflicts:
+            kept = "no quantity" if change.remote_quantity is None else f"{change.remote_quantity:g}"
+            message = (
+                f"{change.part_number}: the assembly has {change.local_quantity:g}, a line kept by hand in "
+                f"the Silo BOM has {kept}. It stays as it is until somebody decides."
+            )
+            found.append(Finding(FindingCode.CONFLICT, Severity.WARNING, message, places))
+        return tuple(found)
 
 
 def rows_as_dicts(rows: Iterable[Row]) -> list[dict[str, Any]]:

@@ -14,12 +14,18 @@ from silo.bom.naming import display_name
 
 
 class ItemLookup(Protocol):
-    """What is needed of a client. ``get_items_by_uuid(uuids)`` is used where the client has it."""
+    """What is needed of a client.
+
+    ``get_items_by_uuid(uuids)`` is used where the client has it; it gives a mapping UUID → item (or None), or
+    the items found, each naming its UUID as ``id``, ``uuid`` or ``silo_uuid``.
+    """
 
     def get_item_by_uuid(self, uuid: str, /) -> Mapping[str, Any] | None: ...
 
 
 Known = Mapping[str, Mapping[str, Any] | None]
+
+_UUID_KEYS = ("id", "uuid", "silo_uuid")
 
 
 def look_up(uuids: Iterable[str], api_client: ItemLookup) -> Known:
@@ -27,9 +33,16 @@ def look_up(uuids: Iterable[str], api_client: ItemLookup) -> Known:
     wanted = list(dict.fromkeys(uuids))
     batch = getattr(api_client, "get_items_by_uuid", None)
     if callable(batch) and wanted:
-        found: Mapping[str, Mapping[str, Any]] = batch(wanted)
+        found = _by_uuid(batch(wanted))
         return {uuid: found.get(uuid) or found.get(uuid.lower()) for uuid in wanted}
     return {uuid: api_client.get_item_by_uuid(uuid) for uuid in wanted}
+
+
+def _by_uuid(answer: Any) -> Known:
+    if isinstance(answer, Mapping):
+        return answer
+    items = [item for item in answer or () if item is not None]
+    return {str(item[key]): item for item in items for key in _UUID_KEYS if item.get(key)}
 
 
 def resolve_part_numbers(
