@@ -19,7 +19,7 @@ from silo_server.middleware import BodyLimit, SecurityHeaders
 from silo_server.routes import auth, bom, items, review, revisions, system, transfer
 from silo_server.routes.context import Server
 from silo_server.settings import Settings, settings_from_environment
-from silo_server.web import site
+from silo_server.web import pages
 
 VERSION = "0.1.0"
 # Routes are matched in this order; /items/by-uuid and /items/search stand before /items/{part_number}.
@@ -31,7 +31,7 @@ ROUTERS = (
     bom.router,
     review.router,
     transfer.router,
-    *site.ROUTERS,
+    *pages.ROUTERS,
 )
 
 
@@ -60,7 +60,7 @@ def create_app(settings: Settings, clock: Clock = utc_now) -> FastAPI:
     for router in ROUTERS:
         app.include_router(router)
     failures.install(app)
-    site.install(app)
+    pages.install(app)
     app.add_middleware(BodyLimit, settings=settings)
     app.add_middleware(SecurityHeaders)
     app.openapi = lambda: _openapi(app)  # type: ignore[method-assign]

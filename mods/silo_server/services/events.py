@@ -7,6 +7,7 @@ Names: the spec's ``bom_merge``; the real Silo's ``item.created``, ``item.update
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -84,6 +85,27 @@ def read_after(tx: Tx, after: int, limit: int = 500) -> list[LoggedEvent]:
         .limit(limit)
     ).all()
     return [LoggedEvent(*row) for row in rows]
+
+
+@dataclass(frozen=True, slots=True)
+class DatedEvent:
+    """An event as people read it: with its time, and its data decoded."""
+
+    id: int
+    name: str
+    at: str
+    data: Mapping[str, Any]
+
+
+def newest(tx: Tx, limit: int, after: int = 0) -> list[DatedEvent]:
+    """The newest events, newest first; only those after id ``after``."""
+    rows = tx.conn.execute(
+        select(events.c.id, events.c.name, events.c.at, events.c.data)
+        .where(events.c.id > after)
+        .order_by(events.c.id.desc())
+        .limit(limit)
+    ).all()
+    return [DatedEvent(row.id, row.name, row.at, json.loads(row.data)) for row in rows]
 
 
 def bounds(tx: Tx) -> tuple[int, int]:

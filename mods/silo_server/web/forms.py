@@ -3,26 +3,42 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import AsyncIterator
 from typing import Annotated
-from urllib.parse import urlencode
+from urllib.parse import quote
 
 from fastapi import Depends, Request
 from starlette.datastructures import FormData
 from starlette.responses import RedirectResponse, Response
 
+from silo.bom.errors import RejectedError
+from silo_server.web.render import NOTICE_COOKIE
 
-async def _form(request: Request) -> FormData:
+NOTICE_SECONDS = 60
+
+
+async def _form(request: Request) -> AsyncIterator[FormData]:
     # The guard read the form for its secret already; Starlette keeps it.
-    return await request.form()
+    form = await request.form(max_files=1)
+    try:
+        yield form
+    finally:
+        await form.close()
 
 
 Form = Annotated[FormData, Depends(_form)]
 
 
 def text(form: FormData, name: str, most: int = 500) -> str:
-    """A text field, trimmed; "" where it is absent or a file."""
+    """A text field, trimmed; "" where it is absent or a file. RejectedError where it is longer."""
     value = form.get(name)
-    return value.strip()[:most] if isinstance(value, str) else ""
+    if not isinstance(value, str):
+        return ""
+    trimmed = value.replace("\x00", "").strip()
+    if len(trimmed) > most:
+        raise RejectedError(f"{name}: wanted at most {most} characters, got {len(trimmed)}")
+    return trimmed
 
 
 def texts(form: FormData, name: str) -> list[str]:
@@ -36,6 +52,26 @@ def whole(form: FormData, name: str) -> int | None:
     return int(value) if value.isascii() and value.isdigit() and len(value) < 16 else None
 
 
+def amount(form: FormData, name: str) -> float:
+    """A number as people type it, with a point or a comma; RejectedError where it is none."""
+    value = text(form, name)
+    try:
+        found = float(value.replace(",", "."))
+    except ValueError:
+        found = math.nan
+    if not math.isfinite(found):
+        raise RejectedError(f"{name}: wanted a number such as 4 or 2.5, got {value!r}")
+    return found
+
+
 def back(path: str, notice: str = "") -> Response:
-    """Go and look at ``path`` (303), with a sentence on top."""
-    return RedirectResponse(f"{path}?{urlencode({'notice': notice})}" if notice else path, 303)
+    """Go and look at ``path`` (303); ``notice`` stands there on top, once.
+
+    It travels in a cookie and not in the address, so that no link can put words into our mouth.
+    """
+    response = RedirectResponse(path, 303)
+    if notice:
+        response.set_cookie(
+            NOTICE_COOKIE, quote(notice), max_age=NOTICE_SECONDS, httponly=True, samesite="lax"
+        )
+    return response

@@ -4,12 +4,12 @@
 from __future__ import annotations
 
 from typing import Annotated
-from urllib.parse import quote
+from urllib.parse import quote, urlsplit
 
 from fastapi import Depends, FastAPI, Request
 from starlette.responses import RedirectResponse, Response
 
-from silo.bom.errors import AuthError
+from silo.bom.errors import AuthError, ForbiddenError
 from silo_server.routes.context import SAFE_METHODS, Guard
 from silo_server.values import Actor, Role
 
@@ -31,8 +31,7 @@ class PageGuard(Guard):
         except AuthError as error:
             if error.status_hint != 401:
                 raise
-            here = request.url.path if request.method in SAFE_METHODS else "/"
-            raise LoginNeededError(here) from None
+            raise LoginNeededError(_here(request)) from None
 
 
 Reader = Annotated[Actor, Depends(PageGuard(Role.VIEWER))]
@@ -40,11 +39,35 @@ Writer = Annotated[Actor, Depends(PageGuard(Role.EDITOR))]
 Administrator = Annotated[Actor, Depends(PageGuard(Role.ADMIN))]
 
 
+def own_form(request: Request) -> None:
+    """For the one form without a session, the login: ForbiddenError where another site sent it.
+
+    A browser says where a form comes from; a page elsewhere must not log somebody in under its own name.
+    """
+    site = request.headers.get("sec-fetch-site")
+    origin = request.headers.get("origin")
+    if site is not None:
+        foreign = site not in ("same-origin", "none")
+    else:
+        foreign = origin is not None and urlsplit(origin).netloc != request.headers.get("host")
+    if foreign:
+        raise ForbiddenError("this form was sent by another site; log in on the login page itself")
+
+
 def install(app: FastAPI) -> None:
     """Lead who is not logged in to the login page."""
     app.add_exception_handler(LoginNeededError, _to_login)
 
 
+def _here(request: Request) -> str:
+    if request.method in SAFE_METHODS:
+        query = f"?{request.url.query}" if request.url.query else ""
+        return request.url.path + query
+    # A form cannot be sent again by a link; the page before it is the best that is left.
+    referer = urlsplit(request.headers.get("referer", ""))
+    return referer.path if referer.netloc == request.headers.get("host") and referer.path else "/"
+
+
 async def _to_login(_request: Request, error: Exception) -> Response:
     assert isinstance(error, LoginNeededError)
-    return RedirectResponse("/login?next=" + quote(error.target), 303)
+    return RedirectResponse("/login?next=" + quote(error.target, safe="/"), 303)

@@ -15,33 +15,44 @@ from silo_server.services.items import get_item
 from silo_server.web.forms import Form, back, text, whole
 from silo_server.web.guard import Reader, Writer
 from silo_server.web.merge_page import bom_path
-from silo_server.web.render import page, segment
+from silo_server.web.render import page, plural
 from silo_server.web.words import changes, sentences
 
 router = APIRouter(include_in_schema=False)
 
 PAGE_SIZE = 50
-# Of this many newest changes the lines are told on the list; older ones are a click away.
+# Of this many newest changes the lines are told on the list; those of older ones are a click away.
 TOLD = 10
+TOLD_LINES = 12
+KNOWN = 500
+
+Point = Annotated[int | None, Query(ge=0, le=2**62)]
 
 
 @router.get("/items/{part_number}/history")
 def history_page(
-    request: Request,
-    server: ServerDep,
-    caller: Reader,
-    part_number: str,
-    before: Annotated[int | None, Query(ge=0, le=2**62)] = None,
+    request: Request, server: ServerDep, caller: Reader, part_number: str, before: Point = None
 ) -> Response:
-    """All changes, newest first."""
+    """All changes, newest first; ``before`` is the change to page on from."""
     with server.db.read(caller) as tx:
         item = get_item(tx, part_number, include_archived=True)
         found = history.list_changes(tx, item, PAGE_SIZE + 1, before)
         told = {
-            change.id: sentences(history.get_change(tx, item, change.id)[1], 12) for change in found[:TOLD]
+            change.id: sentences(history.get_change(tx, item, change.id)[1], TOLD_LINES)
+            for change in found[:TOLD]
         }
-    more = found[PAGE_SIZE - 1].id if len(found) > PAGE_SIZE else None
-    return page(request, "history.html", caller, item=item, changes=found[:PAGE_SIZE], told=told, more=more)
+        newest = next(iter(history.list_changes(tx, item, 1)), None)
+    shown = found[:PAGE_SIZE]
+    return page(
+        request,
+        "history.html",
+        caller,
+        item=item,
+        changes=shown,
+        told=told,
+        newest=newest,
+        more=shown[-1].id if len(found) > PAGE_SIZE else None,
+    )
 
 
 @router.get("/items/{part_number}/compare")
@@ -50,34 +61,39 @@ def compare_page(
     server: ServerDep,
     caller: Reader,
     part_number: str,
-    old: Annotated[int, Query(ge=0, le=2**62)] = 0,
-    new: Annotated[int | None, Query(ge=0, le=2**62)] = None,
+    old: Point = None,
+    new: Point = None,
+    all: bool = False,
 ) -> Response:
-    """Two points of time, line by line."""
+    """Two points of time, line by line; without ``old`` what the newest change did."""
     with server.db.read(caller) as tx:
         item = get_item(tx, part_number, include_archived=True)
-        known = history.list_changes(tx, item, 500)
-        latest = known[0].id if known else 0
-        chosen = latest if new is None else new
-        first, second = sorted((old, chosen))
+        known = history.list_changes(tx, item, KNOWN)
+        points = [0, 0, *(change.id for change in reversed(known))]
+        second = points[-1] if new is None else new
+        first = max((point for point in points if point < second), default=0) if old is None else old
+        first, second = sorted((first, second))
         rows = history.compare(history.state_at(tx, item, first), history.state_at(tx, item, second))
-    said = {
-        row.child.id: changes(row.before, row.after)
-        for row in rows
-        if row.before is not None and row.after is not None
-    }
+    counts = {status: sum(row.status == status for row in rows) for status in STATUSES}
+    said = {row.child.id: changes(row.before, row.after) for row in rows if row.before and row.after}
     return page(
         request,
         "compare.html",
         caller,
         item=item,
-        rows=rows,
+        rows=[row for row in rows if all or row.status != "unchanged"],
+        counts=counts,
+        summary=", ".join(f"{count} {status}" for status, count in counts.items() if count),
         said=said,
         old=first,
         new=second,
         known=known,
-        is_latest=first == latest,
+        show_all=all,
+        latest=points[-1],
     )
+
+
+STATUSES = ("added", "removed", "changed", "unchanged")
 
 
 @router.post("/items/{part_number}/restore")
@@ -87,10 +103,7 @@ def restore(server: ServerDep, caller: Writer, part_number: str, form: Form) -> 
     if change_id is None:
         raise RejectedError("change_id: wanted the number of a change, got none; load the page again")
     with server.db.write(caller) as tx:
+        item = get_item(tx, part_number)
+        was = len(history.state_at(tx, item, change_id))
         history.restore(tx, part_number, change_id, text(form, "reason") or None, None)
-    return back(bom_path(part_number), "Restored. The former state is in the history.")
-
-
-def history_path(part_number: str) -> str:
-    """The history page of an item."""
-    return f"/items/{segment(part_number)}/history"
+    return back(bom_path(part_number), f"Restored: {plural(was, 'line', 'lines')} as of change {change_id}.")

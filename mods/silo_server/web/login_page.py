@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Request
+from fastapi import APIRouter, Depends, Query, Request
 from starlette.datastructures import FormData
 from starlette.responses import RedirectResponse, Response
 
@@ -15,7 +15,7 @@ from silo_server.routes.auth import set_session_cookie
 from silo_server.routes.context import SESSION_COOKIE, ServerDep, client_address, find_actor
 from silo_server.services import logins
 from silo_server.web.forms import Form, back, text
-from silo_server.web.guard import Reader
+from silo_server.web.guard import Reader, own_form
 from silo_server.web.render import page
 
 router = APIRouter(include_in_schema=False)
@@ -38,7 +38,7 @@ def login_form(request: Request, next: Next = START) -> Response:
     return page(request, "login.html", None, target=local_path(next), problem="")
 
 
-@router.post("/login")
+@router.post("/login", dependencies=[Depends(own_form)])
 def log_in(request: Request, server: ServerDep, form: Form) -> Response:
     """Begin a session and go on to ``next``."""
     target = local_path(text(form, "next"))

@@ -1,27 +1,50 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The page at ``resolve_url``: what a merge left for a person to decide."""
+"""The page at ``resolve_url``: what a merge left for a person to decide, and the BOM's lines."""
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Request
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Request
 from starlette.datastructures import FormData
 from starlette.responses import Response
 
-from silo.bom.errors import RejectedError
-from silo_server.routes.context import ServerDep
-from silo_server.services import history
+from silo.bom.errors import NotFoundError, RejectedError, SiloError, VersionConflictError
+from silo_server.db.engine import Tx
+from silo_server.routes.context import Server, ServerDep
+from silo_server.services import edits, events, history
 from silo_server.services import review as service
 from silo_server.services.items import get_item
-from silo_server.services.lines import lines_of
+from silo_server.services.lines import line_of, lines_of
 from silo_server.services.review import Action, Decision
-from silo_server.web.forms import Form, back, text, texts, whole
+from silo_server.values import Actor, Line
+from silo_server.web.forms import Form, amount, back, text, texts, whole
 from silo_server.web.guard import Reader, Writer
-from silo_server.web.render import page, segment
-from silo_server.web.words import sentences
+from silo_server.web.render import page, plural, segment
+from silo_server.web.words import FIELDS, sentences
 
 router = APIRouter(include_in_schema=False)
 
-_SINGLE = {action.value: action for action in Action}
+# A person looks at that many lines; all of them are one click away.
+FIRST_LINES = 500
+LATER_CHANGES = 5
+KEPT = "kept on purpose, not in the CAD model"
+CHANGED_MEANWHILE = (
+    "Somebody else changed this BOM while you were deciding. Nothing of yours was done; "
+    "this is how it stands now."
+)
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What the page is asked to show besides the BOM: a problem, and the form that is being filled in."""
+
+    problem: str = ""
+    edit: str = ""
+    show_all: bool = False
+    typed: Mapping[str, str] = field(default_factory=dict)
 
 
 def bom_path(part_number: str) -> str:
@@ -30,56 +53,189 @@ def bom_path(part_number: str) -> str:
 
 
 @router.get("/items/{part_number}/bom")
-def merge_page(request: Request, server: ServerDep, caller: Reader, part_number: str) -> Response:
-    """Unreferenced lines, conflicts, the last change in plain words, and all lines."""
+def merge_page(
+    request: Request,
+    server: ServerDep,
+    caller: Reader,
+    part_number: str,
+    edit: Annotated[str, Query(max_length=64)] = "",
+    all: bool = False,
+) -> Response:
+    """Unreferenced lines, conflicts, the last sync in plain words, and all lines; ``edit`` opens one."""
+    return _show(request, server, caller, part_number, Asked(edit=edit, show_all=all))
+
+
+@router.post("/items/{part_number}/bom/decide")
+def decide(request: Request, server: ServerDep, caller: Writer, part_number: str, form: Form) -> Response:
+    """Carry a decision out, for one line or for all chosen ones."""
+
+    def work(tx: Tx) -> str:
+        decisions = decisions_of(form)
+        if not decisions:
+            return "No line was chosen, so nothing was changed."
+        service.resolve(tx, part_number, decisions, whole(form, "version"))
+        return _done(decisions)
+
+    return _do(request, server, caller, part_number, work)
+
+
+@router.post("/items/{part_number}/bom/undo")
+def undo(request: Request, server: ServerDep, caller: Writer, part_number: str, form: Form) -> Response:
+    """Take a change back, as a new change."""
+
+    def work(tx: Tx) -> str:
+        change_id = whole(form, "change_id")
+        if change_id is None:
+            raise RejectedError("change_id: wanted the number of a change, got none; load the page again")
+        history.undo(tx, part_number, change_id, None)
+        return "Undone."
+
+    return _do(request, server, caller, part_number, work)
+
+
+@router.post("/items/{part_number}/bom/lines")
+def add_line(request: Request, server: ServerDep, caller: Writer, part_number: str, form: Form) -> Response:
+    """Add a manual line."""
+
+    def work(tx: Tx) -> str:
+        values = line_fields(form)
+        if not text(form, "child"):
+            raise RejectedError("part number: wanted the number of an item, got nothing")
+        new = edits.NewLine(child_part_number=text(form, "child"), **values)
+        added = edits.add_line(tx, part_number, new, whole(form, "version"))
+        return f"{added.line.child_part_number if added.line else 'The line'} added."
+
+    return _do(request, server, caller, part_number, work, Asked(typed=_typed(form)))
+
+
+@router.post("/items/{part_number}/bom/lines/{child}")
+def change_line(
+    request: Request, server: ServerDep, caller: Writer, part_number: str, child: str, form: Form
+) -> Response:
+    """Change what a person may change on a line."""
+
+    def work(tx: Tx) -> str:
+        edited = edits.change_line(tx, part_number, child, line_fields(form), whole(form, "version"))
+        if not edited.change_id:
+            return "Nothing was different, so nothing was changed."
+        return f"{child} changed."
+
+    return _do(request, server, caller, part_number, work, Asked(edit=child, typed=_typed(form)))
+
+
+@router.post("/items/{part_number}/bom/lines/{child}/remove")
+def remove_line(
+    request: Request, server: ServerDep, caller: Writer, part_number: str, child: str, form: Form
+) -> Response:
+    """Take a line out of the BOM."""
+
+    def work(tx: Tx) -> str:
+        edits.remove_line(tx, part_number, child, whole(form, "version"))
+        return f"{child} removed."
+
+    return _do(request, server, caller, part_number, work)
+
+
+def decisions_of(form: FormData) -> list[Decision]:
+    """The decisions in a submitted form: one action for each line in ``chosen``."""
+    try:
+        action = Action(text(form, "action"))
+    except ValueError:
+        raise RejectedError("action: wanted one of the buttons, got none; load the page again") from None
+    reason = text(form, "reason") or (KEPT if action is Action.KEEP else None)
+    return [Decision(child, action, reason) for child in texts(form, "chosen")]
+
+
+def line_fields(form: FormData) -> dict[str, Any]:
+    """The fields of a line that people fill in."""
+    return {
+        "quantity": amount(form, "quantity"),
+        "unit": text(form, "unit", 32) or None,
+        "reference_designators": tuple(text(form, "reference_designators", 10_000).replace(",", " ").split()),
+        "find_number": text(form, "find_number", 32) or None,
+        "notes": text(form, "notes", 10_000) or None,
+    }
+
+
+def _do(
+    request: Request,
+    server: Server,
+    caller: Actor,
+    part_number: str,
+    work: Callable[[Tx], str],
+    asked: Asked | None = None,
+) -> Response:
+    """Do ``work`` and go back; where it cannot be done, the page says why and keeps what was typed."""
+    try:
+        with server.db.write(caller) as tx:
+            notice = work(tx)
+    except SiloError as error:
+        given = asked or Asked()
+        problem = CHANGED_MEANWHILE if isinstance(error, VersionConflictError) else _plain(error)
+        shown = Asked(problem, given.edit, typed=given.typed)
+        return _show(request, server, caller, part_number, shown, error.status_hint)
+    return back(bom_path(part_number), notice)
+
+
+def _show(
+    request: Request, server: Server, caller: Actor, part_number: str, asked: Asked, status: int = 200
+) -> Response:
     with server.db.read(caller) as tx:
         item = get_item(tx, part_number)
         found = service.review(tx, item.part_number)
         lines = lines_of(tx, item)
-        last = next(iter(history.list_changes(tx, item, 1)), None)
-        changed = history.get_change(tx, item, last.id)[1] if last else []
+        merge = found.last_merge
+        merged = history.get_change(tx, item, merge.id)[1] if merge else []
+        recent = history.list_changes(tx, item, LATER_CHANGES)
+        seen = events.bounds(tx)[1]
     return page(
         request,
         "merge.html",
         caller,
+        status=status,
         item=item,
-        lines=lines,
+        total=len(lines),
+        lines=lines if asked.show_all else lines[:FIRST_LINES],
+        editing=_editing(lines, asked, item),
+        typed=asked.typed,
+        problem=asked.problem,
         unreferenced=found.unreferenced,
         conflicts=found.conflicts,
-        last_change=last,
-        last_lines=sentences(changed),
-        can_undo=last is not None,
+        merge=merge,
+        merged=sentences(merged),
+        later=[change for change in recent if merge is None or change.id > merge.id],
+        newest=recent[0] if recent else None,
+        seen=seen,
     )
 
 
-@router.post("/items/{part_number}/bom/decide")
-def decide(server: ServerDep, caller: Writer, part_number: str, form: Form) -> Response:
-    """Carry out one button, or all chosen lines at once."""
-    decisions = decisions_of(form)
-    if not decisions:
-        return back(bom_path(part_number), "Nothing was chosen, so nothing was changed.")
-    with server.db.write(caller) as tx:
-        service.resolve(tx, part_number, decisions, whole(form, "version"))
-    lines = "1 line" if len(decisions) == 1 else f"{len(decisions)} lines"
-    return back(bom_path(part_number), f"Done: {lines}. It can be undone below.")
+def _editing(lines: list[Line], asked: Asked, item: Any) -> Line | None:
+    if not asked.edit:
+        return None
+    try:
+        return line_of(lines, asked.edit, item)
+    except NotFoundError:
+        return None
 
 
-@router.post("/items/{part_number}/bom/undo")
-def undo(server: ServerDep, caller: Writer, part_number: str, form: Form) -> Response:
-    """Take the last change back, as a new change."""
-    change_id = whole(form, "change_id")
-    if change_id is None:
-        raise RejectedError("change_id: wanted the number of a change, got none; load the page again")
-    with server.db.write(caller) as tx:
-        history.undo(tx, part_number, change_id, None)
-    return back(bom_path(part_number), "Undone.")
+def _typed(form: FormData) -> dict[str, str]:
+    return {name: str(form.get(name, "")) for name in ("child", *FIELDS)}
 
 
-def decisions_of(form: FormData) -> list[Decision]:
-    """The decisions in a submitted form: the button's own line, or ``all`` for the chosen ones."""
-    reason = text(form, "reason") or None
-    for name, action in _SINGLE.items():
-        if name in form:
-            return [Decision(text(form, name), action, reason)]
-    for_all = _SINGLE.get(text(form, "all"))
-    return [Decision(number, for_all, reason) for number in texts(form, "chosen")] if for_all else []
+def _done(decisions: list[Decision]) -> str:
+    words = {
+        Action.REMOVE: "removed",
+        Action.KEEP: "kept as intentional",
+        Action.TAKE_CAD: "set to what CAD says",
+        Action.KEEP_SILO: "left as Silo says",
+    }[decisions[0].action]
+    who = decisions[0].child_part_number
+    return f"{who if len(decisions) == 1 else plural(len(decisions), 'line', 'lines')} {words}."
+
+
+def _plain(error: SiloError) -> str:
+    problems = error.problems if isinstance(error, RejectedError) else ()
+    message = "; ".join(
+        problem.partition(": ")[2] if problem.startswith("decisions[") else problem for problem in problems
+    ) or str(error)
+    return message[:1].upper() + message[1:] + "."

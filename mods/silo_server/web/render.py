@@ -1,35 +1,49 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Templates, and what every page shows: who is logged in, the form secret, notices."""
+"""Templates, and what every page shows: who is logged in, the form secret, a notice of what was just done."""
 
 from __future__ import annotations
 
-from datetime import datetime
 from typing import Any
-from urllib.parse import quote
+from urllib.parse import quote, unquote
 
 from fastapi import Request
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
 from starlette.responses import HTMLResponse, Response
 
+from silo_server.clock import wire
 from silo_server.values import Actor, Role
+
+NOTICE_COOKIE = "silo_notice"
 
 
 def quantity(value: float | None, unit: str | None = None) -> str:
     """``12``, ``2.5 m``; a dash where there is none."""
     if value is None:
         return "–"
-    return f"{value:g} {unit}".strip() if unit else f"{value:g}"
+    shown = str(int(value)) if value == int(value) and abs(value) < 1e15 else f"{value:.12g}"
+    return f"{shown} {unit}" if unit else shown
 
 
-def day(stamp: str | datetime | None) -> str:
-    """``2026-02-08 22:15``, UTC as stored."""
-    text = stamp.isoformat() if isinstance(stamp, datetime) else stamp or ""
-    return text[:16].replace("T", " ")
+def when(stamp: str | None) -> Markup | str:
+    """``2026-02-08 22:15`` (UTC, as stored) with its full form for machines; a dash where there is none."""
+    if not stamp:
+        return "–"
+    return Markup('<time datetime="{}">{}</time>').format(wire(stamp), stamp[:16].replace("T", " "))
 
 
 def plural(count: int, one: str, many: str) -> str:
     """``1 item is``, ``3 items are``."""
     return f"{count} {one if count == 1 else many}"
+
+
+def size(count: int | None) -> str:
+    """``812 bytes``, ``14 kB``, ``3.2 MB``."""
+    if count is None:
+        return ""
+    if count < 1000:
+        return f"{count} bytes"
+    return f"{count / 1e3:.0f} kB" if count < 1e6 else f"{count / 1e6:.1f} MB"
 
 
 def segment(text: str) -> str:
@@ -45,7 +59,7 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters.update(quantity=quantity, day=day, segment=segment)
+    environment.filters.update(quantity=quantity, when=when, segment=segment, size=size)
     environment.globals.update(plural=plural)
     return environment
 
@@ -56,14 +70,18 @@ _TEMPLATES = _environment()
 def page(
     request: Request, template: str, actor: Actor | None, *, status: int = 200, **values: Any
 ) -> Response:
-    """A page. ``actor`` None: nobody is logged in."""
+    """A page. ``actor`` None: nobody is logged in. A notice that waits in its cookie is shown once."""
+    notice = unquote(request.cookies.get(NOTICE_COOKIE, ""))[:500]
     html = _TEMPLATES.get_template(template).render(
         actor=actor,
         may_edit=actor is not None and actor.role.covers(Role.EDITOR),
         is_admin=actor is not None and actor.role.covers(Role.ADMIN),
         csrf=(actor.csrf_token or "") if actor is not None else "",
         here=request.url.path,
-        notice=request.query_params.get("notice", "")[:300],
+        notice=notice,
         **values,
     )
-    return HTMLResponse(html, status)
+    response = HTMLResponse(html, status)
+    if notice:
+        response.delete_cookie(NOTICE_COOKIE)
+    return response

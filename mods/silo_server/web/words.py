@@ -7,54 +7,68 @@ from collections.abc import Sequence
 
 from silo_server.services.history import ChangedLine
 from silo_server.values import LineState
-from silo_server.web.render import quantity
+from silo_server.web.render import plural, quantity
 
+# What a person fills in on a line, with its label.
+FIELDS = {
+    "quantity": "Quantity",
+    "unit": "Unit",
+    "reference_designators": "Reference designators",
+    "find_number": "Find number",
+    "notes": "Notes",
+}
 _NAMES = {
-    "unit": "unit",
     "reference_designators": "reference designators",
     "find_number": "find number",
     "notes": "notes",
     "child_revision": "revision",
-    "rel_type": "relation",
+    "rel_type": "type",
 }
 
 
-def sentence(line: ChangedLine) -> str:
-    """What one change made of one line: ``F01-0001 M8x20 Bolt: quantity 8 → 12``."""
+def sentence(line: ChangedLine) -> tuple[str, str]:
+    """(mark, words) of what one change made of one line: ``~``, ``F01-0001 M8x20 Bolt: quantity 8 → 12``."""
     who = f"{line.child.part_number} {line.child.name}".strip()
     if line.before is None and line.after is not None:
-        return f"{who}: added, quantity {quantity(line.after.quantity, line.after.unit)}"
+        return "added", f"{who}: added, quantity {quantity(line.after.quantity, line.after.unit)}"
     if line.after is None:
-        return f"{who}: removed"
+        return "removed", f"{who}: removed"
     assert line.before is not None  # a changed line has both states
-    return f"{who}: {', '.join(changes(line.before, line.after)) or 'no visible change'}"
+    gone = line.after.unreferenced_since is not None and line.before.unreferenced_since is None
+    said = ", ".join(changes(line.before, line.after)) or "no visible change"
+    return ("warn" if gone else "changed"), f"{who}: {said}"
 
 
 def changes(before: LineState, after: LineState) -> list[str]:
     """What differs between two states of a line."""
     said: list[str] = []
     if (before.quantity, before.unit) != (after.quantity, after.unit):
-        said.append(
-            f"quantity {quantity(before.quantity, before.unit)} → {quantity(after.quantity, after.unit)}"
-        )
+        old, new = quantity(before.quantity, before.unit), quantity(after.quantity, after.unit)
+        said.append(f"quantity {old} → {new}")
     if before.unreferenced_since is None and after.unreferenced_since is not None:
         said.append("no longer referenced by the assembly")
-    if (
-        before.unreferenced_since is not None
-        and after.unreferenced_since is None
-        and after.source == "assembly"
-    ):
+    back = before.unreferenced_since is not None and after.unreferenced_since is None
+    if back and after.source == "assembly":
         said.append("referenced again")
     if before.source != after.source:
-        kept = f" ({after.reason})" if after.reason else ""
-        said.append(f"now a manual line{kept}" if after.source == "manual" else "now owned by the assembly")
-    said += [
-        f"{words} changed" for name, words in _NAMES.items() if getattr(before, name) != getattr(after, name)
-    ]
+        said.append("now a manual line" if after.source == "manual" else "owned by the assembly again")
+    if before.reason != after.reason and after.reason:
+        said.append(f"reason: {after.reason}")
+    for name, words in _NAMES.items():
+        old, new = (_shown(getattr(state, name)) for state in (before, after))
+        if old != new:
+            said.append(f"{words} {old} → {new}")
     return said
 
 
-def sentences(lines: Sequence[ChangedLine], most: int = 30) -> list[str]:
+def sentences(lines: Sequence[ChangedLine], most: int = 30) -> list[tuple[str, str]]:
     """The lines of a change; beyond ``most`` only how many more."""
     told = [sentence(line) for line in lines[:most]]
-    return [*told, f"and {len(lines) - most} more lines"] if len(lines) > most else told
+    rest = len(lines) - most
+    return [*told, ("", f"and {plural(rest, 'more line', 'more lines')}")] if rest > 0 else told
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, tuple):
+        return " ".join(map(str, value)) or "none"
+    return "none" if value is None or value == "" else f"“{value}”"

@@ -8,14 +8,30 @@ from starlette.responses import Response
 from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
-from silo_server.web import error_page, guard, history_page, items_page, login_page, merge_page
+from silo_server.web import (
+    account_page,
+    activity_page,
+    error_page,
+    guard,
+    history_page,
+    import_page,
+    item_page,
+    items_page,
+    login_page,
+    merge_page,
+    users_page,
+)
 
-# /items/{part_number} stands last: the others have more in their paths.
 ROUTERS = (
     login_page.router,
+    items_page.router,
+    item_page.router,
     merge_page.router,
     history_page.router,
-    items_page.router,
+    import_page.router,
+    activity_page.router,
+    account_page.router,
+    users_page.router,
 )
 
 

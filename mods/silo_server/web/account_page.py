@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""One's own password and API tokens."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Request
+from starlette.datastructures import FormData
+from starlette.responses import Response
+
+from silo.bom.errors import RejectedError
+from silo_server.routes.context import SESSION_COOKIE, Server, ServerDep
+from silo_server.services import accounts, credentials
+from silo_server.values import Actor, Role
+from silo_server.web.forms import Form, back, text, whole
+from silo_server.web.guard import Reader
+from silo_server.web.render import page
+
+router = APIRouter(include_in_schema=False)
+
+LIFETIMES = (30, 90, 365)
+
+
+@router.get("/account")
+def account_page(request: Request, server: ServerDep, caller: Reader) -> Response:
+    """The own tokens, never their secrets, and a form for the password."""
+    return _show(request, server, caller)
+
+
+@router.post("/account/tokens")
+def create_token(request: Request, server: ServerDep, caller: Reader, form: Form) -> Response:
+    """Make a token. Its secret is on this answer and never again, so that there is no way back to it."""
+    name, days = text(form, "name"), whole(form, "days")
+    if not 0 < len(name) <= 200:
+        return _show(request, server, caller, problem="A token needs a name of at most 200 characters.")
+    if days not in (None, *LIFETIMES):
+        return _show(request, server, caller, problem="Choose one of the lifetimes.")
+    with server.db.write(caller, even_when_read_only=True) as tx:
+        _, secret = credentials.create_token(tx, _user_id(caller), name, days=days)
+    return _show(request, server, caller, fresh=(name, secret))
+
+
+@router.post("/account/tokens/{token_id}/revoke")
+def revoke_token(server: ServerDep, caller: Reader, token_id: int, form: Form) -> Response:
+    """Revoke a token: one's own, or anybody's for an admin."""
+    owner = None if caller.role is Role.ADMIN else _user_id(caller)
+    with server.db.write(caller, even_when_read_only=True) as tx:
+        credentials.revoke_token(tx, token_id, owner)
+    return back("/users" if text(form, "from") == "users" else "/account", "The token is revoked.")
+
+
+@router.post("/account/password")
+def set_password(request: Request, server: ServerDep, caller: Reader, form: Form) -> Response:
+    """Set the own password; ends all own sessions."""
+    password, again = password_of(form, "password"), password_of(form, "again")
+    try:
+        if password != again:
+            raise RejectedError("The two passwords differ.")
+        with server.db.write(caller, even_when_read_only=True) as tx:
+            accounts.change_user(tx, caller.username, password=password)
+    except RejectedError as error:
+        return _show(request, server, caller, problem=str(error))
+    response = back("/login", "The password is set. Log in with it.")
+    response.delete_cookie(SESSION_COOKIE)
+    return response
+
+
+def password_of(form: FormData, name: str) -> str:
+    """A password as it was typed: spaces at its ends belong to it."""
+    value = form.get(name)
+    return value[: accounts.MAX_PASSWORD + 1] if isinstance(value, str) else ""
+
+
+def _show(
+    request: Request,
+    server: Server,
+    caller: Actor,
+    *,
+    problem: str = "",
+    fresh: tuple[str, str] | None = None,
+) -> Response:
+    with server.db.read(caller) as tx:
+        tokens = credentials.list_tokens(tx, _user_id(caller))
+        now = tx.stamp
+        user = accounts.get_user(tx, caller.username)
+    return page(
+        request,
+        "account.html",
+        caller,
+        status=400 if problem else 200,
+        tokens=tokens,
+        now=now,
+        user=user,
+        lifetimes=LIFETIMES,
+        problem=problem,
+        fresh=fresh,
+        shortest=accounts.MIN_PASSWORD,
+    )
+
+
+def _user_id(caller: Actor) -> int:
+    assert caller.user_id is not None  # every caller that a guard let in is a user
+    return caller.user_id

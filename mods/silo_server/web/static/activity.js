@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// The activity page, live: an event says that there is news, the server's own page brings it.
+
+import { listen } from "./live.js";
+
+const MOST = 300;
+const list = document.getElementById("entries");
+const state = document.getElementById("state");
+const names = list.dataset.names.split(" ");
+let busy = false;
+let again = false;
+
+async function refresh() {
+  again = busy;
+  if (busy) return;
+  busy = true;
+  try {
+    const answer = await fetch(`/activity?after=${list.dataset.last}`);
+    const page = new DOMParser().parseFromString(await answer.text(), "text/html");
+    const fresh = page.getElementById("entries");
+    if (!fresh) return location.reload(); // logged out meanwhile
+    list.dataset.last = fresh.dataset.last;
+    for (const entry of fresh.children) entry.classList.add("new");
+    list.prepend(...fresh.children);
+    while (list.children.length > MOST) list.lastElementChild.remove();
+    document.getElementById("empty")?.remove();
+  } catch {
+    state.textContent = "The server cannot be reached.";
+  } finally {
+    busy = false;
+    if (again) refresh();
+  }
+}
+
+listen("/api/events", list.dataset.last, names, refresh, (live) => {
+  state.textContent = live ? "Live: new entries appear by themselves." : "Not connected; trying again.";
+  state.classList.toggle("on", live);
+});

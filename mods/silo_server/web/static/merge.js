@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// The merge page: says when the BOM changed meanwhile, chooses all lines, completes part numbers.
+
+import { complete } from "./complete.js";
+import { listen } from "./live.js";
+
+const place = document.getElementById("live");
+let count = 0;
+
+// The lines stay where they are: a table that jumps under the pointer makes people press the wrong button.
+function announce(name, data) {
+  const told = name === "reset" ? {} : JSON.parse(data);
+  count += 1;
+  const what = name === "bom_merge" ? "A new merge arrived" : "The BOM changed";
+  const detail = told.summary ? `: ${told.summary}` : "";
+  const who = told.user ? ` (${told.user})` : "";
+  const words = document.createElement("span");
+  words.textContent = `${what}${detail}${who}.${count > 1 ? ` ${count} changes since you opened this page.` : ""}`;
+  const link = document.createElement("a");
+  link.href = location.pathname;
+  link.className = "button small";
+  link.textContent = "Show it";
+  place.replaceChildren(words, " ", link);
+  place.classList.add("news");
+}
+
+listen(place.dataset.events, place.dataset.last, ["bom_merge", "bom.updated"], announce);
+
+const all = document.getElementById("all");
+if (all) {
+  const boxes = [...document.querySelectorAll('input[name="chosen"][form="bulk"]')];
+  const told = document.getElementById("count");
+  const recount = () => {
+    const chosen = boxes.filter((box) => box.checked).length;
+    all.checked = chosen === boxes.length;
+    all.indeterminate = chosen > 0 && chosen < boxes.length;
+    told.textContent = chosen ? `${chosen} of ${boxes.length} chosen` : "";
+  };
+  all.closest("label").hidden = false;
+  all.addEventListener("change", () => {
+    for (const box of boxes) box.checked = all.checked;
+    recount();
+  });
+  for (const box of boxes) box.addEventListener("change", recount);
+  recount();
+}
+
+for (const input of document.querySelectorAll("[data-complete]")) complete(input);

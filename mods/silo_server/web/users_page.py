@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""For admins: users, everybody's tokens, the server's mode, and the audit list."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request
+from starlette.responses import Response
+
+from silo.bom.errors import RejectedError, SiloError
+from silo_server.db.engine import mode_of
+from silo_server.db.state import put_state
+from silo_server.routes.context import Server, ServerDep
+from silo_server.services import accounts, audit, credentials, events, logins
+from silo_server.values import Actor, Role
+from silo_server.web.account_page import password_of
+from silo_server.web.forms import Form, back, text
+from silo_server.web.guard import Administrator
+from silo_server.web.render import page
+
+router = APIRouter(include_in_schema=False)
+
+AUDIT_SIZE = 100
+MODES = ("normal", "read-only")
+
+
+@router.get("/users")
+def users_page(request: Request, server: ServerDep, caller: Administrator) -> Response:
+    """All users and tokens."""
+    return _show(request, server, caller)
+
+
+@router.post("/users")
+def create_user(request: Request, server: ServerDep, caller: Administrator, form: Form) -> Response:
+    """Make a user; without a password a login link lets the user in."""
+    username = text(form, "username")
+    try:
+        with server.db.write(caller, even_when_read_only=True) as tx:
+            accounts.create_user(
+                tx,
+                username,
+                _role(text(form, "role")),
+                display_name=text(form, "display_name", 200),
+                password=password_of(form, "password") or None,
+            )
+    except SiloError as error:
+        return _show(request, server, caller, problem=str(error), status=error.status_hint)
+    return back("/users", f"User {username} is made.")
+
+
+@router.post("/users/{username}")
+def change_user(
+    request: Request, server: ServerDep, caller: Administrator, username: str, form: Form
+) -> Response:
+    """Change a user's role, or whether anybody gets in under this name."""
+    try:
+        with server.db.write(caller, even_when_read_only=True) as tx:
+            accounts.change_user(
+                tx, username, role=_role(text(form, "role")), active=text(form, "active") == "yes"
+            )
+    except SiloError as error:
+        return _show(request, server, caller, problem=str(error), status=error.status_hint)
+    return back("/users", f"User {username} is changed.")
+
+
+@router.post("/users/{username}/login-link")
+def create_login_link(request: Request, server: ServerDep, caller: Administrator, username: str) -> Response:
+    """A link that lets this user in once; on this answer and nowhere else."""
+    with server.db.write(caller, even_when_read_only=True) as tx:
+        secret = logins.create_login_link(tx, username)
+        audit.note(tx, "login_link.created", username)
+    link = f"{str(request.base_url).rstrip('/')}/login/link/{secret}"
+    return _show(request, server, caller, link=(username, link))
+
+
+@router.post("/mode")
+def set_mode(server: ServerDep, caller: Administrator, form: Form) -> Response:
+    """Take changes, or take none until told otherwise."""
+    mode = text(form, "mode")
+    if mode not in MODES:
+        raise RejectedError("mode: wanted normal or read-only; load the page again")
+    with server.db.write(caller, even_when_read_only=True) as tx:
+        put_state(tx, "mode", mode)
+        audit.note(tx, "mode.set", mode)
+        events.server_state(tx, mode_of(tx))
+    return back(
+        "/users", "The server takes changes." if mode == "normal" else "The server takes no changes now."
+    )
+
+
+@router.get("/audit")
+def audit_page(
+    request: Request,
+    server: ServerDep,
+    caller: Administrator,
+    before: Annotated[int | None, Query(ge=0, le=2**62)] = None,
+) -> Response:
+    """Who did what, newest first."""
+    with server.db.read(caller) as tx:
+        entries = audit.list_entries(tx, AUDIT_SIZE + 1, before)
+    shown = entries[:AUDIT_SIZE]
+    more = shown[-1].id if len(entries) > AUDIT_SIZE else None
+    return page(request, "audit.html", caller, entries=shown, more=more)
+
+
+def _show(
+    request: Request,
+    server: Server,
+    caller: Actor,
+    *,
+    problem: str = "",
+    status: int = 200,
+    link: tuple[str, str] | None = None,
+) -> Response:
+    with server.db.read(caller) as tx:
+        users = accounts.list_users(tx)
+        tokens = [token for token in credentials.list_tokens(tx) if token.revoked_at is None]
+        now, mode = tx.stamp, mode_of(tx)
+    return page(
+        request,
+        "users.html",
+        caller,
+        status=status,
+        users=users,
+        tokens=tokens,
+        now=now,
+        mode=mode,
+        roles=list(Role),
+        problem=problem[:1].upper() + problem[1:],
+        link=link,
+        minutes=int(server.settings.login_link_seconds // 60),
+        shortest=accounts.MIN_PASSWORD,
+    )
+
+
+def _role(name: str) -> Role:
+    try:
+        return Role(name)
+    except ValueError:
+        raise RejectedError(f"role: wanted one of {', '.join(Role)}, got {name!r}") from None
