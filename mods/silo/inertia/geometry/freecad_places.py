@@ -135,8 +135,10 @@ def material_uuid(obj: Any) -> str | None:
 
 def _piece(obj: Any, name: str) -> bytes:
     table = getattr(obj, "properties", None)
-    piece: bytes | None = table.piece(name) if table is not None else None
-    return piece or b""
+    if table is None or name not in table.names:
+        return b""
+    piece: bytes = table.piece(name)
+    return piece
 
 
 def _name(found: re.Match[bytes]) -> str:

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Normals for pictures: smooth over a fillet, sharp at an edge. Pure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from silo.inertia.geometry.mesh import Floats, Indices, Mesh
+
+CREASE = np.cos(np.radians(38.0))
+"""Faces that meet at more than this angle keep their edge."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shaded:
+    """Triangles with one normal per vertex: vertices (n, 3) [m], normals (n, 3), faces (m, 3)."""
+
+    vertices: Floats
+    normals: Floats
+    faces: Indices
+
+
+def shaded(mesh: Mesh) -> Shaded:
+    """The mesh with normals; a vertex on an edge becomes several."""
+    if not len(mesh):
+        return Shaded(mesh.vertices, np.zeros_like(mesh.vertices), mesh.faces)
+    place = np.unique(mesh.vertices, axis=0, return_inverse=True)[1].reshape(-1)
+    corners = place[mesh.faces]
+    a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
+    areas = np.cross(b - a, c - a)
+    flat = _unit(areas)
+    summed = np.zeros((int(place.max()) + 1, 3))
+    for column in range(3):
+        np.add.at(summed, corners[:, column], areas)
+    smooth = _unit(summed)[corners]
+    agrees = np.einsum("nij,nj->ni", smooth, flat) > CREASE
+    normals = np.where(agrees[:, :, None], smooth, flat[:, None, :]).reshape(-1, 3)
+    points = mesh.vertices[mesh.faces].reshape(-1, 3)
+    rows = np.hstack([points.astype(np.float32), np.round(normals, 3).astype(np.float32)])
+    unique, index = np.unique(rows, axis=0, return_inverse=True)
+    return Shaded(
+        unique[:, :3].astype(np.float64), _unit(unique[:, 3:].astype(np.float64)), index.reshape(-1, 3)
+    )
+
+
+def _unit(vectors: Floats) -> Floats:
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    result: Floats = vectors / np.where(length > 0, length, 1.0)
+    return result
+
+
+def ellipsoid(rings: int = 20, sectors: int = 32) -> Mesh:
+    """A unit sphere; scaled by three semi-axes it is any ellipsoid."""
+    polar = np.linspace(0, np.pi, rings + 1)
+    around = np.linspace(0, 2 * np.pi, sectors, endpoint=False)
+    grid = np.array(
+        [[np.sin(p) * np.cos(t), np.sin(p) * np.sin(t), np.cos(p)] for p in polar for t in around]
+    )
+    faces = []
+    for i in range(rings):
+        for j in range(sectors):
+            a, b = i * sectors + j, i * sectors + (j + 1) % sectors
+            c, d = a + sectors, b + sectors
+            faces += [(a, c, b)] if i == 0 else [(a, c, d)] if i == rings - 1 else [(a, c, b), (b, c, d)]
+    return Mesh(grid, np.array(faces))
