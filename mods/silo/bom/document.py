@@ -47,10 +47,12 @@ class ObjectLike(Protocol):
     def isDerivedFrom(self, type_name: str, /) -> bool: ...
 
 
-def derived(obj: object, type_name: str) -> bool:
+def derived(obj: Any, type_name: str) -> bool:
     """True where ``obj`` says it is of (a type derived from) ``type_name``."""
-    ask = getattr(obj, "isDerivedFrom", None)
-    return bool(ask(type_name)) if callable(ask) else False
+    try:
+        return bool(obj.isDerivedFrom(type_name))
+    except (AttributeError, TypeError):  # a plain object that says nothing of its type
+        return False
 
 
 def own(obj: object, name: str, default: Any = None) -> Any:

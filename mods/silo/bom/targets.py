@@ -138,31 +138,25 @@ def resolve_target(link: object, inspect: Inspect | None = None) -> Target:
 
 
 def _resolve(link: object, trail: _Trail) -> Target:
-    found = Target(obj=None)
     current: Any = link
     index: int | None = None
+    count, mirrored, variant, excluded, element = 1, False, False, False, ""
     while True:
         if is_link(current):
-            found = replace(
-                found,
-                count=found.count * (array_count(current) if index is None else 1),
-                mirrored=found.mirrored ^ is_mirrored(current, index),
-            )
+            count *= array_count(current) if index is None else 1
+            mirrored ^= is_mirrored(current, index)
         elif not is_assembly_link(current) and not derived(current, "App::LinkElement"):
-            return replace(found, obj=current)
+            return Target(current, count, mirrored, variant, excluded, element)
         trail.hops -= 1
         if trail.hops < 0:
             raise _EndlessError
-        hop, variant = _next_hop(current, trail)
+        hop, is_variant = _next_hop(current, trail)
         if hop.problem is not None:
-            return replace(found, problem=hop.problem)
+            return Target(None, count, mirrored, variant, excluded, element, hop.problem)
         current, index = hop.obj, hop.index
-        found = replace(
-            found,
-            variant=found.variant or variant,
-            element=found.element or hop.element,
-            excluded=found.excluded or is_excluded(current),
-        )
+        variant = variant or is_variant
+        element = element or hop.element
+        excluded = excluded or is_excluded(current)
 
 
 def _next_hop(link: Any, trail: _Trail) -> tuple[_Hop, bool]:
