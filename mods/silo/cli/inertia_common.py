@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -81,7 +82,7 @@ def add_result_options(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="OUT",
-        help="write a report: .json, .csv or .md, by suffix; may be repeated",
+        help="write a report: .json, .csv, or .md with a picture beside it, by suffix; may be repeated",
     )
     group.add_argument(
         "--preview",
@@ -224,13 +225,19 @@ def console() -> Any:
 
 
 def _write_files(args: argparse.Namespace, report: InertiaReport, assembly: Assembly) -> None:
-    for name in args.preview:
-        from silo.inertia.output.picture import write_preview
+    pictures = [Path(name) for name in args.preview]
+    drawn = next((path for path in pictures if path.suffix.lower() == ".png"), None)
+    pages = [Path(name) for name in args.report if name.lower().endswith(".md")]
+    if pages and drawn is None:
+        # People look rather than read: a report to read has its picture beside it.
+        drawn = pages[0].with_suffix(".png")
+        pictures.append(drawn)
+    for path in pictures:
+        from silo.inertia.geometry.preview import write_preview
 
-        write_preview(report, assembly, Path(name))
-    picture = next((Path(name) for name in args.preview if name.lower().endswith(".png")), None)
+        write_preview(report, assembly, path)
     for name in args.report:
-        _write(Path(name), _report_text(Path(name), report, picture))
+        _write(Path(name), _report_text(Path(name), report, drawn))
 
 
 def _report_text(path: Path, report: InertiaReport, picture: Path | None) -> str:
@@ -244,8 +251,7 @@ def _report_text(path: Path, report: InertiaReport, picture: Path | None) -> str
         return report_csv(report)
     link = None
     if picture is not None:
-        same = picture.absolute().parent == path.absolute().parent
-        link = picture.name if same else picture.absolute().as_posix()
+        link = Path(os.path.relpath(picture, path.parent)).as_posix()
     return report_markdown(report, link)
 
 

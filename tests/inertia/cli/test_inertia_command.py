@@ -143,7 +143,10 @@ def test_reports_of_every_kind(run: Run, arm: Path) -> None:
     assert "whole assembly" in ran.out
     assert json.loads(files[0].read_text("utf-8"))["format"] == "silo-inertia/1"
     assert len(list(csv.reader(files[1].read_text("utf-8").splitlines()))) == 20
-    assert "## Warnings" in files[2].read_text("utf-8")
+    text = files[2].read_text("utf-8")
+    assert "## Warnings" in text
+    assert "(report.png)" in text
+    assert (arm / "report.png").read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize(
