@@ -358,6 +358,34 @@ def test_one_ring_is_one_finding_wherever_it_is_entered() -> None:
     assert [str(place) for place in finding.where] == ["/v/b.FCStd#Next", "/v/c.FCStd#Next"]
 
 
+def test_no_component_stands_below_itself_however_the_ring_is_entered() -> None:
+    """Two ways into one ring: what was walked on the first must not be reused where it closes the second."""
+    docs = {name: Doc(f"/v/{name}.FCStd") for name in ("top", "one", "two", "three")}
+    asm = {name: doc.assembly() for name, doc in docs.items()}
+    for name, held in {
+        "top": ("one", "two"),
+        "one": ("three",),
+        "two": ("three",),
+        "three": ("two",),
+    }.items():
+        edit(asm[name], Group=[docs[name].link(f"To_{target}", asm[target]) for target in held])
+    found = extract(asm["top"])
+
+    def paths(entries: Any, above: tuple[str, ...] = ()) -> set[tuple[str, ...]]:
+        names = {(*above, entry.document_label): entry.children for entry in entries}
+        return set(names).union(*(paths(children, path) for path, children in names.items()))
+
+    assert paths(found.entries) == {
+        ("one",),
+        ("one", "three"),
+        ("one", "three", "two"),
+        ("two",),
+        ("two", "three"),
+    }
+    (finding,) = found.findings_of(FindingCode.CYCLE)
+    assert [str(place) for place in finding.where] == ["/v/three.FCStd#To_two", "/v/two.FCStd#To_three"]
+
+
 def test_two_documents_that_use_each_other_are_no_cycle() -> None:
     """A links a part of B and B links a part of A: documents form a ring, objects do not."""
     a, b = Doc("/v/a.FCStd"), Doc("/v/b.FCStd")

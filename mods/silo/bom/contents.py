@@ -86,6 +86,13 @@ def _add(total: _Worth, more: _Worth, times: int = 1) -> None:
         total[key] = (target, before + count * times)
 
 
+def _left_out_by(obj: Any) -> str:
+    """The object's own property that leaves it out; "" where none does."""
+    if own(obj, "Suppressed") is True:
+        return "Suppressed"
+    return "SiloBomExclude" if is_excluded(obj) else ""
+
+
 class Reader:
     """Reads the contents of assemblies, and tells a notebook what it met."""
 
@@ -171,16 +178,24 @@ class _Reading:
         return leaves
 
     def _left_out(self, found: list[_Member]) -> set[Key]:
-        out: set[Key] = set()
-        for key, obj, kind in found:
-            if kind not in _REPEATABLE or key in out or not self._is_left_out(obj):
-                continue
-            out.add(key)
-            if kind in INLINE:
-                out.update(inner for inner, _, _ in flattened(obj, self._key))
-            else:
-                self._holds_components = True
-        return out
+        marked = [member for member in found if member[2] in _REPEATABLE and _left_out_by(member[1])]
+        inside: set[Key] = set()
+        for key, obj, kind in marked:
+            if kind in INLINE and key not in inside:
+                inside.update(inner for inner, _, _ in flattened(obj, self._key))
+        for key, obj, kind in marked:
+            if key not in inside:  # what goes with its container needs no word of its own
+                self._tell_left_out(obj)
+            self._holds_components |= kind not in INLINE
+        return inside.union(key for key, _, _ in marked)
+
+    def _tell_left_out(self, obj: Any) -> bool:
+        mark = _left_out_by(obj)
+        if mark == "Suppressed":
+            self._notes.suppressed(obj)
+        elif mark:
+            self._notes.excluded(obj)
+        return bool(mark)
 
     def _repeated(self, found: list[_Member], left_out: set[Key]) -> set[Key]:
         """The originals of Draft arrays: the array shows its original as the first element."""
@@ -195,15 +210,6 @@ class _Reading:
             if of_base in INLINE:
                 covered.update(inner for inner, _, _ in flattened(base, self._key))
         return covered
-
-    def _is_left_out(self, obj: Any) -> bool:
-        if own(obj, "Suppressed") is True:
-            self._notes.suppressed(obj)
-            return True
-        if is_excluded(obj):
-            self._notes.excluded(obj)
-            return True
-        return False
 
     def _worth(self, key: Key, obj: Any, kind: Kind) -> _Worth:
         """What one object brings; each is looked at once, so groups of groups cost no more than they hold."""
@@ -231,7 +237,7 @@ class _Reading:
     def _draft_array(self, key: Key, array: Any) -> _Worth:
         base, count = first_of(own(array, "Base")), own(array, "Count", 0)
         worth: _Worth = {}
-        if base is not None and not self._is_left_out(base):
+        if base is not None and not self._tell_left_out(base):
             times = count if isinstance(count, int) and count > 0 else 1
             _add(worth, self._worth(self._key(base), base, kind_of(base)), times)
             if worth:

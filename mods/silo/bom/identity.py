@@ -50,15 +50,22 @@ def identity_of(obj: object) -> str | None:
 
 
 def walk_entries(entries: Iterable[BomEntry]) -> Iterator[BomEntry]:
-    """Every distinct component below, each once, parents before children."""
-    seen: set[tuple[str, str]] = set()
+    """Every distinct component below, each once, parents before children.
+
+    What lies below is looked at for each distinct value of a component: where a walk was cut (a ring, too
+    deep), one component may have fewer children in one place than in another.
+    """
+    yielded: set[tuple[str, str]] = set()
+    seen: dict[int, BomEntry] = {}  # nested assemblies share their values; kept, so that ids stay theirs
     stack = list(reversed(tuple(entries)))
     while stack:
         entry = stack.pop()
-        if entry.key in seen:
+        if id(entry) in seen:
             continue
-        seen.add(entry.key)
-        yield entry
+        seen[id(entry)] = entry
+        if entry.key not in yielded:
+            yielded.add(entry.key)
+            yield entry
         stack.extend(reversed(entry.children))
 
 

@@ -25,6 +25,7 @@ from silo.bom.identity import identity_findings, identity_of
 from silo.bom.kinds import is_container, is_named_assembly
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.notes import Notes
+from silo.bom.rings import Rings
 from silo.bom.roots import links_beside
 from silo.bom.targets import Inspect, is_array, resolve_target
 
@@ -65,8 +66,8 @@ def extract(
         walker.notes.broken(top, target.problem)
     else:
         top = target.obj
-        entries = walker.assembly(top, level)
-    head = replace(walker.entry_for(top, level - 1), is_assembly=True)
+        entries = walker.tree(top, level)
+    head = replace(walker.entry_for(top), level=level - 1, is_assembly=True)
     if not entries and not walker.notes.any_blocking():
         walker.notes.empty(head)
     walker.notes.container(top)
@@ -81,8 +82,10 @@ class _Walker:
         self._paths: dict[str, str] = {}
         self.notes = Notes(self._path)
         self._reader = Reader(self.notes, self.key, inspect)
-        self._memo: dict[tuple[Key, int], tuple[BomEntry, ...]] = {}
-        self._stack: list[Key] = []
+        self._rings = Rings({})
+        self._memo: dict[tuple[Key, int, Key], tuple[BomEntry, ...]] = {}
+        self._heads: dict[Key, BomEntry] = {}
+        self._containers: dict[Key, bool] = {}
 
     def key(self, obj: Any) -> Key:
         """What a component is: its file and its name in it."""
@@ -96,60 +99,86 @@ class _Walker:
             self._paths[path] = self._canonical(path)
         return self._paths[path]
 
-    def entry_for(self, obj: Any, level: int) -> BomEntry:
-        path, name = self.key(obj)
-        return BomEntry(
-            doc_path=path,
-            silo_uuid=identity_of(obj),
-            level=level,
-            object_name=name,
-            label=label_of(obj),
-            document_label=getattr(getattr(obj, "Document", None), "Label", "") or "",
-            is_assembly=is_named_assembly(obj),
-        )
+    def entry_for(self, obj: Any) -> BomEntry:
+        """What an object says of itself, wherever it is used."""
+        path, name = key = self.key(obj)
+        if key not in self._heads:
+            self._heads[key] = BomEntry(
+                doc_path=path,
+                silo_uuid=identity_of(obj),
+                object_name=name,
+                label=label_of(obj),
+                document_label=getattr(getattr(obj, "Document", None), "Label", "") or "",
+                is_assembly=is_named_assembly(obj),
+            )
+        return self._heads[key]
 
-    def assembly(self, container: Any, level: int) -> tuple[BomEntry, ...]:
-        """The direct children of an assembly, put together once per nesting level at which it occurs."""
+    def tree(self, top: Any, level: int) -> tuple[BomEntry, ...]:
+        """The direct children of the top, with all that is below them."""
+        self._rings = Rings(self._read_all(top))
+        return self._assembly(top, level, depth=1, entry=self.key(top))
+
+    def _read_all(self, top: Any) -> dict[Key, list[Key]]:
+        """Read every assembly that can be reached; returns which of them each one holds."""
+        holds: dict[Key, list[Key]] = {}
+        layer = {self.key(top): top}
+        for _ in range(MAX_LEVELS):
+            below: dict[Key, Any] = {}
+            for key, container in layer.items():
+                targets = {self.key(c.target): c.target for c in self._reader.contents(container).counts}
+                held = {name: target for name, target in targets.items() if self._is_container(name, target)}
+                holds[key] = sorted(held)
+                below.update(held)
+            layer = {name: target for name, target in below.items() if name not in holds}
+        return holds
+
+    def _is_container(self, key: Key, target: Any) -> bool:
+        if key not in self._containers:
+            self._containers[key] = is_container(target)
+        return self._containers[key]
+
+    def _assembly(self, container: Any, level: int, depth: int, entry: Key) -> tuple[BomEntry, ...]:
+        """The direct children of an assembly, put together once per nesting level at which it occurs.
+
+        entry
+            where the walk came into the ring that the assembly is in; itself where it is in none.
+        """
         key = self.key(container)
-        if (known := self._memo.get((key, level))) is not None:
+        if (known := self._memo.get((key, level, entry))) is not None:
             return known
-        self._stack.append(key)
         contents = self._reader.contents(container)
-        lines = self._lines(contents.counts)
-        # Below, assemblies are visited by name: where a tree contains itself, the cut must not depend on the
-        # order of a Group.
-        below = {name: self._below(lines[name][0].target, level + 1) for name in sorted(lines)}
-        entries = tuple(self._entry(counts, level, below[name]) for name, counts in lines.items())
-        if contents.holds_components or is_named_assembly(container) or len(self._stack) == 1:
-            self.notes.local_geometry(container, contents.local)
-        self._stack.pop()
-        self._memo[(key, level)] = entries
-        return entries
-
-    def _lines(self, counts: list[Count]) -> dict[Key, list[Count]]:
         lines: dict[Key, list[Count]] = {}
-        for count in counts:
-            key = self.key(count.target)
-            if key in self._stack:
-                self.notes.cycle(count.shown, self._stack[self._stack.index(key) :])
+        for count in contents.counts:
+            name = self.key(count.target)
+            if self._rings.closes(entry, key, name):
+                self.notes.cycle(count.shown, self._rings.example(name))
             else:
-                lines.setdefault(key, []).append(count)
-        return lines
+                lines.setdefault(name, []).append(count)
+        entries = []
+        for name, counts in lines.items():
+            inner = entry if self._rings.same_ring(key, name) else name
+            children = self._below(counts[0].target, level + 1, depth + 1, inner)
+            entries.append(self._entry(counts, level, children))
+        if contents.holds_components or is_named_assembly(container) or depth == 1:
+            self.notes.local_geometry(container, contents.local)
+        self._memo[(key, level, entry)] = tuple(entries)
+        return self._memo[(key, level, entry)]
 
-    def _below(self, target: Any, level: int) -> tuple[BomEntry, ...]:
-        if not is_container(target):
+    def _below(self, target: Any, level: int, depth: int, entry: Key) -> tuple[BomEntry, ...]:
+        if not self._is_container(self.key(target), target):
             return ()
-        if len(self._stack) >= MAX_LEVELS:
+        if depth > MAX_LEVELS:
             self.notes.too_deep(target, MAX_LEVELS)
             return ()
-        return self.assembly(target, level)
+        return self._assembly(target, level, depth, entry)
 
     def _entry(self, counts: list[Count], level: int, children: tuple[BomEntry, ...]) -> BomEntry:
         target = counts[0].target
-        entry = self.entry_for(target, level)
+        entry = self.entry_for(target)
         links = [count.shown for count in counts if count.link]
         return replace(
             entry,
+            level=level,
             quantity=sum(count.quantity for count in counts),
             children=children,
             is_assembly=entry.is_assembly or self._is_assembly(target),
@@ -160,7 +189,8 @@ class _Walker:
         )
 
     def _is_assembly(self, target: Any) -> bool:
-        return is_container(target) and self._reader.contents(target).holds_components
+        key = self.key(target)
+        return self._is_container(key, target) and self._reader.contents(target).holds_components
 
 
 __all__ = ["Extraction", "Finding", "FindingCode", "Place", "extract", "extract_bom_links"]

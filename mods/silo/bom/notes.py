@@ -98,9 +98,8 @@ class Notes:
             self._add(code, about, Severity.ERROR, text, link, "used by {users}")
 
     def cycle(self, link: Any, ring: Sequence[tuple[str, str]]) -> None:
-        """``ring``: the assemblies from the one that is reached again to the one that reaches it."""
-        start = ring.index(min(ring))
-        path = " → ".join(str(Place(*key)) for key in (*ring[start:], *ring[:start], ring[start]))
+        """``ring``: the assemblies that contain each other, the first not repeated."""
+        path = " → ".join(str(Place(*key)) for key in (*ring, ring[0]))
         self._add(
             FindingCode.CYCLE,
             path,
