@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The error tree: as drawn, each with a status and a code, each saying whose fault it is."""
+
+from __future__ import annotations
+
+import inspect
+import re
+
+import pytest
+
+from silo.bom import errors
+from silo.bom.errors import CycleError, DocumentError, RejectedError, SiloError
+
+CLASSES = [cls for _, cls in inspect.getmembers(errors, inspect.isclass) if issubclass(cls, SiloError)]
+
+
+def drawn() -> dict[str, str]:
+    """Class → parent, as the module's docstring draws them."""
+    tree, path = {}, {0: "SiloError"}
+    for line in (errors.__doc__ or "").splitlines():
+        if found := re.match(r"^    ([│ ]*)[├└]── (\w+)", line):
+            depth = len(found[1]) // 4 + 1
+            path[depth] = found[2]
+            tree[found[2]] = path[depth - 1]
+    return tree
+
+
+def test_the_drawing_is_the_tree() -> None:
+    """Every class stands in the drawing, below its parent."""
+    assert drawn() == {cls.__name__: cls.__mro__[1].__name__ for cls in CLASSES if cls is not SiloError}
+
+
+@pytest.mark.parametrize("cls", CLASSES)
+def test_every_error_has_a_sentence_a_status_and_a_code(cls: type[SiloError]) -> None:
+    """For the reader, for HTTP, and for machines."""
+    assert cls.__doc__
+    assert 400 <= cls.status_hint < 600
+    assert re.fullmatch(r"[a-z_]+", cls.code)
+
+
+def test_codes_are_told_apart() -> None:
+    """No two errors have one name."""
+    codes = [cls.code for cls in CLASSES]
+    assert len(codes) == len(set(codes))
+
+
+def test_errors_carry_what_they_know() -> None:
+    """The path of a document, the ring of a cycle, all problems of a request at once."""
+    assert (str(DocumentError("/v/a.FCStd", "no zip")), DocumentError("/v/a.FCStd", "no zip").path) == (
+        "/v/a.FCStd: no zip",
+        "/v/a.FCStd",
+    )
+    assert CycleError(["A", "B", "A"]).path == ("A", "B", "A")
+    assert "A → B → A" in str(CycleError(["A", "B", "A"]))
+    assert RejectedError("no", ["entry 0", "entry 3"]).problems == ("entry 0", "entry 3")
+    assert RejectedError("no").problems == ()

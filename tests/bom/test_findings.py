@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Every finding there is can be met, says what and where in plain words, and means what it is called."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import pytest
+from fakes import Doc, edit
+
+from silo.bom import BomEntry, Finding, FindingCode, Severity, choose_assembly, diff_bom, extract
+from silo.bom.diff import diff_findings
+from silo.bom.document import LinkProblem
+from silo.bom.resolve import consolidation_findings, unregistered_findings
+
+
+class Scene:
+    """A top document, a bolt in a file of its own, and a sub-assembly of two bolts."""
+
+    def __init__(self) -> None:
+        self.top = Doc("/v/top.FCStd")
+        self.bolt = Doc("/v/bolt.FCStd").body(Label="Bolt")
+        sub = Doc("/v/sub.FCStd")
+        self.sub = sub.assembly(sub.link("S1", self.bolt), sub.link("S2", self.bolt))
+
+    def walked(self, *members: Any) -> Iterable[Finding]:
+        return extract(self.top.assembly(*members)).findings
+
+
+def met_by_a_member(make: Callable[[Scene], Any]) -> Callable[[], Iterable[Finding]]:
+    """The findings of an assembly that holds what ``make`` makes."""
+
+    def walk() -> Iterable[Finding]:
+        scene = Scene()
+        return scene.walked(make(scene))
+
+    return walk
+
+
+def broken(code: FindingCode) -> Callable[[], Iterable[Finding]]:
+    problem = LinkProblem(code, "parts/b.FCStd", "Box", "the reason")
+    return met_by_a_member(lambda scene: scene.top.link("L", None, LinkProblem=problem))
+
+
+def cycle() -> Iterable[Finding]:
+    scene = Scene()
+    asm = scene.top.assembly(scene.top.link("L", scene.sub))
+    edit(scene.sub, Group=[scene.sub.Document.link("Back", asm)])
+    return extract(asm).findings
+
+
+def too_deep() -> Iterable[Finding]:
+    below = Scene().bolt
+    for number in range(100):
+        doc = Doc(f"/v/{number}.FCStd")
+        below = doc.assembly(doc.link("L", below))
+    return extract(below).findings
+
+
+def loose(beside: bool) -> Iterable[Finding]:
+    scene = Scene()
+    scene.top.link("Loose", scene.bolt)
+    if beside:
+        scene.top.assembly(scene.top.link("L", scene.bolt))
+    return extract(choose_assembly(scene.top)).findings
+
+
+def one_identity(*places: tuple[str, str]) -> Iterable[Finding]:
+    docs: dict[str, Doc] = {}
+    top = Doc("/v/top.FCStd")
+    links = []
+    for path, name in places:
+        doc = docs.setdefault(path, Doc(path, meta={"SiloUUID": "u-1"}))
+        links.append(top.link(f"L{name}", doc.body(name)))
+    return extract(top.assembly(*links)).findings
+
+
+def stale(scene: Scene) -> Any:
+    return scene.top.assembly_link("AL", scene.sub, [scene.top.link("C", scene.sub.Group[0])])
+
+
+def variant(scene: Scene) -> Any:
+    return scene.top.link("V", scene.top.body("Copy"), LinkCopyOnChangeSource=scene.bolt)
+
+
+def draft_array(scene: Scene) -> Any:
+    base = scene.top.link("Base", scene.bolt)
+    return scene.top.add("Part::FeaturePython", "Array", Base=base, Count=3)
+
+
+SCENES: dict[FindingCode, Callable[[], Iterable[Finding]]] = {
+    **{
+        code: broken(code)
+        for code in (
+            FindingCode.MISSING_FILE,
+            FindingCode.MISSING_OBJECT,
+            FindingCode.UNREADABLE_FILE,
+            FindingCode.LFS_POINTER,
+            FindingCode.OUTSIDE_ROOT,
+            FindingCode.BROKEN_LINK,
+            FindingCode.LOST_ASSEMBLY,
+            FindingCode.UNSET_LINK,
+        )
+    },
+    FindingCode.CYCLE: cycle,
+    FindingCode.TOO_DEEP: too_deep,
+    FindingCode.IN_DOCUMENT_LINK: met_by_a_member(lambda s: s.top.link("L", s.top.body("Layout"))),
+    FindingCode.SUB_ELEMENT_LINK: met_by_a_member(lambda s: s.top.link("L", (s.bolt, "Face1"))),
+    FindingCode.NO_COMPONENT: met_by_a_member(
+        lambda s: s.top.link("L", Doc("/v/master.FCStd").add("Spreadsheet::Sheet", "Sheet"))
+    ),
+    FindingCode.SUPPRESSED: met_by_a_member(lambda s: s.top.link("L", s.bolt, Suppressed=True)),
+    FindingCode.EXCLUDED: met_by_a_member(lambda s: s.top.link("L", s.bolt, SiloBomExclude=True)),
+    FindingCode.MIRRORED: met_by_a_member(lambda s: s.top.link("L", s.bolt, ScaleVector=(-1.0, 1.0, 1.0))),
+    FindingCode.VARIANT: met_by_a_member(variant),
+    FindingCode.DRAFT_ARRAY: met_by_a_member(draft_array),
+    FindingCode.LOCAL_GEOMETRY: met_by_a_member(lambda s: s.top.body("Local")),
+    FindingCode.FOREIGN_COMPONENT: met_by_a_member(
+        lambda s: s.top.add("Part::FeaturePython", "b_Bolt", sourceFile="b.FCStd", a2p_Version="0.4")
+    ),
+    FindingCode.NO_CONTAINER: lambda: loose(beside=False),
+    FindingCode.BESIDE_ASSEMBLY: lambda: loose(beside=True),
+    FindingCode.STALE_ASSEMBLY_LINK: met_by_a_member(stale),
+    FindingCode.EMPTY_BOM: lambda: extract(Doc("/v/top.FCStd").assembly()).findings,
+    FindingCode.COPIED_IDENTITY: lambda: one_identity(("/v/a.FCStd", "A"), ("/v/b.FCStd", "B")),
+    FindingCode.SHARED_IDENTITY: lambda: one_identity(("/v/a.FCStd", "A"), ("/v/a.FCStd", "B")),
+    FindingCode.CONSOLIDATION: lambda: consolidation_findings(extract(Scene().sub).entries),
+    FindingCode.UNREGISTERED: lambda: unregistered_findings(extract(Scene().sub).entries),
+    FindingCode.UNREFERENCED: lambda: diff_findings(
+        diff_bom([], [{"child_part_number": "P", "quantity": 1}]), BomEntry("/v/top.FCStd", object_name="A")
+    ),
+    FindingCode.CONFLICT: lambda: diff_findings(
+        diff_bom(
+            [{"child_part_number": "P", "quantity": 2}],
+            [{"child_part_number": "P", "quantity": 1, "source": "manual"}],
+        ),
+        BomEntry("/v/top.FCStd", object_name="A"),
+    ),
+}
+
+BLOCKING = {
+    FindingCode.MISSING_FILE,
+    FindingCode.MISSING_OBJECT,
+    FindingCode.UNREADABLE_FILE,
+    FindingCode.LFS_POINTER,
+    FindingCode.OUTSIDE_ROOT,
+    FindingCode.BROKEN_LINK,
+    FindingCode.LOST_ASSEMBLY,
+    FindingCode.CYCLE,
+    FindingCode.TOO_DEEP,
+}
+
+
+def meet(code: FindingCode) -> Finding:
+    return next(finding for finding in SCENES[code]() if finding.code is code)
+
+
+def test_there_is_a_scene_for_every_code() -> None:
+    """A code that nothing can produce is a promise that nobody keeps."""
+    assert set(SCENES) == set(FindingCode)
+
+
+@pytest.mark.parametrize("code", FindingCode)
+def test_every_code_is_met_and_told_in_plain_words(code: FindingCode) -> None:
+    """One sentence or two, with an end, a place, and none of Python's own words."""
+    finding = meet(code)
+    assert finding.where
+    assert finding.where[0].doc_path.startswith("/v/")
+    assert finding.message.strip() == finding.message != ""
+    assert finding.message.endswith((".", "?"))
+    assert not re.search(r"\bNone\b|<|object at|\{|\}|Traceback", finding.message)
+    assert len(finding.message) < 400
+
+
+@pytest.mark.parametrize("code", FindingCode)
+def test_what_is_missing_blocks_and_nothing_else_does(code: FindingCode) -> None:
+    """A BOM that cannot be trusted is not synced; doubts and remarks do not stop the work."""
+    assert meet(code).blocks is (code in BLOCKING)
+
+
+@pytest.mark.parametrize("code", FindingCode)
+def test_codes_are_names_for_machines(code: FindingCode) -> None:
+    """Stable, lower case, one word to a machine."""
+    assert re.fullmatch(r"[a-z]+(_[a-z]+)*", code.value)
+
+
+@pytest.mark.parametrize("label", ["<b>Bolt</b>", "{users}", "{0}", "%s", "a\nb", "\x1b[31m", "💥"])
+def test_labels_are_text(label: str) -> None:
+    """A label with braces, markup or control characters is repeated as it is, and breaks nothing."""
+    top = Doc("/v/top.FCStd")
+    problem = LinkProblem(FindingCode.MISSING_FILE, "{file}.FCStd", "{obj}", "{detail}")
+    found = extract(top.assembly(top.link("L", None, Label=label, LinkProblem=problem)))
+    assert label in found.findings[0].message
+    assert "/v/{file}.FCStd" in found.findings[0].message
+
+
+def test_severities_are_ordered_words() -> None:
+    """What machines read in JSON."""
+    assert [severity.value for severity in Severity] == ["info", "warning", "error"]

@@ -1,0 +1,327 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Counting laws over random assemblies: the walker against a naive count, and against any order of a Group.
+
+A plan says what a person built; from it come the fake documents that the walker sees, and, apart from that, a
+count that does nothing but go from instance to instance and add one.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+from fakes import Doc, ForwardingLink, edit
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from silo.bom import extract
+from silo.bom.document import LinkProblem
+from silo.bom.findings import FindingCode
+from silo.bom.model import BomEntry
+from silo.bom.report import flat_counts
+
+Key = tuple[str, str]
+
+
+# --- plans ------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Link:
+    """``count`` 0 is a plain link; ``style`` is how FreeCAD would hold it; ``mark`` leaves it out."""
+
+    target: str
+    count: int = 0
+    style: str = "link"
+    mark: str = ""
+
+
+@dataclass
+class Inside:
+    """An inline container: a part, an assembly, a folder or a link group, shown ``repeats`` times more."""
+
+    kind: str
+    items: list[Any]
+    repeats: int = 0
+    mark: str = ""
+
+
+@dataclass
+class Plan:
+    """Assemblies by name, each a list of items; what is named ``p…`` is a part. The last one is the top."""
+
+    assemblies: dict[str, list[Any]] = field(default_factory=dict)
+
+    @property
+    def top(self) -> str:
+        return list(self.assemblies)[-1]
+
+
+STYLES = ("link", "live", "chain", "draft", "element")
+MARKS = ("", "", "", "", "Suppressed", "SiloBomExclude")
+
+
+def links(targets: list[str]) -> st.SearchStrategy[Link]:
+    return st.builds(
+        Link, st.sampled_from(targets), st.integers(0, 3), st.sampled_from(STYLES), st.sampled_from(MARKS)
+    )
+
+
+def items(targets: list[str], depth: int = 2) -> st.SearchStrategy[list[Any]]:
+    one = links(targets)
+    if depth:
+        kinds = st.sampled_from(["part", "assembly", "folder", "link_group"])
+        one = one | st.builds(
+            Inside, kinds, items(targets, depth - 1), st.integers(0, 2), st.sampled_from(MARKS)
+        )
+    return st.lists(one, max_size=4)
+
+
+@st.composite
+def plans(draw: st.DrawFn) -> Plan:
+    plan = Plan()
+    targets = ["p0", "p1", "p2"]
+    for number in range(draw(st.integers(1, 4))):
+        name = f"a{number}"
+        plan.assemblies[name] = draw(items(targets))
+        targets = [*targets, name]
+    return plan
+
+
+# --- the naive count --------------------------------------------------------------------------------------
+
+
+def instances(plan: Plan, name: str) -> Iterator[str]:
+    """Every instance of every component in an assembly, one after the other."""
+    for target in direct(plan.assemblies[name]):
+        yield target
+        if target in plan.assemblies:
+            yield from instances(plan, target)
+
+
+def direct(things: list[Any]) -> Iterator[str]:
+    for thing in things:
+        if thing.mark:
+            continue
+        if isinstance(thing, Link):
+            # One element of an array is one; a chain through an array of two shows both each time.
+            times = 1 if thing.style == "element" else max(1, thing.count)
+            for _ in range(times * (2 if thing.style == "chain" else 1)):
+                yield thing.target
+        else:
+            shown = 1 + (thing.repeats if thing.kind == "link_group" else 0)
+            for _ in range(shown):
+                yield from direct(thing.items)
+
+
+# --- the documents ----------------------------------------------------------------------------------------
+
+
+class Builder:
+    """Makes the fake documents of a plan."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+        self.targets: dict[str, Any] = {}
+        self.serial = 0
+
+    def name(self) -> str:
+        self.serial += 1
+        return f"N{self.serial}"
+
+    def target(self, name: str) -> Any:
+        if name not in self.targets:
+            doc = Doc(f"/v/{name}.FCStd")
+            self.targets[name] = (
+                doc.assembly(*self.members(doc, self.plan.assemblies[name]))
+                if name in self.plan.assemblies
+                else doc.body()
+            )
+        return self.targets[name]
+
+    def members(self, doc: Doc, things: list[Any]) -> list[Any]:
+        return [obj for thing in things for obj in self.objects(doc, thing)]
+
+    def objects(self, doc: Doc, thing: Any) -> list[Any]:
+        mark = {thing.mark: True} if thing.mark else {}
+        return self.link(doc, thing, mark) if isinstance(thing, Link) else self.inside(doc, thing, mark)
+
+    def link(self, doc: Doc, thing: Link, mark: dict[str, bool]) -> list[Any]:
+        target, count = self.target(thing.target), thing.count
+        if thing.style == "live":
+            return [ForwardingLink(doc, self.name(), target, ElementCount=count, **mark)]
+        if thing.style == "chain":
+            hop = Doc(f"/v/hop-{self.name()}.FCStd").array(self.name(), target, 2)
+            return [doc.link(self.name(), hop, ElementCount=count, **mark)]
+        if thing.style == "element":
+            return [doc.link(self.name(), (doc.array(self.name(), target, 5), "3."), **mark)]
+        if thing.style == "draft" and count:
+            base = doc.link(self.name(), target)
+            array = doc.add("Part::FeaturePython", self.name(), Base=base, Count=count, **mark)
+            return [array] if mark else [base, array]
+        return [doc.array(self.name(), target, count, **mark)]
+
+    def inside(self, doc: Doc, thing: Inside, mark: dict[str, bool]) -> list[Any]:
+        inner = self.members(doc, thing.items)
+        container = getattr(doc, thing.kind)(
+            *([] if thing.kind == "assembly" else [self.name()]), *inner, **mark
+        )
+        if thing.kind == "assembly":
+            edit(container)
+            container.__dict__["Name"] = self.name()
+        found = [container]
+        if thing.kind == "folder":
+            found += inner  # FreeCAD lists a folder's content in the assembly's Group as well
+        if thing.kind == "link_group" and not mark:
+            found += [doc.link(self.name(), container) for _ in range(thing.repeats)]
+        return found
+
+
+def build(plan: Plan) -> Any:
+    return Builder(plan).target(plan.top)
+
+
+def key_of(plan: Plan, name: str) -> Key:
+    return (f"/v/{name}.FCStd", "Assembly" if name in plan.assemblies else "Body")
+
+
+# --- laws -------------------------------------------------------------------------------------------------
+
+
+@given(plans())
+def test_quantities_multiplied_down_the_tree_are_the_naive_count(plan: Plan) -> None:
+    """Arrays, chains, live links, Draft arrays, inline containers, repeated groups, what is left out."""
+    wanted = Counter(key_of(plan, name) for name in instances(plan, plan.top))
+    assert flat_counts(extract(build(plan)).entries) == wanted
+
+
+@given(plans())
+def test_each_level_is_the_naive_count_of_its_assembly(plan: Plan) -> None:
+    """Quantities are per one parent at every depth, and levels count up."""
+
+    def check(entries: tuple[BomEntry, ...], name: str, level: int) -> None:
+        wanted = Counter(key_of(plan, target) for target in direct(plan.assemblies[name]))
+        assert {entry.key: entry.quantity for entry in entries} == wanted
+        for entry in entries:
+            assert entry.level == level
+            below = entry.doc_path.removeprefix("/v/").removesuffix(".FCStd")
+            if below in plan.assemblies:
+                check(entry.children, below, level + 1)
+
+    check(extract(build(plan)).entries, plan.top, 1)
+
+
+def shuffled(obj: Any, random: Any, seen: set[int]) -> None:
+    """Mix every Group and ElementList below an assembly (elements of arrays have their order by name)."""
+    if id(obj) in seen:
+        return
+    seen.add(id(obj))
+    for name in ("Group", "ElementList"):
+        members = list(obj.__dict__.get(name) or ())
+        if obj.TypeId != "App::Link":
+            random.shuffle(members)
+            if members:
+                edit(obj, **{name: members})
+        for member in members:
+            shuffled(member, random, seen)
+    linked = obj.__dict__.get("LinkedObject")
+    if linked is not None:
+        shuffled(linked[0] if isinstance(linked, tuple) else linked, random, seen)
+
+
+def normal(entries: tuple[BomEntry, ...]) -> Any:
+    return sorted(
+        (
+            entry.key,
+            entry.quantity,
+            entry.level,
+            entry.is_assembly,
+            entry.consolidation_warning,
+            entry.individual_links,
+            sorted(entry.instances),
+            normal(entry.children),
+        )
+        for entry in entries
+    )
+
+
+@given(plans(), st.randoms(use_true_random=False))
+def test_counting_is_order_free(plan: Plan, random: Any) -> None:
+    """Any order of any Group gives the same lines and the same findings."""
+    asm = build(plan)
+    before = extract(asm)
+    shuffled(asm, random, set())
+    after = extract(asm)
+    assert normal(after.entries) == normal(before.entries)
+    assert set(after.findings) == set(before.findings)
+
+
+@st.composite
+def tangles(draw: st.DrawFn) -> Any:
+    """Assemblies that link each other in any way, rings included, with broken and odd links among them."""
+    docs = [Doc(f"/v/t{number}.FCStd", meta={"SiloUUID": f"u{number % 2}"}) for number in range(4)]
+    assemblies = [doc.assembly() for doc in docs]
+    bolt = Doc("/v/bolt.FCStd", meta={"SiloUUID": "u1"}).body()
+    problems = [LinkProblem(FindingCode.MISSING_FILE, "x.FCStd", "Box"), LinkProblem(FindingCode.UNSET_LINK)]
+    for doc, asm in zip(docs, assemblies, strict=True):
+        members = []
+        for number, choice in enumerate(draw(st.lists(st.integers(0, 8), max_size=5))):
+            name = f"L{number}"
+            if choice < 4:
+                members.append(doc.link(name, assemblies[choice]))
+            elif choice < 6:
+                members.append(doc.link(name, None, LinkProblem=problems[choice - 4]))
+            elif choice == 6:
+                members.append(doc.link(name, bolt, ScaleVector=(-1.0, 1.0, 1.0)))
+            elif choice == 7:
+                members.append(doc.link(name, (bolt, "Face1")))
+            else:
+                members.append(doc.body(name))
+        edit(asm, Group=members)
+    return assemblies[0]
+
+
+@settings(max_examples=200)
+@given(tangles(), st.randoms(use_true_random=False))
+def test_also_tangles_are_order_free_and_end(asm: Any, random: Any) -> None:
+    """Rings are cut at the same place, and told in the same words, whatever the order."""
+    before = extract(asm)
+    shuffled(asm, random, set())
+    after = extract(asm)
+    assert normal(after.entries) == normal(before.entries)
+    assert set(after.findings) == set(before.findings)
+
+
+@given(tangles())
+def test_no_tree_contains_itself(asm: Any) -> None:
+    """However assemblies refer to each other, no component stands below itself."""
+
+    def check(entries: tuple[BomEntry, ...], above: tuple[Key, ...]) -> None:
+        for entry in entries:
+            assert entry.key not in above
+            check(entry.children, (*above, entry.key))
+
+    found = extract(asm)
+    check(found.entries, (found.assembly.key,))
+
+
+@given(plans())
+def test_walking_twice_says_the_same(plan: Plan) -> None:
+    """The walker keeps nothing and changes nothing."""
+    asm = build(plan)
+    assert extract(asm) == extract(asm)
+
+
+@given(plans(), st.integers(0, 3), st.integers(1, 5))
+def test_one_more_link_adds_what_it_shows_and_nothing_else(plan: Plan, which: int, count: int) -> None:
+    """Additivity: an array of n more of a component changes exactly that component's quantity, by n."""
+    name = [*(n for n in plan.assemblies if n != plan.top), "p0", "p1", "p2"][which % 3]
+    asm = build(plan)
+    before = {entry.key: entry.quantity for entry in extract(asm).entries}
+    target = Builder(plan).target(name)
+    edit(asm, Group=[*asm.Group, asm.Document.array("More", target, count)])
+    after = {entry.key: entry.quantity for entry in extract(asm).entries}
+    key = key_of(plan, name)
+    assert after == {**before, key: before.get(key, 0) + count}
