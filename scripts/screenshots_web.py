@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Photograph the web pages into ``docs/images/web-*.png``: the example assembly on a server of its own.
+
+Run: ``.venv/bin/python scripts/screenshots_web.py [FOLDER]`` (needs Chromium on the machine). Into another
+FOLDER every page is photographed in light and dark, wide and narrow, to look at while working on them.
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from playwright.sync_api import Browser, Page, sync_playwright
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "tests" / "support"))
+
+from gearbox_story import GearboxStory  # noqa: E402
+
+from silo.api.client import SiloClient  # noqa: E402
+from silo_server.run import RunningServer, running_server  # noqa: E402
+
+DOCS = ROOT / "docs" / "images"
+WIDE, NARROW = {"width": 1200, "height": 800}, {"width": 390, "height": 844}
+IMPORT = "Part number,Quantity,Unit,Notes\nM01-0001,1,,\nF01-0001,14,,torque 25 Nm\nC01-0002,0.05,l,oil\nX99,1,,\n"
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A page to photograph. ``show`` is a selector that must be there before."""
+
+    name: str
+    path: str
+    show: str = "main"
+
+
+def main() -> None:
+    """Play the story, then photograph."""
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else None
+    with tempfile.TemporaryDirectory() as scratch, _server(Path(scratch)) as (server, story):
+        top = _play(story)
+        with sync_playwright() as playwright:
+            browser = playwright.chromium.launch(
+                executable_path=shutil.which("chromium"), args=["--no-sandbox", "--disable-gpu"]
+            )
+            state = _log_in(browser, server, Path(scratch) / "state.json")
+            if folder is None:
+                _for_docs(browser, server, state, top)
+            else:
+                folder.mkdir(parents=True, exist_ok=True)
+                _all(browser, server, state, top, folder)
+            browser.close()
+
+
+@contextmanager
+def _server(folder: Path) -> Iterator[tuple[RunningServer, GearboxStory]]:
+    with (
+        running_server(f"sqlite:///{folder / 'silo.db'}", token="silo_" + "0" * 40) as server,
+        SiloClient(server.base_url, server.token) as client,
+    ):
+        yield server, GearboxStory(folder, client)
+
+
+def _play(story: GearboxStory) -> str:
+    """Everything that the pages can show; the part number of the top assembly."""
+    client = story.client
+    story.register()
+    story.upload()
+    story.sync()
+    top = story.number_of("TopAssembly")
+    glue = client.create_item("kindred-rd", "C01", "Thread locker", item_type="consumable")
+    client.create_item("kindred-rd", "C01", "Gear oil ISO VG 220", item_type="consumable")
+    client.add_bom_line(top, glue.part_number, quantity=0.02, unit="l", notes="cover bolts, medium strength")
+    client.update_bom_line(top, story.number_of("MotorMount"), quantity=2)
+    story.remove("Cover")
+    story.remove("BasePlate")
+    story.more_bolts(4)
+    story.sync()
+    return top
+
+
+def _log_in(browser: Browser, server: RunningServer, state: Path) -> Path:
+    context = browser.new_context()
+    context.new_page().goto(server.login_url)
+    context.storage_state(path=state)
+    context.close()
+    return state
+
+
+def _shots(top: str) -> list[Shot]:
+    return [
+        Shot("items", "/items", ".items"),
+        Shot("item", f"/items/{top}", ".tree"),
+        Shot("flat", f"/items/{top}?view=flat"),
+        Shot("merge", f"/items/{top}/bom", ".banner.warn"),
+        Shot("edit", f"/items/{top}/bom?edit=F01-0001#edit", "#edit"),
+        Shot("history", f"/items/{top}/history"),
+        Shot("compare", f"/items/{top}/compare?old=0"),
+        Shot("activity", "/activity", ".live.on"),
+        Shot("import", f"/items/{top}/import"),
+        Shot("account", "/account"),
+        Shot("users", "/users"),
+        Shot("audit", "/audit"),
+        Shot("missing", "/items/NO-SUCH"),
+    ]
+
+
+def _all(browser: Browser, server: RunningServer, state: Path, top: str, folder: Path) -> None:
+    for scheme in ("light", "dark"):
+        for width, viewport in (("wide", WIDE), ("narrow", NARROW)):
+            context = browser.new_context(
+                base_url=server.base_url, storage_state=state, color_scheme=scheme, viewport=viewport
+            )
+            page = context.new_page()
+            for shot in _shots(top):
+                _photograph(page, shot, folder / f"{shot.name}-{width}-{scheme}.png")
+            _check_import(page, top)
+            page.screenshot(path=folder / f"checked-{width}-{scheme}.png", full_page=True)
+            context.close()
+            stranger = browser.new_context(
+                base_url=server.base_url, color_scheme=scheme, viewport=viewport
+            ).new_page()
+            _photograph(stranger, Shot("login", "/login"), folder / f"login-{width}-{scheme}.png")
+            stranger.context.close()
+
+
+def _for_docs(browser: Browser, server: RunningServer, state: Path, top: str) -> None:
+    wanted = {"items", "item", "merge", "compare", "activity"}
+    for scheme, viewport, suffix in (("light", WIDE, ""), ("dark", NARROW, "-phone")):
+        context = browser.new_context(
+            base_url=server.base_url, storage_state=state, color_scheme=scheme, viewport=viewport
+        )
+        page = context.new_page()
+        for shot in _shots(top):
+            if shot.name in wanted and (not suffix or shot.name == "merge"):
+                _photograph(page, shot, DOCS / f"web-{shot.name}{suffix}.png")
+        context.close()
+
+
+def _photograph(page: Page, shot: Shot, path: Path) -> None:
+    page.goto(shot.path)
+    page.locator(shot.show).first.wait_for()
+    page.screenshot(path=path, full_page=True)
+
+
+def _check_import(page: Page, top: str) -> None:
+    page.goto(f"/items/{top}/import")
+    page.get_by_label("CSV file").set_input_files(
+        {"name": "bom.csv", "mimeType": "text/csv", "buffer": IMPORT.encode()}
+    )
+    page.get_by_role("button", name="Check the file").click()
+    page.locator("#checked").wait_for()
+
+
+if __name__ == "__main__":
+    main()
