@@ -182,15 +182,17 @@ def has_identity(doc: Any) -> bool:
 
 def not_in_silo(taken: Snapshot) -> Entry:
     """The box for a document that has no item yet."""
-    register = Action(Do.REGISTER, translate("Silo", "Register Parts…"), document=taken.path)
     name = taken.label or os.path.basename(taken.path)
+    text = taken.problem or translate("Silo", "It has no Silo part number yet, so it was not sent.")
+    tone = Tone.PLAIN if taken.problem else Tone.WARNING
+    register = Action(Do.REGISTER, translate("Silo", "Register Parts…"), document=taken.path)
     return Entry(
         key=f"not-in-silo:{taken.path}",
         title=translate("Silo", "Saved, but not in Silo: {name}").replace("{name}", name),
         when=time.time(),
-        tone=Tone.WARNING,
-        lines=(Line(translate("Silo", "It has no Silo part number yet, so it was not sent."), Tone.WARNING),),
-        actions=(register,),
+        tone=tone,
+        lines=(Line(text, tone),),
+        actions=() if taken.problem else (register,),
         rank=1,
         icon="silo-commit",
     )

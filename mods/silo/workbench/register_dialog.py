@@ -160,7 +160,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self._problem.setText(plain(text, 500))
         self._problem.setVisible(bool(text))
 
-    def done(self, order: Order, result: Registration) -> None:
+    def registered(self, order: Order, result: Registration) -> None:
         """One component is registered, or could not be."""
         for row in self._rows:
             if row.candidate is order.candidate:

@@ -142,14 +142,15 @@ class RegisterFlow:
         self._session.ask(translate("Silo", "Registering"), run, done=finished, failed=failed)
 
     def _done(self, path: str, order: Order, result: Registration) -> None:
-        self._with_dialog(path, lambda dialog: dialog.done(order, result))
+        self._with_dialog(path, lambda dialog: dialog.registered(order, result))
 
     def _send(self, path: str, registered: Sequence[Candidate]) -> None:
         """Upload the files that have an item now, and sync the assembly's BOM with the new lines."""
         if not registered:
             return
         comment = translate("Silo", "Registered")
-        for part in dict.fromkeys(c.entry.doc_path for c in registered):
+        # A file that gives several parts is no single item's.
+        for part in dict.fromkeys(c.entry.doc_path for c in registered if not c.shares_file):
             doc = host.find_document(part)
             if doc is not None and part != path:
                 self._commits.send(doc, comment)

@@ -12,13 +12,14 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from silo.bom.document import document_property, object_name, own
+from silo.bom.document import document_property, own
 from silo.bom.errors import InputError, SiloError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.identity import META_KEY, identity_of
 from silo.bom.links import extract
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.roots import choose_assembly
+from silo.workbench.words import plain, translate
 
 FORMAT = 1
 
@@ -69,7 +70,7 @@ def take(doc: Any, *, assembly: Any = None, walk: Walk = extract) -> Snapshot:
     extraction = walk(container)
     head = extraction.assembly
     if not (extraction.entries or extraction.blocked or _is_assembly_object(container)):
-        return Snapshot(path, label, part_identity(doc))
+        return Snapshot(path, label, part_identity(doc), problem=_several(doc, label))
     return Snapshot(path, label, head.silo_uuid or part_identity(doc), _with_identity(extraction, doc))
 
 
@@ -97,12 +98,28 @@ def part_identity(doc: Any) -> str | None:
     found = document_property(doc, "SiloUUID") or (getattr(doc, "Meta", None) or {}).get(META_KEY)
     if isinstance(found, str) and found.strip():
         return found.strip()
-    marked = {
-        identity: object_name(obj)
+    marked = _marked(doc)
+    return next(iter(marked)) if len(marked) == 1 else None
+
+
+def _marked(doc: Any) -> set[str]:
+    """The identities on the objects of a document."""
+    return {
+        identity
         for obj in getattr(doc, "Objects", ()) or ()
         if (own(obj, "SiloItemId") or own(obj, "SiloUUID")) and (identity := identity_of(obj))
     }
-    return next(iter(marked)) if len(marked) == 1 else None
+
+
+def _several(doc: Any, label: str) -> str:
+    """Why a document has no identity of its own although its parts have; "" where that is not so."""
+    count = len(_marked(doc))
+    if count < 2 or part_identity(doc):
+        return ""
+    text = translate(
+        "Silo", "{name} holds {n} registered parts, so its file is no single item's and stays here."
+    )
+    return text.replace("{name}", plain(label, 80)).replace("{n}", str(count))
 
 
 # --- JSON ------------------------------------------------------------------------------------------------

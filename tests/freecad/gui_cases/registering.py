@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Inside FreeCAD: give numbers to parts, from the dialog to the BOM; parts that cannot be written."""
+
+from __future__ import annotations
+
+import os
+import stat
+import sys
+from typing import Any
+
+sys.path.insert(0, os.environ["SILO_TEST_CASES"])
+
+from inside import (
+    VAULT,
+    App,
+    Gui,
+    QtCore,
+    addon,
+    assembly,
+    boxes,
+    close_all,
+    part,
+    run,
+    settled,
+    tell,
+    unmark,
+    wait,
+)
+
+NUMBER, COMPONENT, NAME = 4, 0, 1
+
+
+def story() -> None:
+    one = addon()
+    one.preferences.set("AskComment", False)
+    wait(lambda: one.session.shown.connection == "online")
+    parts = {name: part(name) for name in ("Bracket", "MotorMount", "Fixed", "Twin", "Construction")}
+    two = two_parts()
+    (VAULT / "Fixed.FCStd").chmod(stat.S_IRUSR)
+    made = assembly(
+        "Top",
+        *((name, box, 0) for name, box in parts.items()),
+        ("Left", two.getObject("Left"), 0),
+        ("Right", two.getObject("Right"), 0),
+    )
+    top = made.Document
+    unmark(top)
+    # An edit that is not saved yet goes along.
+    parts["Bracket"].Length = 33
+
+    App.setActiveDocument(top.Name)
+    Gui.runCommand("Silo_RegisterParts")
+    dialog = wait(lambda: next(iter(one.registrations._open.values()), None))
+    wait(lambda: dialog.rows)
+    tell(
+        offered={
+            row.component(): [row.name, row.item_type, row.category, row.checked, row.note()[0]]
+            for row in dialog.rows
+        }
+    )
+    uncheck(dialog, "Construction.FCStd")
+    rename(dialog, "MotorMount.FCStd", "Motor mount")
+    dialog.register_button.click()
+    wait(lambda: done(dialog) >= 6 and settled())
+    wait(lambda: boxes("BOM Updated: ") and settled())
+    tell(
+        registered={row.component(): row.result.part_number for row in dialog.rows if row.finished},
+        left=[row.component() for row in dialog.rows if not row.finished],
+        button=dialog.skip_button.text(),
+    )
+    dialog.skip_button.click()
+    wait(lambda: not one.registrations._open)
+    identities(top.FileName)
+
+    # The next commit asks again, for those that were skipped.
+    one.commits.start(App.ActiveDocument)
+    again = wait(lambda: next(iter(one.registrations._open.values()), None))
+    wait(lambda: again.rows)
+    tell(asked_again=[row.component() for row in again.rows])
+    again.close()
+
+
+def two_parts() -> Any:
+    """One file that gives two parts."""
+    doc = App.newDocument("Two")
+    for name in ("Left", "Right"):
+        doc.addObject("Part::Box", name).Label = f"{name} jaw"
+    doc.recompute()
+    doc.saveAs(str(VAULT / "Two.FCStd"))
+    unmark(doc)
+    return doc
+
+
+def row_of(dialog: Any, component: str) -> int:
+    return next(i for i, row in enumerate(dialog.rows) if row.component() == component)
+
+
+def uncheck(dialog: Any, component: str) -> None:
+    item = dialog.table.item(row_of(dialog, component), COMPONENT)
+    item.setCheckState(QtCore.Qt.CheckState.Unchecked)
+
+
+def rename(dialog: Any, component: str, name: str) -> None:
+    dialog.table.item(row_of(dialog, component), NAME).setText(name)
+
+
+def done(dialog: Any) -> int:
+    return sum(1 for row in dialog.rows if row.finished)
+
+
+def identities(top: str) -> None:
+    """What a fresh FreeCAD session reads from the files."""
+    close_all()
+    doc = App.openDocument(top)
+    found: dict[str, Any] = {}
+    for other in App.listDocuments().values():
+        found[other.Name] = {
+            "meta": dict(other.Meta),
+            "property": getattr(other, "SiloUUID", None) if hasattr(other, "addProperty") else None,
+            "objects": {o.Name: o.SiloItemId for o in other.Objects if "SiloItemId" in o.PropertiesList},
+        }
+    bracket = App.getDocument("Bracket")
+    App.setActiveDocument(doc.Name)
+    tell(
+        identities=found, edit=float(bracket.getObject("Box").Length), properties=hasattr(doc, "addProperty")
+    )
+
+
+run(story)
