@@ -5,12 +5,14 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
+from typing import Any
 
 from silo.bom.errors import CancelledError
 from silo.inertia.geometry import isolate, store
 from silo.inertia.geometry.cache import Cache, default_folder, key_of
 from silo.inertia.geometry.detect import Kind, detect
 from silo.inertia.geometry.options import Progress, Reading, ReadOptions, Report
+from silo.inertia.materials.cards import cards_fingerprint
 from silo.inertia.model import Assembly
 
 
@@ -28,11 +30,11 @@ def read(path: str | Path, *, options: ReadOptions | None = None) -> Assembly:
     """
     options = options or ReadOptions()
     path = Path(path)
-    detect(path)
+    kind = detect(path)
     if not options.isolate:
         return read_here(path, options, _reporter(path, options)).assembly
     cache = Cache(options.cache_dir or default_folder()) if options.cache else None
-    key = key_of(path, options.content_options()) if cache else ""
+    key = key_of(path, _content(kind, options)) if cache else ""
     known = cache.get(key, path) if cache else None
     if known is not None:
         return known
@@ -42,6 +44,12 @@ def read(path: str | Path, *, options: ReadOptions | None = None) -> Assembly:
         if cache is not None:
             cache.put(key, result)
         return store.load(result)[0]
+
+
+def _content(kind: Kind, options: ReadOptions) -> dict[str, Any]:
+    """What a result depends on besides the file: for FreeCAD documents also the cards that hold densities."""
+    content = options.content_options()
+    return {**content, "cards": cards_fingerprint()} if kind is Kind.FREECAD else content
 
 
 def read_here(path: Path, options: ReadOptions, report: Report) -> Reading:

@@ -8,6 +8,7 @@ gases, are no materials here.
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 import sys
@@ -36,6 +37,19 @@ def card_folders() -> tuple[Path, ...]:
     """Folders that hold material cards here: FREECAD_MATERIALS first, then the usual places."""
     given = [Path(p) for p in os.environ.get("FREECAD_MATERIALS", "").split(os.pathsep) if p]
     return tuple(folder for folder in (*given, *_usual()) if folder.is_dir())
+
+
+def cards_fingerprint() -> str:
+    """Changes with every card that is added, removed or edited; for caches of what cards were used for."""
+    seen = hashlib.sha256()
+    for folder in card_folders():
+        for path in sorted(folder.rglob("*.FCMat")):
+            try:
+                stat = path.stat()
+            except OSError:
+                continue
+            seen.update(f"{path}\0{stat.st_size}\0{stat.st_mtime_ns}\n".encode())
+    return seen.hexdigest()
 
 
 def _usual() -> Iterator[Path]:

@@ -187,7 +187,8 @@ def _link_rows(report: InertiaReport) -> Iterable[str]:
 def _frames(report: InertiaReport) -> Iterable[str]:
     frames = {link.frame.description for link in report.links.values()}
     if len(frames) == 1:
-        yield f"Inertia is about each centre of mass. Frame of all numbers: {_cell(frames.pop())}."
+        frame = _cell(frames.pop())
+        yield f"Inertia is about each centre of mass. Frame: {frame}; of the whole assembly: its own."
         return
     yield "Inertia is about each centre of mass. Frames:"
     yield ""
