@@ -13,6 +13,7 @@ from fakes import Doc, edit
 from silo.bom import BomEntry, Finding, FindingCode, Severity, choose_assembly, diff_bom, extract
 from silo.bom.diff import diff_findings
 from silo.bom.document import LinkProblem
+from silo.bom.findings import respelt_findings
 from silo.bom.resolve import consolidation_findings, unregistered_findings
 
 
@@ -123,6 +124,9 @@ SCENES: dict[FindingCode, Callable[[], Iterable[Finding]]] = {
     FindingCode.NO_CONTAINER: lambda: loose(beside=False),
     FindingCode.BESIDE_ASSEMBLY: lambda: loose(beside=True),
     FindingCode.STALE_ASSEMBLY_LINK: met_by_a_member(stale),
+    FindingCode.RESPELT: lambda: respelt_findings(
+        ["/v/top.FCStd records A.FCStd; taken was a.FCStd"], "/v/top.FCStd"
+    ),
     FindingCode.EMPTY_BOM: lambda: extract(Doc("/v/top.FCStd").assembly()).findings,
     FindingCode.COPIED_IDENTITY: lambda: one_identity(("/v/a.FCStd", "A"), ("/v/b.FCStd", "B")),
     FindingCode.SHARED_IDENTITY: lambda: one_identity(("/v/a.FCStd", "A"), ("/v/a.FCStd", "B")),

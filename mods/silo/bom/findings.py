@@ -8,6 +8,7 @@ file must never read as "removed".
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -48,6 +49,7 @@ class FindingCode(StrEnum):
     BESIDE_ASSEMBLY = "beside_assembly"
     STALE_ASSEMBLY_LINK = "stale_assembly_link"
     LOST_ASSEMBLY = "lost_assembly"
+    RESPELT = "respelt"
     EMPTY_BOM = "empty_bom"
     CONSOLIDATION = "consolidation"
     # identity
@@ -86,3 +88,8 @@ class Finding:
     def blocks(self) -> bool:
         """True where the BOM is not to be synced unless the user says so."""
         return self.severity is Severity.ERROR
+
+
+def respelt_findings(notes: Iterable[str], top: str) -> tuple[Finding, ...]:
+    """What was taken though it is recorded in other case: right here, missing on another system."""
+    return tuple(Finding(FindingCode.RESPELT, Severity.WARNING, f"{note}.", (Place(top),)) for note in notes)

@@ -8,8 +8,10 @@ import json
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from silo.bom.findings import respelt_findings
 from silo.bom.links import extract
 from silo.bom.model import Extraction
 from silo.bom.roots import choose_assembly
@@ -67,7 +69,9 @@ def read_assembly(top: str, assembly: str | None = None) -> Extraction:
 
     with Library() as library:
         document = library.open(top)
-        return extract(choose_assembly(document, assembly))
+        found = extract(choose_assembly(document, assembly))
+        told = respelt_findings(library.notes, document.FileName)
+    return replace(found, findings=(*found.findings, *told))
 
 
 def print_json(data: Any) -> None:

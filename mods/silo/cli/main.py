@@ -68,7 +68,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return CANCELLED
     except BrokenPipeError:
         # The reader (head, less) has seen enough; that is no error. Nothing may be flushed any more.
-        sys.stdout = None  # type: ignore[assignment]
+        sys.stdout = None
         return OK
     except CancelledError:
         print("Cancelled.", file=sys.stderr)
