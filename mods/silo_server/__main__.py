@@ -21,15 +21,11 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--workers", type=int, default=1, metavar="N", help="server processes")
     args = parser.parse_args(argv)
     try:
-        serve(args.host, args.port, args.database, workers=args.workers, tell=_tell)
+        serve(args.host, args.port, args.database, workers=args.workers)
     except SiloError as error:
         print(error, file=sys.stderr)
         return 2
     return 0
-
-
-def _tell(line: str) -> None:
-    print(line, flush=True)
 
 
 if __name__ == "__main__":

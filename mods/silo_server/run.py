@@ -19,6 +19,8 @@ from typing import Any
 
 import uvicorn
 from fastapi import FastAPI
+from sqlalchemy import make_url
+from sqlalchemy.exc import SQLAlchemyError
 
 from silo.bom.errors import ConfigError
 from silo_server.app import create_app
@@ -41,16 +43,48 @@ class RunningServer:
     app: FastAPI
 
 
-class SiloServer(uvicorn.Server):
-    """uvicorn's server, which lets its event streams go before it waits for its connections to end."""
+@dataclass(frozen=True, slots=True)
+class Greeting:
+    """What a server says of itself when it starts. ``public``: other machines reach it."""
 
-    def __init__(self, config: uvicorn.Config) -> None:
+    url: str
+    token: str
+    login_url: str
+    database: str
+    public: bool
+
+    def lines(self) -> list[str]:
+        """For people, and for scripts that look for the first address and the token."""
+        lines = [
+            f"Silo server: {self.url}",
+            f"Token:       {self.token}",
+            f"Log in:      {self.login_url}",
+            f"Database:    {self.database}",
+        ]
+        if self.public:
+            warning = "This server can be reached from other machines. Put TLS before it (docs/server.md)."
+            lines.append(warning)
+        return lines
+
+
+def _tell(greeting: Greeting) -> None:
+    # Whoever reads the output of a pipe waits for the address, and the server never ends by itself.
+    print(*greeting.lines(), sep="\n", flush=True)
+
+
+class SiloServer(uvicorn.Server):
+    """uvicorn's server, which lets its event streams go before it waits for its connections to end.
+
+    ``on_up`` is called once it answers.
+    """
+
+    def __init__(self, config: uvicorn.Config, on_up: Callable[[], None]) -> None:
         super().__init__(config)
-        self.up = threading.Event()
+        self._on_up = on_up
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)
-        self.up.set()
+        self._on_up()
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         app: Any = self.config.loaded_app
@@ -68,7 +102,7 @@ def serve(
     *,
     workers: int = 1,
     token: str | None = None,
-    tell: Callable[[str], None] = print,
+    tell: Callable[[Greeting], None] = _tell,
 ) -> None:
     """Serve until interrupted; tells the address, a token and a login link through ``tell`` first.
 
@@ -83,12 +117,14 @@ def serve(
     welcome = _prepare(settings, token or os.environ.get("SILO_API_TOKEN") or None)
     sock = _bind(host, port)
     base_url = _base_url(host, sock.getsockname()[1])
-    for line in _greeting(base_url, welcome, settings, host):
-        tell(line)
+    login_url = f"{base_url}/login/link/{welcome.login_secret}"
+    database = _without_password(settings)
+    greeting = Greeting(base_url, welcome.token, login_url, database, not is_loopback(host))
     with sock:
         if workers == 1:
-            _work(settings, sock)
+            _work(settings, sock, lambda: tell(greeting))
         else:
+            tell(greeting)
             _run_workers(settings, workers, sock)
 
 
@@ -112,11 +148,12 @@ def running_server(
     welcome = _prepare(given, token)
     app = create_app(given)
     sock = _bind(host, port)
-    server = SiloServer(_config(app))
+    up = threading.Event()
+    server = SiloServer(_config(app), up.set)
     thread = threading.Thread(target=server.run, kwargs={"sockets": [sock]}, name="silo-server", daemon=True)
     thread.start()
     try:
-        if not server.up.wait(START_SECONDS):
+        if not up.wait(START_SECONDS):
             raise ConfigError(f"the embedded server did not come up within {START_SECONDS} seconds")
         base_url = _base_url(host, sock.getsockname()[1])
         login_url = f"{base_url}/login/link/{welcome.login_secret}"
@@ -128,11 +165,15 @@ def running_server(
 
 
 def _prepare(settings: Settings, token: str | None) -> Welcome:
-    db = Database(settings)
     try:
-        return prepare(db, token)
-    finally:
-        db.close()
+        db = Database(settings)
+        try:
+            return prepare(db, token)
+        finally:
+            db.close()
+    except (SQLAlchemyError, OSError) as error:
+        cause = str(getattr(error, "orig", None) or error).strip().partition("\n")[0]
+        raise ConfigError(f"the database {_without_password(settings)} cannot be used: {cause}") from error
 
 
 def _config(app: FastAPI) -> uvicorn.Config:
@@ -142,6 +183,8 @@ def _config(app: FastAPI) -> uvicorn.Config:
         # uvicorn's access log writes whole URLs; a login link must not end up there.
         access_log=False,
         timeout_graceful_shutdown=SHUTDOWN_SECONDS,
+        # Longer than a proxy keeps its connections, so that it is never the server who hangs up first.
+        timeout_keep_alive=75,
         server_header=False,
     )
 
@@ -167,13 +210,13 @@ def _run_workers(settings: Settings, workers: int, sock: socket.socket) -> None:
         process.join(SHUTDOWN_SECONDS + 5)
 
 
-def _work(settings: Settings, sock: socket.socket) -> None:
+def _work(settings: Settings, sock: socket.socket, on_up: Callable[[], None] | None = None) -> None:
     # An answer of 100 000 rows is as many small objects; Python's collector, as it is set, would look through
     # all of them (and through every loaded module) again and again while they are made. Half the time goes.
     gc.freeze()
     gc.set_threshold(50_000, 20, 100)
     _allow_many_connections()
-    SiloServer(_config(create_app(settings))).run(sockets=[sock])
+    SiloServer(_config(create_app(settings)), on_up or (lambda: None)).run(sockets=[sock])
 
 
 def _allow_many_connections() -> None:
@@ -194,9 +237,10 @@ def _bind(host: str, port: int) -> socket.socket:
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         sock.bind((host, port))
-    except OSError as error:
+    except (OSError, OverflowError) as error:
         sock.close()
-        raise ConfigError(f"cannot listen on {host}:{port}: {error.strerror}; try --port 0") from error
+        cause = getattr(error, "strerror", None) or "wanted a port from 0 to 65535"
+        raise ConfigError(f"cannot listen on {host}:{port}: {cause}; --port 0 takes a free one") from error
     sock.listen(2048)
     sock.set_inheritable(True)
     return sock
@@ -205,15 +249,6 @@ def _bind(host: str, port: int) -> socket.socket:
 def _base_url(host: str, port: int) -> str:
     shown = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
     return f"http://[{shown}]:{port}" if ":" in shown else f"http://{shown}:{port}"
-
-
-def _greeting(base_url: str, welcome: Welcome, settings: Settings, host: str) -> list[str]:
-    lines = [f"Silo server: {base_url}", f"Token:       {welcome.token}"]
-    lines.append(f"Log in:      {base_url}/login/link/{welcome.login_secret}")
-    lines.append(f"Database:    {_without_password(settings)}")
-    if not is_loopback(host):
-        lines.append("This server can be reached from other machines. Put TLS before it (docs/server.md).")
-    return lines
 
 
 def is_loopback(host: str) -> bool:
@@ -225,6 +260,4 @@ def is_loopback(host: str) -> bool:
 
 
 def _without_password(settings: Settings) -> str:
-    from sqlalchemy import make_url
-
     return make_url(settings.sqlalchemy_url).render_as_string(hide_password=True)

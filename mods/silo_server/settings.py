@@ -66,10 +66,16 @@ class Settings:
 
     @property
     def sqlalchemy_url(self) -> str:
-        """The URL with the driver that we ship."""
+        """The URL with the driver that we ship. Raises ConfigError for a database of another kind."""
         for short in ("postgresql://", "postgres://"):
             if self.database_url.startswith(short):
                 return "postgresql+psycopg://" + self.database_url[len(short) :]
+        if not self.database_url.startswith(("sqlite://", "postgresql+psycopg://")):
+            kind = self.database_url.partition("://")[0][:40]  # what follows may hold a password
+            raise ConfigError(
+                "database: wanted sqlite:///path/to/file.db or postgresql://user:password@host/database, "
+                f"got {kind!r}"
+            )
         return self.database_url
 
     @property

@@ -5,6 +5,10 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
+import json
+import signal
+from contextlib import suppress
+from dataclasses import asdict
 
 from silo.bom.errors import ConfigError
 from silo.cli import common
@@ -27,6 +31,7 @@ def register(commands: Commands) -> None:
         "--database", metavar="URL", help="sqlite:///FILE or postgresql://…; default: your data folder"
     )
     parser.add_argument("--workers", type=int, default=1, metavar="N", help="server processes (PostgreSQL)")
+    common.add_json_option(parser)
     parser.set_defaults(run=run)
 
 
@@ -42,9 +47,16 @@ def need_server_extra() -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Serve until told to stop."""
+    """Serve until told to stop, which is how a server ends: 0 also after Ctrl-C or a TERM signal."""
     need_server_extra()
-    from silo_server.run import serve
+    from silo_server.run import Greeting, serve
 
-    serve(host=args.host, port=args.port, database_url=args.database, workers=args.workers)
+    def tell(greeting: Greeting) -> None:
+        text = json.dumps(asdict(greeting)) if args.json else "\n".join(greeting.lines())
+        # Whoever reads the output of a pipe waits for the address, and the server never ends by itself.
+        print(text, flush=True)
+
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    with suppress(KeyboardInterrupt):
+        serve(args.host, args.port, args.database, workers=args.workers, tell=tell)
     return 0
