@@ -203,10 +203,17 @@ def undo(tx: Tx, part_number: str, change_id: int, expected: int | None) -> tupl
     check_version(parent, expected)
     change, lines = get_change(tx, parent, change_id)
     current = {line.id: line for line in lines_of(tx, parent)}
+    untouched = {
+        (line.child_id, line.state.rel_type): line.id
+        for line in current.values()
+        if line.id not in {changed.line_id for changed in lines}
+    }
     touched = [
         line.child.part_number
         for line in lines
         if line.after != (current[line.line_id].state if line.line_id in current else None)
+        # The line was removed, and the same part has got a new line since.
+        or (line.before is not None and (line.child.id, line.before.rel_type) in untouched)
     ]
     if touched:
         raise ConflictError(

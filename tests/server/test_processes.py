@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Several servers over one database: events cross, no state in a process that another lacks."""
+
+from __future__ import annotations
+
+import os
+import signal
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from silo.bom.errors import ConfigError
+from silo_server.__main__ import main
+from silo_server.run import is_loopback, running_server, serve
+from silo_server.settings import Settings
+from silo_server.testing import Api, Databases, ServerProcess
+
+TOKEN = "silo_several"
+
+
+@pytest.mark.postgres
+def test_notify_carries_events_to_the_other_server(databases: Databases, tmp_path: Path) -> None:
+    """PostgreSQL's NOTIFY alone does it: neither server looks by itself within the test's life."""
+    url = databases.new("postgres")
+    settings = Settings(database_url=url, poll_seconds=3600.0)
+    with (
+        running_server(url, token=TOKEN, files_dir=tmp_path, settings=settings) as one,
+        running_server(url, token=TOKEN, files_dir=tmp_path, settings=settings) as two,
+        Api(one.base_url, TOKEN) as here,
+        Api(two.base_url, TOKEN) as there,
+        there.events() as events,
+    ):
+        for _ in range(5):
+            number = here.item()
+            assert events.next("item.created").data["part_number"] == number
+
+
+def test_the_poll_carries_events_where_nobody_tells(url: str, tmp_path: Path) -> None:
+    """Another process over the same file, or a lost notification: the log is looked at all the same."""
+    settings = Settings(database_url=url, poll_seconds=0.05)
+    with (
+        running_server(url, token=TOKEN, files_dir=tmp_path, settings=settings) as one,
+        running_server(url, token=TOKEN, files_dir=tmp_path, settings=settings) as two,
+        Api(one.base_url, TOKEN) as here,
+        Api(two.base_url, TOKEN) as there,
+        there.events() as events,
+    ):
+        number = here.item()
+        assert events.next("item.created").data["part_number"] == number
+
+
+def test_what_one_server_did_another_knows(url: str, tmp_path: Path) -> None:
+    """Tokens, sync answers, modes and files are in the database and the store, not in a process."""
+    with (
+        running_server(url, token=TOKEN, files_dir=tmp_path) as one,
+        running_server(url, token=TOKEN, files_dir=tmp_path) as two,
+        Api(one.base_url, TOKEN) as here,
+        Api(two.base_url, TOKEN) as there,
+    ):
+        parent, child = here.items(2)
+        first = here.merge(parent, {child: 1}, sync_id="crossing")
+        there.merge(parent, {child: 2})
+        assert there.merge(parent, {child: 1}, sync_id="crossing") == first
+        assert here.quantities(parent) == {child: 2}
+        made = there.good("POST", "/api/auth/tokens", {"name": "x"})
+        mine = here.as_(made["token"])
+        assert mine.get("/api/auth/me")["username"] == "admin"
+        there.good("DELETE", f"/api/auth/tokens/{made['id']}")
+        mine.bad(401, "GET", "/api/auth/me")
+        there.good("PUT", "/api/admin/mode", {"mode": "read-only"})
+        here.bad(503, "POST", "/api/items", {"part_number": "X", "name": "x"})
+
+
+@pytest.mark.postgres
+@pytest.mark.slow
+def test_worker_processes_share_a_socket_and_events_cross(databases: Databases, tmp_path: Path) -> None:
+    """``--workers 3``: whichever process a listener is at, it hears what any other did."""
+    url = databases.new("postgres")
+    with (
+        ServerProcess(url, tmp_path, TOKEN, workers=3) as server,
+        Api(server.base_url, TOKEN) as api,
+    ):
+        streams = [api.events() for _ in range(12)]
+        try:
+            for _ in range(5):
+                api.forget_connection()
+                number = api.item()
+                for stream in streams:
+                    assert stream.next("item.created").data["part_number"] == number
+        finally:
+            for stream in streams:
+                stream.close()
+        assert server.stop() == 0
+
+
+def test_a_server_ends_when_it_is_asked_to_though_somebody_listens(tmp_path: Path) -> None:
+    """SIGTERM with open event streams: they are ended, the exit is clean."""
+    with (
+        ServerProcess(f"sqlite:///{tmp_path / 'x.db'}", tmp_path, TOKEN) as server,
+        Api(server.base_url, TOKEN) as api,
+        api.events() as events,
+    ):
+        api.item()
+        events.next("item.created")
+        code = server.stop()
+        with pytest.raises(AssertionError, match="the stream ended"):
+            events.next("never")
+    assert code in (0, -signal.SIGTERM)
+
+
+def test_two_servers_may_start_at_once(url: str, tmp_path: Path) -> None:
+    """Both bring the new database up to date; one waits for the other."""
+    servers = [ServerProcess(url, tmp_path, TOKEN) for _ in range(2)]
+    try:
+        for server in servers:
+            with Api(server.base_url, TOKEN) as api:
+                assert api.get("/api/auth/me")["username"] == "admin"
+    finally:
+        for server in servers:
+            server.stop()
+
+
+def test_what_cannot_be_served_is_one_plain_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A port that is taken, a database that is none, no workers: exit code 2, no stack trace."""
+    url = f"sqlite:///{tmp_path / 'x.db'}"
+    with running_server(url, token=TOKEN, files_dir=tmp_path) as running:
+        port = running.base_url.rpartition(":")[2]
+        assert main(["--port", port, "--database", url]) == 2
+    assert "cannot listen" in capsys.readouterr().err
+    assert main(["--database", "sqlite://"]) == 2
+    assert "sqlite:///path" in capsys.readouterr().err
+    with pytest.raises(ConfigError, match="workers"):
+        serve(database_url=url, workers=0)
+
+
+def test_the_greeting_has_no_password(url: str) -> None:
+    """The database is told without its password."""
+    from silo_server.run import _without_password
+
+    settings = Settings(database_url="postgresql://silo:hunter2@db/silo")
+    assert "hunter2" not in _without_password(settings)
+    assert _without_password(replace(settings, database_url=url)).startswith(url.split(":")[0][:6])
+
+
+def test_loopback() -> None:
+    """Only what no other machine reaches counts."""
+    told = {
+        host: is_loopback(host)
+        for host in ("127.0.0.1", "::1", "localhost", "0.0.0.0", "::", "10.0.0.1", "h")
+    }
+    assert [host for host, yes in told.items() if yes] == ["127.0.0.1", "::1", "localhost"]
+
+
+def test_no_token_in_a_log(tmp_path: Path) -> None:
+    """Neither requests nor failures write tokens, links or passwords anywhere."""
+    read, write = os.pipe()
+    with os.fdopen(read) as log:
+        saved = os.dup(2)
+        os.dup2(write, 2)
+        os.close(write)
+        try:
+            with (
+                ServerProcess(f"sqlite:///{tmp_path / 'x.db'}", tmp_path, "silo_secret_token") as server,
+                Api(server.base_url, "silo_secret_token") as api,
+            ):
+                api.get("/api/items")
+                api.bad(401, "POST", "/api/auth/login", {"username": "x", "password": "secret-password"})
+                api.call("GET", "/login/link/secret-link")
+        finally:
+            os.dup2(saved, 2)
+            os.close(saved)
+        text = log.read()
+    assert "secret" not in text
