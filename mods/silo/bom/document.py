@@ -68,11 +68,15 @@ def own(obj: object, name: str, default: Any = None) -> Any:
 
 def same_document(a: object, b: object) -> bool:
     """True where both are one document: the same object, or two objects of one file."""
+    # Not by ==, which plain objects that hold each other do for ever; FreeCAD has one object per document.
     if a is b:
         return True
-    path, other = getattr(a, "FileName", ""), getattr(b, "FileName", "")
-    # Saved documents are told apart by their files: plain objects that hold each other compare for ever.
-    return bool(path == other) if path and other else a == b
+    path = getattr(a, "FileName", "")
+    return bool(path) and bool(path == getattr(b, "FileName", ""))
+
+
+# No name in FreeCAD holds a dash.
+NAMELESS = "object-"
 
 
 def object_name(obj: object) -> str:
@@ -80,7 +84,7 @@ def object_name(obj: object) -> str:
     name = getattr(obj, "Name", None)
     if isinstance(name, str) and (name or getattr(obj, "is_document_root", False)):
         return name
-    return f"object-{id(obj):x}"
+    return f"{NAMELESS}{id(obj):x}"
 
 
 def label_of(obj: object) -> str:

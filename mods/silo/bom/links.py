@@ -19,7 +19,7 @@ from dataclasses import replace
 from typing import Any
 
 from silo.bom.contents import Count, Key, Reader
-from silo.bom.document import label_of, object_name
+from silo.bom.document import NAMELESS, label_of, object_name
 from silo.bom.findings import Finding, FindingCode, Place
 from silo.bom.identity import identity_findings, identity_of
 from silo.bom.kinds import is_container, is_named_assembly
@@ -86,10 +86,26 @@ class _Walker:
         self._memo: dict[tuple[Key, int, Key], tuple[BomEntry, ...]] = {}
         self._heads: dict[Key, BomEntry] = {}
         self._containers: dict[Key, bool] = {}
+        self._nameless: dict[int, list[Any]] = {}
 
     def key(self, obj: Any) -> Key:
-        """What a component is: its file and its name in it."""
+        """What tells an object from any other: its file and its name in it."""
         return (self._path(obj), object_name(obj))
+
+    def component(self, obj: Any) -> Key:
+        """What a component is; the same as its key where it has a name.
+
+        Nameless ones are told apart by the order in which their document showed them, so that two documents
+        made of one file agree.
+        """
+        path, name = key = self.key(obj)
+        if not path or not name.startswith(NAMELESS):
+            return key
+        shown = self._nameless.setdefault(id(obj.Document), [])
+        place = next((place for place, other in enumerate(shown) if other is obj), len(shown))
+        if place == len(shown):
+            shown.append(obj)
+        return (path, f"{NAMELESS}{place + 1}" if place else "")
 
     def _path(self, obj: Any) -> str:
         path = getattr(getattr(obj, "Document", None), "FileName", "") or ""
@@ -101,7 +117,7 @@ class _Walker:
 
     def entry_for(self, obj: Any) -> BomEntry:
         """What an object says of itself, wherever it is used."""
-        path, name = key = self.key(obj)
+        path, name = key = self.component(obj)
         if key not in self._heads:
             self._heads[key] = BomEntry(
                 doc_path=path,
@@ -116,16 +132,17 @@ class _Walker:
     def tree(self, top: Any, level: int) -> tuple[BomEntry, ...]:
         """The direct children of the top, with all that is below them."""
         self._rings = Rings(self._read_all(top))
-        return self._assembly(top, level, depth=1, entry=self.key(top))
+        return self._assembly(top, level, depth=1, entry=self.component(top))
 
     def _read_all(self, top: Any) -> dict[Key, list[Key]]:
         """Read every assembly that can be reached; returns which of them each one holds."""
         holds: dict[Key, list[Key]] = {}
-        layer = {self.key(top): top}
+        layer = {self.component(top): top}
         for _ in range(MAX_LEVELS):
             below: dict[Key, Any] = {}
             for key, container in layer.items():
-                targets = {self.key(c.target): c.target for c in self._reader.contents(container).counts}
+                counts = self._reader.contents(container).counts
+                targets = {self.component(count.target): count.target for count in counts}
                 held = {name: target for name, target in targets.items() if self._is_container(name, target)}
                 holds[key] = sorted(held)
                 below.update(held)
@@ -143,13 +160,13 @@ class _Walker:
         entry
             where the walk came into the ring that the assembly is in; itself where it is in none.
         """
-        key = self.key(container)
+        key = self.component(container)
         if (known := self._memo.get((key, level, entry))) is not None:
             return known
         contents = self._reader.contents(container)
         lines: dict[Key, list[Count]] = {}
         for count in contents.counts:
-            name = self.key(count.target)
+            name = self.component(count.target)
             if self._rings.closes(entry, key, name):
                 self.notes.cycle(count.shown, self._rings.example(name))
             else:
@@ -165,7 +182,7 @@ class _Walker:
         return self._memo[(key, level, entry)]
 
     def _below(self, target: Any, level: int, depth: int, entry: Key) -> tuple[BomEntry, ...]:
-        if not self._is_container(self.key(target), target):
+        if not self._is_container(self.component(target), target):
             return ()
         if depth > MAX_LEVELS:
             self.notes.too_deep(target, MAX_LEVELS)
@@ -189,7 +206,7 @@ class _Walker:
         )
 
     def _is_assembly(self, target: Any) -> bool:
-        key = self.key(target)
+        key = self.component(target)
         return self._is_container(key, target) and self._reader.contents(target).holds_components
 
 

@@ -3,8 +3,8 @@
 
 Assemblies that contain each other form a ring (in general: a strongly connected part of the graph). Entered
 at one of them, a ring is shown outwards from there: a link is followed where it leads one step further
-from the entry, and cut otherwise. So no assembly stands below itself, and the cut depends neither on the order
-in which links are met nor on what was walked before.
+from the entry, and cut otherwise. So no assembly stands below itself, and the cut depends neither on the
+order in which links are met nor on what was walked before.
 """
 
 from __future__ import annotations
