@@ -27,7 +27,9 @@ from silo_server.run import RunningServer, running_server  # noqa: E402
 
 DOCS = ROOT / "docs" / "images"
 WIDE, NARROW = {"width": 1200, "height": 800}, {"width": 390, "height": 844}
-IMPORT = "Part number,Quantity,Unit,Notes\nM01-0001,1,,\nF01-0001,14,,torque 25 Nm\nC01-0002,0.05,l,oil\nX99,1,,\n"
+IMPORT = (
+    "Part number,Quantity,Unit,Notes\nM01-0001,1,,\nF01-0001,14,,torque 25 Nm\nC01-0002,0.05,l,oil\nX99,1,,\n"
+)
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,7 @@ def _shots(top: str) -> list[Shot]:
         Shot("item", f"/items/{top}", ".tree"),
         Shot("flat", f"/items/{top}?view=flat"),
         Shot("merge", f"/items/{top}/bom", ".banner.warn"),
-        Shot("edit", f"/items/{top}/bom?edit=F01-0001#edit", "#edit"),
+        Shot("edit", f"/items/{top}/bom?edit=F01-0001", "#edit"),
         Shot("history", f"/items/{top}/history"),
         Shot("compare", f"/items/{top}/compare?old=0"),
         Shot("activity", "/activity", ".live.on"),

@@ -38,7 +38,9 @@ class GearboxStory:
     def __init__(self, folder: Path, client: SiloClient) -> None:
         self.client = client
         self.top = folder / "gearbox" / "TopAssembly.FCStd"
-        shutil.copytree(EXAMPLE, self.top.parent, ignore=shutil.ignore_patterns("*.py", "__pycache__", "*.md"))
+        shutil.copytree(
+            EXAMPLE, self.top.parent, ignore=shutil.ignore_patterns("*.py", "__pycache__", "*.md")
+        )
 
     def register(self) -> None:
         """Give every component its part number."""

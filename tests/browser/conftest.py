@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""A real browser against a real server.
+
+Chromium is the machine's own. Without one these tests are skipped, loudly; with ``SILO_REQUIRE_BROWSER=1``
+they fail instead.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
+
+from silo_server.run import RunningServer, running_server
+from silo_server.testing import Api
+
+TOKEN = "silo_" + "browser0" * 5
+SECONDS = 20
+
+Visit = Callable[..., Page]
+
+
+def need(found: bool, what: str) -> None:
+    """Skip, or fail where the machine promised to have it."""
+    if found:
+        return
+    if os.environ.get("SILO_REQUIRE_BROWSER") == "1":
+        pytest.fail(f"SILO_REQUIRE_BROWSER is 1, but {what}")
+    pytest.skip(f"{what}; set SILO_REQUIRE_BROWSER=1 to make this an error")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Everything in this folder needs the browser."""
+    for item in items:
+        if Path(__file__).parent in item.path.parents:
+            item.add_marker(pytest.mark.browser)
+
+
+@pytest.fixture(scope="session")
+def chromium() -> Iterator[Browser]:
+    """The machine's Chromium."""
+    path = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    need(path is not None, "there is no Chromium on this machine")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox", "--disable-gpu"])
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningServer]:
+    """A server over an empty database; each test makes its own items."""
+    folder = tmp_path_factory.mktemp("server")
+    with running_server(f"sqlite:///{folder / 'silo.db'}", token=TOKEN) as running:
+        yield running
+
+
+@pytest.fixture
+def api(server: RunningServer) -> Iterator[Api]:
+    """The admin's token."""
+    with Api(server.base_url, TOKEN) as caller:
+        yield caller
+
+
+@pytest.fixture
+def visit(chromium: Browser, server: RunningServer, api: Api) -> Iterator[Visit]:
+    """``visit(role)``: a page of somebody who is logged in (nobody for ``None``).
+
+    A script that fails, and whatever our own Content-Security-Policy refuses, fails the test.
+    """
+    contexts: list[BrowserContext] = []
+    faults: list[str] = []
+
+    def open_page(role: str | None = "admin", **options: Any) -> Page:
+        context = chromium.new_context(base_url=server.base_url, **options)
+        context.set_default_timeout(SECONDS * 1000)
+        contexts.append(context)
+        page = context.new_page()
+        page.on("pageerror", lambda error: faults.append(str(error)))
+        page.on("console", lambda message: _refused(message.text, faults))
+        if role is not None:
+            page.goto(login_path(api, role))
+        return page
+
+    yield open_page
+    for context in contexts:
+        context.close()
+    assert not faults
+
+
+def login_path(api: Api, role: str) -> str:
+    """A one-time link for a user with this role, who is made where there is none."""
+    if role != "admin" and api.call("POST", "/api/users", {"username": role, "role": role}).status != 201:
+        api.good("PUT", f"/api/users/{role}", {"role": role, "active": True})
+    return str(api.good("POST", f"/api/users/{role}/login-link")["path"])
+
+
+def _refused(text: str, faults: list[str]) -> None:
+    if "Content Security Policy" in text or "Uncaught" in text:
+        faults.append(text)

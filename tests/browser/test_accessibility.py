@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""An accessibility pass (axe-core) over every page, light and dark, wide and on a phone.
+
+axe-core comes from npm into a cache folder when the tests first run; without npm, or without a way to its
+registry, these tests are skipped, loudly.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page
+
+from silo_server.testing import Api, bom
+
+Visit = Callable[..., Page]
+
+AXE = "axe-core@4.10.3"
+RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
+RUN = "tags => axe.run(document, { runOnly: tags })"
+PAGES = (
+    "/login",
+    "/items",
+    "/items?q=nothing-like-this",
+    "/items/{parent}",
+    "/items/{parent}?view=flat",
+    "/items/{child}",
+    "/items/{parent}/bom",
+    "/items/{parent}/bom?edit={child}",
+    "/items/{child}/bom",
+    "/items/{parent}/history",
+    "/items/{parent}/compare?old=0&all=1",
+    "/items/{parent}/import",
+    "/activity",
+    "/account",
+    "/users",
+    "/audit",
+    "/nowhere",
+)
+
+
+@pytest.fixture(scope="session")
+def axe(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The source of axe-core."""
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "silo-mod-tests"
+    script = cache / AXE / "node_modules" / "axe-core" / "axe.min.js"
+    if not script.is_file():
+        npm = shutil.which("npm")
+        if npm is None:
+            pytest.skip("npm is not on this machine, so axe-core cannot be had; accessibility is NOT tested")
+        folder = tmp_path_factory.mktemp("axe")
+        command = [
+            npm,
+            "install",
+            "--no-audit",
+            "--no-fund",
+            "--ignore-scripts",
+            "--prefix",
+            str(folder),
+            AXE,
+        ]
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, timeout=180)
+        except subprocess.TimeoutExpired:
+            pytest.skip("npm did not answer within 180 s; accessibility is NOT tested")
+        if done.returncode != 0:
+            pytest.skip(f"npm cannot install {AXE}; accessibility is NOT tested: {done.stderr[-300:]}")
+        shutil.copytree(folder / "node_modules", script.parents[1], dirs_exist_ok=True)
+    return script.read_text("utf-8")
+
+
+@pytest.fixture
+def numbers(api: Api) -> dict[str, str]:
+    """A BOM with everything: used, unreferenced, manual, in conflict, several levels."""
+    parent, child, module, gone, also_gone, disputed = api.items(6)
+    api.good("PUT", f"/api/items/{child}", {"properties": {"mass_kg": 0.5}, "comment": "weighed"})
+    api.merge(module, {child: 2})
+    whole = {child: 4, module: 1, gone: 1, also_gone: 2, disputed: 3}
+    api.merge(parent, whole)
+    api.good("PUT", bom(parent, disputed), {"quantity": 6, "notes": "one spare"})
+    api.merge(parent, {child: 5, module: 1, disputed: 4})
+    return {"parent": parent, "child": child}
+
+
+@pytest.mark.parametrize("width", [1200, 390])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_no_page_has_a_finding(
+    axe: str, numbers: dict[str, str], visit: Visit, scheme: str, width: int
+) -> None:
+    """Not a single violation of WCAG 2.2 AA or of axe's best practices, whatever its weight."""
+    page = visit("admin", color_scheme=scheme, viewport={"width": width, "height": 844})
+    stranger = visit(None, color_scheme=scheme, viewport={"width": width, "height": 844})
+    findings: list[str] = []
+    for path in PAGES:
+        shown = stranger if path == "/login" else page
+        shown.goto(path.format(**numbers))
+        findings += [f"{path}: {finding}" for finding in violations(shown, axe)]
+    assert findings == []
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_answers_have_no_finding(axe: str, numbers: dict[str, str], visit: Visit, scheme: str) -> None:
+    """Pages that only a form or an event brings: a checked import, a new token, a notice, news, a problem."""
+    page = visit("admin", color_scheme=scheme)
+    findings: list[str] = []
+
+    def look(what: str) -> None:
+        findings.extend(f"{what}: {finding}" for finding in violations(page, axe))
+
+    page.goto(f"/items/{numbers['parent']}/import")
+    text = f"Part number,Quantity\n{numbers['child']},9\nNO-SUCH,1\n".encode()
+    page.get_by_label("CSV file").set_input_files({"name": "x.csv", "mimeType": "text/csv", "buffer": text})
+    page.get_by_role("button", name="Check the file").click()
+    page.locator("#checked").wait_for()
+    look("import")
+    page.goto("/account")
+    page.get_by_label("Name of a new token").fill("laptop")
+    page.get_by_role("button", name="Make token").click()
+    page.locator("#fresh").wait_for()
+    look("token")
+    page.goto(f"/items/{numbers['parent']}/bom")
+    page.get_by_role("button", name="Keep 6").click()
+    page.locator(".notice").wait_for()
+    look("notice")
+    page.get_by_label("Part number").fill("NO-SUCH")
+    page.get_by_role("button", name="Add line").click()
+    page.get_by_role("alert").wait_for()
+    look("problem")
+    page.goto(f"/items/{numbers['child']}/bom")
+    assert findings == []
+
+
+def violations(page: Page, axe: str) -> list[str]:
+    """What axe finds on the page as it is shown now: rule, weight, and where."""
+    page.evaluate(axe)
+    found: dict[str, Any] = page.evaluate(RUN, RULES)
+    return [
+        f"{violation['id']} ({violation['impact']}): {node['target'][0]} {node['failureSummary']}"
+        for violation in found["violations"]
+        for node in violation["nodes"]
+    ]

@@ -1,0 +1,286 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The page where a person decides: every button of it, from the keyboard, without script, and live."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import pytest
+from playwright.sync_api import Page, Route, expect
+
+from silo_server.run import RunningServer
+from silo_server.testing import Api, bom, wait_until
+
+Visit = Callable[..., Page]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A BOM whose lines ``gone`` the assembly does not reference any more; ``used`` it does."""
+
+    parent: str
+    used: str
+    gone: list[str]
+
+    @property
+    def path(self) -> str:
+        return f"/items/{self.parent}/bom"
+
+
+@pytest.fixture
+def case(api: Api) -> Case:
+    """Three unreferenced lines and one that is used."""
+    parent, used, *gone = api.items(5)
+    api.merge(parent, {used: 4, **dict.fromkeys(gone, 1)})
+    api.merge(parent, {used: 4})
+    return Case(parent, used, gone)
+
+
+def line_of(page: Page, child: str) -> object:
+    """The row of the BOM's own table."""
+    return page.locator(
+        "section[aria-labelledby=lines] tr", has=page.get_by_role("link", name=child, exact=True)
+    )
+
+
+def test_bulk_keep_and_undo(case: Case, api: Api, visit: Visit) -> None:
+    """All lines are chosen at once, kept with one reason, and one click takes that back."""
+    page = visit("editor")
+    page.goto(case.path)
+    page.get_by_label("Choose all 3").check()
+    expect(page.locator("#count")).to_have_text("3 of 3 chosen")
+    page.get_by_label("Reason for keeping all chosen").fill("Spare parts")
+    page.get_by_role("button", name="Keep chosen").click()
+    expect(page.locator(".notice")).to_contain_text("3 lines kept as intentional")
+    expect(page.locator(".banner.warn")).to_have_count(0)
+    assert {line["reason"] for line in api.lines(case.parent).values()} == {None, "Spare parts"}
+    page.locator(".notice").get_by_role("button", name="Undo").click()
+    expect(page.locator(".banner.warn h2")).to_contain_text("3 items in the Silo BOM are not referenced")
+
+
+def test_some_are_chosen_and_removed(case: Case, api: Api, visit: Visit) -> None:
+    """Only what is chosen goes; the box that chooses all says that some are."""
+    page = visit("editor")
+    page.goto(case.path)
+    for child in case.gone[:2]:
+        page.get_by_label(f"Choose {child}").check()
+    assert page.get_by_label("Choose all 3").evaluate("box => box.indeterminate")
+    page.get_by_role("button", name="Remove chosen").click()
+    expect(page.locator(".notice")).to_contain_text("2 lines removed")
+    assert set(api.quantities(case.parent)) == {case.used, case.gone[2]}
+
+
+def test_nothing_chosen_changes_nothing(case: Case, api: Api, visit: Visit) -> None:
+    """A bulk button without a choice says so."""
+    page = visit("editor")
+    page.goto(case.path)
+    before = api.lines(case.parent)
+    page.get_by_role("button", name="Remove chosen").click()
+    expect(page.locator(".notice")).to_contain_text("No line was chosen")
+    assert api.lines(case.parent) == before
+
+
+def test_enter_in_a_reason_keeps_that_line(case: Case, api: Api, visit: Visit) -> None:
+    """From the keyboard: Enter after a reason keeps this line, and no other, and removes nothing."""
+    page = visit("editor")
+    page.goto(case.path)
+    page.get_by_label(f"Reason for keeping {case.gone[1]}").fill("Glue")
+    page.keyboard.press("Enter")
+    expect(page.locator(".notice")).to_contain_text(f"{case.gone[1]} kept as intentional")
+    lines = api.lines(case.parent)
+    assert lines[case.gone[1]]["source"] == "manual"
+    assert set(lines) == {case.used, *case.gone}
+
+
+def test_a_conflict_shows_both_and_either_is_one_click(api: Api, visit: Visit) -> None:
+    """CAD says 4, Silo says 6: keep Silo's, and after CAD changed again take CAD's."""
+    parent, child = api.items(2)
+    api.merge(parent, {child: 3})
+    api.good("PUT", bom(parent, child), {"quantity": 6})
+    api.merge(parent, {child: 4})
+    page = visit("editor")
+    page.goto(f"/items/{parent}/bom")
+    conflict = page.locator(".banner.conflict li")
+    expect(conflict).to_contain_text("CAD says 4, Silo says 6")
+    page.get_by_role("button", name=f"Keep 6 for {child}").click()
+    expect(page.locator(".notice")).to_contain_text(f"{child} left as Silo says")
+    expect(page.locator(".banner.conflict")).to_have_count(0)
+    api.merge(parent, {child: 5})
+    page.reload()
+    expect(conflict).to_contain_text("CAD says 5, Silo says 6")
+    page.get_by_role("button", name=f"Take 5 from CAD for {child}").click()
+    expect(page.locator(".banner.calm")).to_be_visible()
+    assert api.quantities(parent) == {child: 5}
+
+
+def test_a_part_that_left_the_assembly_in_conflict(api: Api, visit: Visit) -> None:
+    """A person's quantity on a part that CAD has no more: in words, with a button that removes it."""
+    parent, child, other = api.items(3)
+    api.merge(parent, {child: 3, other: 1})
+    api.good("PUT", bom(parent, child), {"quantity": 6})
+    api.merge(parent, {other: 1})
+    page = visit("editor")
+    page.goto(f"/items/{parent}/bom")
+    expect(page.locator(".banner.conflict li")).to_contain_text("CAD has it no more, Silo says 6")
+    page.get_by_role("button", name=f"Remove it for {child}").click()
+    expect(page.locator(".banner.calm")).to_be_visible()
+    assert api.quantities(parent) == {other: 1}
+
+
+def test_a_merge_arrives_live(case: Case, api: Api, visit: Visit) -> None:
+    """The open page says that a merge arrived, moves nothing under the hand, and shows it on a click."""
+    page = visit("viewer")
+    page.goto(case.path)
+    expect(page.locator(".news")).to_have_count(0)
+    api.merge(case.parent, {case.used: 9, case.gone[0]: 1})
+    news = page.locator("#live")
+    expect(news).to_contain_text("A new merge arrived")
+    expect(news).to_contain_text("1 quantity changed")
+    expect(page.locator(".banner.warn h2")).to_contain_text("3 items")
+    news.get_by_role("link", name="Show it").click()
+    expect(page.locator(".banner.warn h2")).to_contain_text("2 items")
+    expect(page.locator(".columns")).to_contain_text("quantity 4 → 9")
+    expect(page.locator("#live")).to_be_empty()
+
+
+def test_what_happens_before_the_stream_stands_is_not_missed(case: Case, api: Api, visit: Visit) -> None:
+    """A merge between the page and its event stream is told: the page says up to where it knows."""
+    page = visit("viewer")
+    held: list[Route] = []
+    page.route("**/api/events*", lambda route: held.append(route))
+    page.goto(case.path)
+    wait_until(lambda: _pumped(page, bool(held)), "the request for events")
+    api.merge(case.parent, {case.used: 7})
+    held[0].continue_()
+    expect(page.locator("#live")).to_contain_text("A new merge arrived")
+
+
+def test_other_items_are_no_news(case: Case, api: Api, visit: Visit) -> None:
+    """A merge of another BOM is not announced; the next one of this is, and is the first."""
+    page = visit("viewer")
+    page.goto(case.path)
+    other, child = api.items(2)
+    api.merge(other, {child: 1})
+    api.merge(case.parent, {case.used: 5})
+    expect(page.locator("#live")).to_contain_text("A new merge arrived")
+    expect(page.locator("#live")).not_to_contain_text("2 changes")
+
+
+def test_a_hidden_tab_gives_its_connection_back(
+    case: Case, api: Api, visit: Visit, server: RunningServer
+) -> None:
+    """Hidden: no stream. Visible again: a new one, and what happened meanwhile is told."""
+    hub = server.app.state.server.hub
+    wait_until(lambda: hub.listeners == 0, "the end of earlier streams")
+    page = visit("viewer")
+    page.goto(case.path)
+    wait_until(lambda: _pumped(page, hub.listeners == 1), "the stream")
+    _set_hidden(page, True)
+    wait_until(lambda: _pumped(page, hub.listeners == 0), "the end of the stream")
+    api.merge(case.parent, {case.used: 6})
+    _set_hidden(page, False)
+    expect(page.locator("#live")).to_contain_text("A new merge arrived")
+
+
+def test_lines_are_added_changed_and_removed(api: Api, visit: Visit) -> None:
+    """By hand: the number is completed while typing, a line is changed in its place, and taken out."""
+    parent, child = api.items(2)
+    page = visit("editor")
+    page.goto(f"/items/{parent}/bom")
+    number = page.get_by_label("Part number")
+    number.press_sequentially(child[:-1])
+    expect(page.locator(f'#known option[value="{child}"]')).to_have_count(1)
+    number.fill(child)
+    page.get_by_label("Quantity").fill("2,5")
+    page.get_by_label("Unit").fill("m")
+    page.get_by_role("button", name="Add line").click()
+    expect(page.locator(".notice")).to_contain_text(f"{child} added")
+    expect(line_of(page, child)).to_contain_text("2.5 m")
+    page.get_by_role("link", name=f"Edit {child}").click()
+    form = page.locator("#edit")
+    expect(form.get_by_label("Quantity")).to_be_focused()
+    form.get_by_label("Quantity").fill("3")
+    form.get_by_label("Reference designators").fill("R1, R2 R3")
+    form.get_by_label("Notes").fill("cut to length")
+    form.get_by_role("button", name="Save").click()
+    expect(line_of(page, child)).to_contain_text("R1 R2 R3")
+    assert api.lines(parent)[child]["reference_designators"] == ["R1", "R2", "R3"]
+    page.get_by_role("link", name=f"Edit {child}").click()
+    page.get_by_role("button", name="Remove from BOM").click()
+    expect(page.locator(".notice")).to_contain_text(f"{child} removed")
+    assert api.lines(parent) == {}
+
+
+def test_what_is_wrong_is_said_and_nothing_typed_is_lost(api: Api, visit: Visit) -> None:
+    """A quantity of zero, an unknown number: the page says what is wrong and keeps what was typed."""
+    parent, child = api.items(2)
+    page = visit("editor")
+    page.goto(f"/items/{parent}/bom")
+    for number, quantity, wrong in (
+        (child, "0", "wanted a number above 0"),
+        (child, "many", "wanted a number such as 4 or 2.5"),
+        ("NO-SUCH", "1", "does not exist on this server"),
+        (parent, "1", parent),
+    ):
+        page.get_by_label("Part number").fill(number)
+        page.get_by_label("Quantity").fill(quantity)
+        page.get_by_label("Notes").fill("as ordered")
+        page.get_by_role("button", name="Add line").click()
+        expect(page.get_by_role("alert")).to_contain_text(wrong)
+        expect(page.get_by_label("Part number")).to_have_value(number)
+        expect(page.get_by_label("Notes")).to_have_value("as ordered")
+    assert api.lines(parent) == {}
+
+
+def test_a_decision_on_an_old_page_does_nothing(case: Case, api: Api, visit: Visit) -> None:
+    """Somebody else was quicker: nothing is done, and the page shows how it stands now."""
+    page = visit("editor")
+    page.goto(case.path)
+    api.good("PUT", bom(case.parent, case.used), {"notes": "changed meanwhile"})
+    page.get_by_role("button", name=f"Remove {case.gone[0]}").click()
+    expect(page.get_by_role("alert")).to_contain_text("Somebody else changed this BOM")
+    assert case.gone[0] in api.lines(case.parent)
+    page.get_by_role("button", name=f"Remove {case.gone[0]}").click()
+    expect(page.locator(".notice")).to_contain_text(f"{case.gone[0]} removed")
+
+
+def test_everything_works_without_script(case: Case, api: Api, visit: Visit) -> None:
+    """Keep, remove, bulk, undo, add and edit are plain forms."""
+    page = visit("editor", java_script_enabled=False)
+    page.goto(case.path)
+    page.get_by_role("button", name=f"Keep as intentional {case.gone[0]}").click()
+    page.get_by_role("button", name=f"Remove {case.gone[1]}").click()
+    expect(page.locator(".banner.warn h2")).to_contain_text("1 item in the Silo BOM is not referenced")
+    page.locator(".notice").get_by_role("button", name="Undo").click()
+    expect(page.locator(".banner.warn h2")).to_contain_text("2 items")
+    for child in case.gone[1:]:
+        page.get_by_label(f"Choose {child}").check()
+    page.get_by_role("button", name="Remove chosen").click()
+    expect(page.locator(".banner.calm")).to_be_visible()
+    assert set(api.lines(case.parent)) == {case.used, case.gone[0]}
+
+
+def test_a_viewer_sees_and_changes_nothing(case: Case, visit: Visit) -> None:
+    """The banner and the lines, without a single button or field but log-out."""
+    page = visit("viewer")
+    page.goto(case.path)
+    expect(page.locator(".banner.warn h2")).to_contain_text("3 items")
+    expect(page.locator("main button, main input, main form")).to_have_count(0)
+    expect(page.get_by_role("link", name="Edit")).to_have_count(0)
+
+
+def _pumped(page: Page, value: bool) -> bool:
+    # Playwright's own events are only handled while one of its calls runs.
+    page.evaluate("1")
+    return value
+
+
+def _set_hidden(page: Page, hidden: bool) -> None:
+    page.evaluate(
+        """hidden => {
+            Object.defineProperty(document, "hidden", { configurable: true, get: () => hidden });
+            document.dispatchEvent(new Event("visibilitychange"));
+        }""",
+        hidden,
+    )

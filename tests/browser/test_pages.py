@@ -1,0 +1,408 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Every other page in a browser: items, item, history, import, activity, account, users, audit, login."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Locator, Page, Route, expect
+
+from silo_server.testing import Api, bom, form_body
+
+Visit = Callable[..., Page]
+
+
+def row(page: Page, name: str) -> Locator:
+    """The table row that begins with this name."""
+    return page.locator("tr", has=page.get_by_role("rowheader", name=name, exact=True))
+
+
+# --- items ------------------------------------------------------------------------------------------------
+
+
+def test_search_as_you_type(api: Api, visit: Visit) -> None:
+    """The list follows the typing, the address keeps up, and no page is loaded."""
+    screw, nut = api.item("SRCH-1", name="Hex screw"), api.item("SRCH-2", name="Hex nut")
+    page = visit("viewer")
+    page.goto("/items")
+    page.evaluate("window.still = true")
+    page.get_by_label("Search").press_sequentially("hex screw")
+    expect(page.get_by_role("rowheader", name=screw)).to_be_visible()
+    expect(page.get_by_role("rowheader", name=nut)).to_have_count(0)
+    expect(page.locator("#found")).to_have_text("1 item for “hex screw”")
+    page.wait_for_url("**/items?q=hex+screw&type=")
+    assert page.evaluate("window.still")
+    page.get_by_label("Search").fill("nothing like this")
+    expect(page.locator("#results")).to_contain_text("Nothing fits")
+
+
+def test_a_late_answer_does_not_replace_a_newer_one(api: Api, visit: Visit) -> None:
+    """The answer to the first letters comes last, and is not shown."""
+    slow, quick = api.item("LATE-A1"), api.item("LATE-B1")
+    page = visit("viewer")
+    held: list[Route] = []
+    page.route("**/items?q=late-a*", lambda route: held.append(route))
+    page.goto("/items")
+    with page.expect_request("**/items?q=late-a*"):
+        page.get_by_label("Search").fill("late-a")
+    page.get_by_label("Search").fill("late-b")
+    expect(page.get_by_role("rowheader", name=quick)).to_be_visible()
+    for route in held:
+        route.continue_()
+    expect(page.get_by_role("rowheader", name=slow)).to_have_count(0)
+    expect(page.get_by_role("rowheader", name=quick)).to_be_visible()
+
+
+def test_type_filter_and_search_without_script(api: Api, visit: Visit) -> None:
+    """The form is a form: words and type, without script."""
+    tool, part = api.item("TYPE-1", item_type="tool"), api.item("TYPE-2", item_type="part")
+    page = visit("viewer", java_script_enabled=False)
+    page.goto("/")
+    page.get_by_label("Search").fill("TYPE-")
+    page.get_by_label("Type").select_option("tool")
+    page.get_by_role("button", name="Search").click()
+    expect(page.get_by_role("rowheader", name=tool)).to_be_visible()
+    expect(page.get_by_role("rowheader", name=part)).to_have_count(0)
+
+
+def test_the_list_has_pages(api: Api, visit: Visit) -> None:
+    """Fifty at a time, forwards and back, with the words kept."""
+    for n in range(53):
+        api.item(f"PAGE-{n:03}")
+    page = visit("viewer")
+    page.goto("/items?q=PAGE-")
+    expect(page.locator("#found")).to_contain_text("53 items for “PAGE-”, 1 to 50 shown")
+    page.get_by_role("link", name="Next").click()
+    expect(page.locator("tbody tr")).to_have_count(3)
+    page.get_by_role("link", name="Previous").click()
+    expect(page.locator("tbody tr")).to_have_count(50)
+
+
+# --- one item -----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def machine(api: Api) -> dict[str, str]:
+    """A machine with two modules of three screws each; one screw has no mass."""
+    names = ("machine", "module", "screw", "plate")
+    numbers = dict(zip(names, api.items(4), strict=True))
+    api.good("PUT", f"/api/items/{numbers['screw']}", {"properties": {"mass_kg": 0.5, "standard_cost": 2}})
+    api.merge(numbers["module"], {numbers["screw"]: 3})
+    api.merge(numbers["machine"], {numbers["module"]: 2, numbers["plate"]: 1})
+    return numbers
+
+
+def test_the_tree_opens_and_closes(machine: dict[str, str], visit: Visit) -> None:
+    """Several levels, each can be closed, all at once too, also from the keyboard."""
+    page = visit("viewer")
+    page.goto(f"/items/{machine['machine']}")
+    screw = page.locator(".tree").get_by_role("link", name=machine["screw"])
+    expect(screw).to_be_visible()
+    page.get_by_role("button", name="Close all").click()
+    expect(screw).to_be_hidden()
+    page.locator(".tree summary").first.focus()
+    page.keyboard.press("Enter")
+    expect(screw).to_be_visible()
+    expect(page.locator(".tree").first).to_contain_text("3 ×")
+    expect(page.locator(".tree .badge").first).to_have_text("assembly")
+
+
+def test_flat_view_totals_and_what_is_missing(machine: dict[str, str], visit: Visit) -> None:
+    """Quantities in all, mass and cost, and which item states none."""
+    page = visit("viewer")
+    page.goto(f"/items/{machine['machine']}")
+    page.get_by_role("link", name="Flat, with totals").click()
+    expect(row(page, machine["screw"])).to_contain_text("6")
+    expect(row(page, machine["screw"])).to_contain_text("3 kg")
+    totals = page.locator(".totals").first
+    expect(totals).to_contain_text("3 kg")
+    expect(totals).to_contain_text("12.00 EUR")
+    expect(totals).to_contain_text(f"without 1 item that states none: {machine['plate']}")
+
+
+def test_where_used(machine: dict[str, str], visit: Visit) -> None:
+    """Directly and further up."""
+    page = visit("viewer")
+    page.goto(f"/items/{machine['screw']}")
+    expect(row(page, machine["module"])).to_contain_text("directly")
+    expect(row(page, machine["machine"])).to_contain_text("2 levels up")
+
+
+def test_files_and_exports_are_downloads(
+    machine: dict[str, str], api: Api, visit: Visit, tmp_path: Path
+) -> None:
+    """A revision's file comes back as it was sent; the exports are files with names."""
+    number = machine["machine"]
+    body, headers = form_body({"file": ("plan.txt", b"as sent"), "comment": "first"})
+    assert api.call("POST", f"/api/items/{number}/file", body=body, headers=headers).status == 201
+    page = visit("viewer")
+    page.goto(f"/items/{number}")
+    with page.expect_download() as download:
+        page.get_by_role("link", name="plan.txt").click()
+    assert Path(download.value.path()).read_bytes() == b"as sent"
+    with page.expect_download() as download:
+        page.get_by_role("link", name="all levels as CSV").click()
+    assert download.value.suggested_filename.endswith("-bom-indented.csv")
+    assert machine["screw"] in Path(download.value.path()).read_text("utf-8")
+
+
+# --- history ------------------------------------------------------------------------------------------------
+
+
+def test_history_compare_and_restore(machine: dict[str, str], api: Api, visit: Visit) -> None:
+    """Two points side by side with words and colour; the old state comes back."""
+    number, plate, module = machine["machine"], machine["plate"], machine["module"]
+    api.good("PUT", bom(number, plate), {"quantity": 5})
+    api.good("DELETE", bom(number, module))
+    page = visit("editor")
+    page.goto(f"/items/{number}/bom")
+    page.get_by_role("link", name="Whole history").click()
+    expect(page.locator("tbody tr")).to_have_count(3)
+    page.locator('input[name="old"]').last.check()
+    page.get_by_role("button", name="Compare the two chosen").click()
+    expect(row(page, module)).to_contain_text("removed")
+    expect(row(page, module)).to_have_class("removed")
+    expect(row(page, plate)).to_contain_text("changed")
+    expect(row(page, plate)).to_contain_text("quantity 1 → 5")
+    page.get_by_label("Reason").fill("too early")
+    page.get_by_role("button", name="Make the BOM again as in the old state").click()
+    expect(page.locator(".notice")).to_contain_text("Restored: 2 lines")
+    assert api.quantities(number) == {module: 2, plate: 1}
+
+
+# --- import -------------------------------------------------------------------------------------------------
+
+
+def test_import_shows_before_it_writes(machine: dict[str, str], api: Api, visit: Visit) -> None:
+    """A mistake writes nothing and the row is named; a good file shows what it will do, then does it."""
+    number, plate, screw = machine["machine"], machine["plate"], machine["screw"]
+    page = visit("editor")
+    page.goto(f"/items/{number}/import")
+    before = api.lines(number)
+    check(page, f"Part number,Quantity\n{plate},4\nNO-SUCH,1\n")
+    expect(page.locator("#checked")).to_contain_text("1 row has a problem")
+    expect(row(page, "NO-SUCH")).to_contain_text("does not exist on this server")
+    expect(page.get_by_role("button", name="Import", exact=False)).to_have_count(0)
+    check(page, f"Part number;Quantity;Notes\n{plate};4;\n{screw};2,5;spare\n")
+    expect(page.locator("#checked")).to_contain_text("1 to add, 1 to change")
+    expect(row(page, plate)).to_contain_text("quantity 1 → 4")
+    assert api.lines(number) == before
+    page.get_by_role("button", name="Import 2 rows").click()
+    expect(page.locator(".notice")).to_contain_text("1 added, 1 changed")
+    assert api.quantities(number) == {machine["module"]: 2, plate: 4, screw: 2.5}
+
+
+def test_import_of_an_old_check_is_checked_again(machine: dict[str, str], api: Api, visit: Visit) -> None:
+    """The BOM changed between check and click: nothing is written, and the check is repeated."""
+    number, plate = machine["machine"], machine["plate"]
+    page = visit("editor")
+    page.goto(f"/items/{number}/import")
+    check(page, f"Part number,Quantity\n{plate},4\n")
+    api.good("PUT", bom(number, plate), {"quantity": 4})
+    page.get_by_role("button", name="Import 1 row").click()
+    expect(page.get_by_role("alert")).to_contain_text("changed by somebody else")
+    expect(page.locator("#checked")).to_contain_text("nothing to do")
+
+
+def check(page: Page, text: str) -> None:
+    """Choose a file with this text and have it checked."""
+    file = {"name": "bom.csv", "mimeType": "text/csv", "buffer": text.encode()}
+    page.get_by_label("CSV file").set_input_files([file])  # type: ignore[list-item]
+    page.get_by_role("button", name="Check the file").click()
+    page.locator("#checked").wait_for()
+
+
+# --- activity -----------------------------------------------------------------------------------------------
+
+
+def test_activity_is_live(api: Api, visit: Visit) -> None:
+    """What happens appears by itself, newest first, in words, and leads to the page it is about."""
+    parent, child = api.items(2)
+    page = visit("viewer")
+    page.goto("/activity")
+    expect(page.locator("#state")).to_contain_text("Live")
+    api.merge(parent, {child: 4})
+    first = page.locator("#entries > li").first
+    expect(first).to_contain_text(parent)
+    expect(first).to_contain_text("BOM merged from CAD")
+    expect(first).to_contain_text("+1 added")
+    api.merge(parent, {})
+    expect(first).to_contain_text("⚠1 unreferenced")
+    expect(first.locator("time")).to_have_count(1)
+    first.get_by_role("link", name=parent).click()
+    expect(page.locator(".banner.warn h2")).to_contain_text("1 item in the Silo BOM is not referenced")
+
+
+def test_activity_comes_back_after_it_was_turned_away(api: Api, visit: Visit) -> None:
+    """The stream is refused (a restart behind a proxy): the page says so, tries again, and misses nothing."""
+    page = visit("viewer")
+    turned_away: list[str] = []
+
+    def turn_away_once(route: Route) -> None:
+        if turned_away:
+            route.continue_()
+            return
+        turned_away.append(route.request.url)
+        route.fulfill(status=503, body="")
+
+    page.route("**/api/events*", turn_away_once)
+    page.goto("/activity")
+    expect(page.locator("#state")).to_contain_text("trying again")
+    item = api.item(name="made while nobody listened")
+    expect(page.locator("#state")).to_contain_text("Live")
+    expect(page.locator("#entries > li").first).to_contain_text(item)
+
+
+# --- account, users, audit ----------------------------------------------------------------------------------
+
+
+def test_a_token_is_shown_once_works_and_is_revoked(api: Api, visit: Visit) -> None:
+    """Make one, use it, see that it is not shown again, revoke it."""
+    page = visit("viewer")
+    page.goto("/account")
+    page.get_by_label("Name of a new token").fill("laptop")
+    page.get_by_role("button", name="Make token").click()
+    secret = page.get_by_label("The token").input_value()
+    assert api.as_(secret).get("/api/auth/me")["username"] == "viewer"
+    page.goto("/account")
+    assert secret not in page.content()
+    page.get_by_role("button", name="Revoke laptop").click()
+    expect(page.locator(".notice")).to_contain_text("revoked")
+    assert api.as_(secret).call("GET", "/api/auth/me").status == 401
+
+
+def test_users_roles_and_login_links(api: Api, visit: Visit) -> None:
+    """A new user comes in by a link, becomes an editor, sets a password, and is locked out."""
+    page = visit("admin")
+    page.goto("/users")
+    page.get_by_label("User name").fill("newcomer")
+    page.get_by_label("Full name").fill("New <b>Comer</b>")
+    page.get_by_role("button", name="Make user").click()
+    expect(row(page, "newcomer")).to_contain_text("New <b>Comer</b>")
+    page.get_by_role("button", name="Login link for newcomer").click()
+    link = page.get_by_label("The login link").input_value()
+    other = visit(None)
+    other.goto(link)
+    expect(other.locator(".who")).to_contain_text("viewer")
+    page.get_by_label("Role of newcomer").select_option("editor")
+    page.get_by_role("button", name="Save newcomer").click()
+    expect(page.locator(".notice")).to_contain_text("newcomer is changed")
+    other.goto("/account")
+    expect(other.locator(".who")).to_contain_text("editor")
+    other.get_by_label("New password").fill("correct horse battery")
+    other.get_by_label("Once more").fill("correct horse battery")
+    other.get_by_role("button", name="Set password").click()
+    other.get_by_label("User name").fill("newcomer")
+    other.get_by_label("Password").fill("correct horse battery")
+    other.get_by_role("button", name="Log in").click()
+    expect(other.locator(".who")).to_contain_text("New <b>Comer</b>")
+    page.get_by_label("Access of newcomer").select_option("no")
+    page.get_by_role("button", name="Save newcomer").click()
+    expect(page.locator(".notice")).to_contain_text("newcomer is changed")
+    other.goto("/items")
+    expect(other.get_by_role("heading", level=1)).to_have_text("Log in")
+    page.get_by_role("link", name="Audit").click()
+    expect(page.locator("tbody")).to_contain_text("user.created")
+    expect(page.locator("tbody")).to_contain_text("login.link")
+
+
+def test_the_last_admin_stays(visit: Visit) -> None:
+    """Nobody locks everybody out; the page says why."""
+    page = visit("admin")
+    page.goto("/users")
+    page.get_by_label("Role of admin").select_option("viewer")
+    page.get_by_role("button", name="Save admin").click()
+    expect(page.get_by_role("alert")).to_contain_text("last admin")
+
+
+def test_read_only_and_back(machine: dict[str, str], visit: Visit) -> None:
+    """The server takes no changes: a decision is answered in plain words; then it takes them again."""
+    admin, editor = visit("admin"), visit("editor")
+    admin.goto("/users")
+    admin.get_by_role("button", name="Take none for now").click()
+    expect(admin.locator("#mode + form")).to_contain_text("takes no changes at the moment")
+    editor.goto(f"/items/{machine['machine']}/bom?edit={machine['plate']}")
+    editor.get_by_role("button", name="Remove from BOM").click()
+    expect(editor.get_by_role("alert")).to_contain_text("read-only at the moment")
+    admin.get_by_role("button", name="Take changes again").click()
+    expect(admin.locator(".notice")).to_contain_text("takes changes")
+
+
+# --- getting in and out -------------------------------------------------------------------------------------
+
+
+def test_login_leads_where_one_wanted_to_go(machine: dict[str, str], visit: Visit) -> None:
+    """Not logged in: the login page, and from there on to the page that was asked for; then out again."""
+    path = f"/items/{machine['machine']}?view=flat"
+    page = visit(None)
+    page.goto(path)
+    expect(page.get_by_role("heading", level=1)).to_have_text("Log in")
+    page.get_by_label("User name").fill("admin")
+    page.get_by_label("Password").fill("not the password")
+    page.get_by_role("button", name="Log in").click()
+    expect(page.get_by_role("alert")).to_contain_text("user name or password is wrong")
+    assert page.locator('input[name="next"]').input_value() == path
+    inside = visit("viewer")
+    inside.goto(path)
+    inside.get_by_role("button", name="Log out").click()
+    expect(inside.get_by_role("heading", level=1)).to_have_text("Log in")
+    inside.goto(path)
+    expect(inside.get_by_role("heading", level=1)).to_have_text("Log in")
+
+
+def test_the_keyboard_is_enough(visit: Visit) -> None:
+    """The first Tab offers to skip to the content, and every stop on the way shows where one is."""
+    page = visit("viewer")
+    page.goto("/items")
+    page.keyboard.press("Tab")
+    skip = page.get_by_role("link", name="Skip to content")
+    expect(skip).to_be_focused()
+    expect(skip).to_be_in_viewport()
+    page.keyboard.press("Enter")
+    page.keyboard.press("Tab")
+    expect(page.get_by_label("Search")).to_be_focused()
+    assert page.get_by_label("Search").evaluate("e => getComputedStyle(e).outlineStyle") == "solid"
+
+
+HOSTILE = "<img src=x onerror=alert(1)>\"'&lt;{{7*7}}\u202e</td></script>"
+
+
+def test_names_are_shown_as_text(api: Api, visit: Visit) -> None:
+    """A hostile name, note, comment or reason is text on every page, also on those that scripts fill."""
+    parent, child = api.item(name=HOSTILE), api.item(name=HOSTILE, long_description=HOSTILE)
+    page = visit("admin")
+    page.on("dialog", lambda dialog: pytest.fail("a script of the name's ran"))
+    page.goto("/activity")
+    expect(page.locator("#state")).to_contain_text("Live")
+    api.merge(parent, {child: 1}, document={"file": HOSTILE})
+    api.good("PUT", bom(parent, child), {"notes": HOSTILE, "unit": "<b>m</b>"})
+    api.good("PUT", f"/api/items/{child}", {"properties": {"<b>": HOSTILE}, "comment": HOSTILE})
+    expect(page.locator("#entries")).to_contain_text(HOSTILE)
+    for path in ("", "/bom", f"/bom?edit={child}", "/history", "/compare?old=0&all=1", "/import"):
+        page.goto(f"/items/{parent}{path}")
+        expect(page.locator("main")).to_contain_text(HOSTILE)
+        assert page.locator("img[src=x]").count() == 0
+    page.goto(f"/items/{child}")
+    expect(page.locator("main")).to_contain_text(HOSTILE)
+    page.goto("/items")
+    page.get_by_label("Search").fill("onerror")
+    expect(page.locator("#found")).to_contain_text("2 items")
+    expect(page.locator("#results")).to_contain_text(HOSTILE)
+    assert page.locator("img[src=x]").count() == 0
+
+
+def test_errors_are_pages(machine: dict[str, str], visit: Visit) -> None:
+    """What is not there, and what one may not do, is a page in words that leads on."""
+    page = visit("viewer")
+    for path, words in (
+        ("/items/NO-SUCH", "does not exist on this server"),
+        ("/nowhere", "There is no page /nowhere"),
+        ("/users", "viewer, this needs admin"),
+        (f"/items/{machine['machine']}/import", "this needs editor"),
+        (f"/items/{machine['machine']}/compare?old=x", "old"),
+    ):
+        page.goto(path)
+        expect(page.get_by_role("alert")).to_contain_text(words)
+        expect(page.get_by_role("link", name="Go to the items")).to_be_visible()
