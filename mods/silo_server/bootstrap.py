@@ -4,21 +4,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import timedelta
 
-from sqlalchemy import delete, func, select
+from sqlalchemy import func, select
 
 from silo.bom.errors import ConfigError
-from silo_server.clock import stamp
 from silo_server.db.engine import Database, Tx
 from silo_server.db.migrate import upgrade
-from silo_server.db.tables import api_tokens, bom_syncs, users
-from silo_server.services import accounts, credentials, events, logins
+from silo_server.db.tables import users
+from silo_server.services import accounts, credentials, logins
+from silo_server.services.housekeeping import START_TOKEN, clear_away
 from silo_server.values import Role
 
-START_TOKEN = "given out at start"
 START_TOKEN_DAYS = 30.0
-SYNC_DAYS = 90.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +43,7 @@ def prepare(db: Database, token: str | None = None) -> Welcome:
         admin = _first_admin(tx)
         secret = _give_token(tx, admin, token)
         link = logins.create_login_link(tx, admin.username)
-        _clear_away(tx)
+        clear_away(tx)
     return Welcome(admin.username, secret, link, first)
 
 
@@ -65,11 +62,3 @@ def _give_token(tx: Tx, admin: accounts.User, token: str | None) -> str:
     if not credentials.has_secret(tx, token):
         credentials.create_token(tx, admin.id, "SILO_API_TOKEN", secret=token)
     return token
-
-
-def _clear_away(tx: Tx) -> None:
-    tx.conn.execute(
-        delete(api_tokens).where(api_tokens.c.name == START_TOKEN, api_tokens.c.expires_at <= tx.stamp)
-    )
-    tx.conn.execute(delete(bom_syncs).where(bom_syncs.c.at <= stamp(tx.at - timedelta(days=SYNC_DAYS))))
-    events.trim(tx, tx.settings.event_log_size)

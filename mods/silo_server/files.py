@@ -68,9 +68,20 @@ class FileStore:
             target = self._place(digest.hexdigest())
             target.parent.mkdir(parents=True, exist_ok=True)
             os.replace(temporary, target)
+            _flush_folder(target.parent)
         finally:
             temporary.unlink(missing_ok=True)
         return digest.hexdigest(), size
+
+
+def _flush_folder(folder: Path) -> None:
+    # The name of a file is durable only with its folder; Windows neither needs nor allows this.
+    if os.name == "posix":
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
 
 
 def clean_name(name: str) -> str:

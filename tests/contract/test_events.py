@@ -137,7 +137,7 @@ def test_who_was_away_for_too_long_is_told_to_read_again(quick: RunningServer) -
             api.item()
             old = events.next("item.created").id
         api.items(20)
-        quick.app.state.server.hub._trim()
+        quick.app.state.server.hub._clear_away()
         with api.events("", old) as events:
             reset = events.next("reset", "item.created")
             assert (reset.name, reset.data) == ("reset", {})

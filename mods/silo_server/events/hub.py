@@ -25,14 +25,15 @@ from sqlalchemy.exc import SQLAlchemyError
 from silo_server.db.engine import Database
 from silo_server.services import events as log
 from silo_server.services.events import LoggedEvent
+from silo_server.services.housekeeping import clear_away
 
 logger = logging.getLogger("silo_server.events")
 
 RING_EVENTS = 2048
 RING_BYTES = 16 * 1024 * 1024
 PAGE = 500
-# Trimming once in so many polls keeps the log near its size without looking at it all the time.
-TRIM_EVERY_POLLS = 600
+# Ten minutes, as the poll is usually set.
+CLEAR_AWAY_EVERY_POLLS = 600
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,9 +150,9 @@ class Hub:
             self._poke.clear()
             try:
                 await self._read_news()
-                if polls >= TRIM_EVERY_POLLS:
+                if polls >= CLEAR_AWAY_EVERY_POLLS:
                     polls = 0
-                    await asyncio.to_thread(self._trim)
+                    await asyncio.to_thread(self._clear_away)
             except SQLAlchemyError as error:
                 # The database is away; the poll finds out when it is back, and nothing is lost meanwhile.
                 logger.warning("the event log cannot be read at the moment: %s", type(error).__name__)
@@ -200,9 +201,9 @@ class Hub:
             frames = [to_frame(event) for event in log.read_after(tx, cursor, PAGE)]
         return Batch(frames, frames[-1].id if frames else head)
 
-    def _trim(self) -> None:
+    def _clear_away(self) -> None:
         with self._db.write(even_when_read_only=True) as tx:
-            log.trim(tx, tx.settings.event_log_size)
+            clear_away(tx)
 
 
 class _PostgresListener:

@@ -22,6 +22,7 @@ from silo_server.routes.models import (
 from silo_server.routes.render import item_to_wire
 from silo_server.schema.catalog import describe, describe_form, find_schema, schemas
 from silo_server.services import items as service
+from silo_server.services.numbering import preview_number
 
 router = APIRouter(prefix="/api", tags=["items"])
 
@@ -147,7 +148,7 @@ def unarchive_item(server: ServerDep, caller: Editor, part_number: str) -> Respo
 def generate_part_number(server: ServerDep, caller: Editor, body: NumberBody) -> Response:
     """The number the next item of the category would get; a preview that consumes nothing."""
     with server.db.read(caller) as tx:
-        number = service.preview_number(tx, body.schema_name, body.category)
+        number = preview_number(tx, body.schema_name, body.category)
     return json_answer({"part_number": number})
 
 

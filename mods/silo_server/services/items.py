@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import re
 import uuid as uuids
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -16,16 +15,12 @@ from sqlalchemy.exc import IntegrityError
 from silo.bom.errors import NotFoundError, RejectedError
 from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
-from silo_server.db.tables import items, number_counters
+from silo_server.db.tables import items
 from silo_server.errors import DuplicateError
-from silo_server.schema.catalog import ITEM_TYPES, Category, Schema, find_schema
+from silo_server.schema.catalog import ITEM_TYPES, Category, find_schema
 from silo_server.services import events, revisions
+from silo_server.services.numbering import check_number, take_number
 from silo_server.values import Item
-
-# Words that stand where a part number stands in a path.
-RESERVED = frozenset({"by-uuid", "search", "export.csv", "import", "new"})
-NUMBER_FORM = re.compile(r"[^\s/\\?#%\x00-\x1f\x7f](?:[^/\\?#%\x00-\x1f\x7f]{0,62}[^\s/\\?#%\x00-\x1f\x7f])?")
-MAX_TEXT = 10_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,18 +135,6 @@ def list_items(tx: Tx, query: ItemQuery) -> tuple[list[Item], int]:
     return [to_item(row) for row in rows], total
 
 
-def preview_number(tx: Tx, schema_name: str | None, category: str) -> str:
-    """The number the next item of the category would get; consumes nothing."""
-    schema = find_schema(schema_name)
-    found = schema.category(category)
-    last = tx.conn.scalar(
-        select(number_counters.c.last_serial).where(
-            number_counters.c.schema_name == schema.name, number_counters.c.category == found.code
-        )
-    )
-    return _next_free(tx, schema, found, last or 0)[0]
-
-
 def create_item(tx: Tx, new: NewItem) -> tuple[Item, bool]:
     """Make an item. Returns it, and False where its UUID was known already (the repeat of a request).
 
@@ -163,7 +146,7 @@ def create_item(tx: Tx, new: NewItem) -> tuple[Item, bool]:
             return to_item(known), False
     schema = find_schema(new.schema)
     category = schema.category(new.category) if new.category else None
-    number = check_number(new.part_number) if new.part_number else _take_number(tx, schema, category)
+    number = check_number(new.part_number) if new.part_number else take_number(tx, schema, category)
     name, description = new.name.strip(), new.description.strip()
     values = {
         "uuid": normal_uuid(new.uuid) if new.uuid else str(uuids.uuid4()),
@@ -249,17 +232,6 @@ def unarchive_item(tx: Tx, part_number: str) -> Item:
     return get_item(tx, part_number)
 
 
-def check_number(number: str) -> str:
-    """A part number as given, trimmed; RejectedError where it cannot stand in a path or a cell."""
-    trimmed = number.strip()
-    if not NUMBER_FORM.fullmatch(trimmed) or trimmed.casefold() in RESERVED or trimmed in (".", ".."):
-        raise RejectedError(
-            "part_number: wanted 1 to 64 characters without / \\ ? # % and control characters, "
-            f"got {number!r}"
-        )
-    return trimmed
-
-
 def normal_uuid(uuid: str) -> str:
     """The UUID in its one written form; RejectedError where it is none."""
     normal = uuid_or_none(uuid)
@@ -316,40 +288,3 @@ def _changed_values(item: Item, change: ItemChange) -> dict[str, Any]:
 
 def _search_key(number: str, name: str, description: str) -> str:
     return "\n".join((number, name, description)).casefold()
-
-
-def _take_number(tx: Tx, schema: Schema, category: Category | None) -> str:
-    if category is None:
-        raise RejectedError("category: wanted one (such as F01) or an explicit part_number, got neither")
-    where = (number_counters.c.schema_name == schema.name, number_counters.c.category == category.code)
-    _ensure_counter(tx, schema.name, category.code)
-    last = tx.conn.scalar(select(number_counters.c.last_serial).where(*where).with_for_update()) or 0
-    number, serial = _next_free(tx, schema, category, last)
-    tx.conn.execute(update(number_counters).where(*where).values(last_serial=serial))
-    return number
-
-
-def _ensure_counter(tx: Tx, schema: str, category: str) -> None:
-    from sqlalchemy.dialects import postgresql, sqlite
-
-    make = postgresql.insert if tx.postgres else sqlite.insert
-    tx.conn.execute(
-        make(number_counters)
-        .values(schema_name=schema, category=category, last_serial=0)
-        .on_conflict_do_nothing()
-    )
-
-
-def _next_free(tx: Tx, schema: Schema, category: Category, last: int) -> tuple[str, int]:
-    # Explicit numbers may stand in the way; they are few, so that a page of candidates is looked at a time.
-    serial = last
-    while True:
-        page = {schema.number(category.code, n): n for n in range(serial + 1, serial + 65)}
-        keys = {number.casefold(): number for number in page}
-        taken = set(
-            tx.conn.scalars(select(items.c.part_number_key).where(one_of(tx, items.c.part_number_key, keys)))
-        )
-        for key, number in keys.items():
-            if key not in taken:
-                return number, page[number]
-        serial += 64

@@ -12,14 +12,12 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
-from urllib.parse import quote
 
 from sqlalchemy import delete, insert, select
 
 from silo.bom.errors import ConflictError, RejectedError
 from silo.bom.merge import MergePlan, plan_merge, summary
 from silo.bom.model import QuantityChange
-from silo_server.clock import wire
 from silo_server.db.bulk import insert_rows, one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import bom_conflicts, bom_syncs, items
@@ -35,12 +33,9 @@ from silo_server.services.changes import (
 )
 from silo_server.services.items import get_item
 from silo_server.services.lines import lines_of
+from silo_server.services.merge_answer import answer_of, event_of
 from silo_server.services.merge_request import MergeOrder
-from silo_server.values import Item, Line, LineState, dumps, number
-
-UNREFERENCED = "Present in server BOM but not in assembly"
-# An event goes to every listener: beyond this many unchanged lines it only says how many there are.
-EVENT_UNCHANGED_LINES = 500
+from silo_server.values import Item, Line, LineState, dumps
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +62,7 @@ def preview_merge(tx: Tx, part_number: str, order: MergeOrder, expected: int | N
     parent = get_item(tx, part_number)
     check_version(parent, expected)
     prepared = _prepare(tx, parent, order)
-    return MergeOutcome(dumps(_answer(prepared, order)), parent.bom_version)
+    return MergeOutcome(dumps(answer_of(parent, prepared.plan.diff, order.sync_id)), parent.bom_version)
 
 
 def merge_bom(tx: Tx, part_number: str, order: MergeOrder, expected: int | None) -> MergeOutcome:
@@ -84,17 +79,12 @@ def merge_bom(tx: Tx, part_number: str, order: MergeOrder, expected: int | None)
     prepared = _prepare(tx, parent, order)
     _, version = apply_changes(tx, parent, _line_changes(tx, prepared), _note(prepared, order))
     _remember_conflicts(tx, prepared)
-    answer = _answer(prepared, order)
+    answer = answer_of(parent, prepared.plan.diff, order.sync_id)
     text = dumps(answer)
     if order.sync_id:
         _remember_sync(tx, parent, order, text, version)
-    events.bom_merged(tx, parent, _event(tx, prepared, answer))
+    events.bom_merged(tx, parent, event_of(tx, parent, prepared.plan.diff, answer))
     return MergeOutcome(text, version)
-
-
-def resolve_url(part_number: str) -> str:
-    """Where a person decides on what a merge left open."""
-    return f"/items/{quote(part_number, safe='')}/bom"
 
 
 def _prepare(tx: Tx, parent: Item, order: MergeOrder) -> _Prepared:
@@ -204,71 +194,6 @@ def _note(prepared: _Prepared, order: MergeOrder) -> ChangeNote:
         document_revision=order.document_revision,
         sync_id=order.sync_id,
     )
-
-
-def _answer(prepared: _Prepared, order: MergeOrder) -> dict[str, Any]:
-    diff = prepared.plan.diff
-    answer: dict[str, Any] = {
-        "status": "merged",
-        "diff": {
-            "added": [_pair(c.part_number, c.quantity) for c in diff.added],
-            "removed": [_pair(c.part_number, c.quantity) for c in diff.removed],
-            "quantity_changed": [
-                {
-                    "part_number": c.part_number,
-                    "old_quantity": number(c.remote_quantity),
-                    "new_quantity": number(c.local_quantity),
-                }
-                for c in diff.quantity_changed
-            ],
-            "unchanged": [_pair(c.part_number, c.quantity) for c in diff.unchanged],
-        },
-        "warnings": [
-            {"type": "unreferenced", "part_number": c.part_number, "message": UNREFERENCED}
-            for c in diff.removed
-        ]
-        + [_conflict_warning(c) for c in diff.conflicts],
-        "resolve_url": resolve_url(prepared.parent.part_number),
-    }
-    if order.sync_id:
-        answer["sync_id"] = order.sync_id
-    return answer
-
-
-def _pair(part_number: str, quantity: float | None) -> dict[str, Any]:
-    return {"part_number": part_number, "quantity": number(quantity)}
-
-
-def _conflict_warning(conflict: QuantityChange) -> dict[str, Any]:
-    cad, ours = number(conflict.local_quantity), number(conflict.remote_quantity)
-    return {
-        "type": "conflict",
-        "part_number": conflict.part_number,
-        "message": f"The assembly has {cad}, Silo has {ours} (set by a person); a person decides",
-        "assembly_quantity": cad,
-        "server_quantity": ours,
-    }
-
-
-def _event(tx: Tx, prepared: _Prepared, answer: Mapping[str, Any]) -> dict[str, Any]:
-    diff = dict(answer["diff"])
-    if len(diff["unchanged"]) > EVENT_UNCHANGED_LINES:
-        diff["unchanged_count"] = len(diff["unchanged"])
-        diff["unchanged"] = []
-    event: dict[str, Any] = {
-        "type": "bom_merge",
-        "item": prepared.parent.part_number,
-        "user": tx.actor.username,
-        "timestamp": wire(tx.stamp),
-        "summary": summary(prepared.plan.diff),
-        "diff": diff,
-        "resolve_url": answer["resolve_url"],
-    }
-    if "sync_id" in answer:
-        event["sync_id"] = answer["sync_id"]
-    if prepared.plan.diff.conflicts:
-        event["warnings"] = answer["warnings"]
-    return event
 
 
 def _remember_conflicts(tx: Tx, prepared: _Prepared) -> None:

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Part numbers: what one may look like, and how the next of a category is found."""
+
+from __future__ import annotations
+
+import re
+
+from sqlalchemy import select, update
+from sqlalchemy.dialects import postgresql, sqlite
+
+from silo.bom.errors import RejectedError
+from silo_server.db.bulk import one_of
+from silo_server.db.engine import Tx
+from silo_server.db.tables import items, number_counters
+from silo_server.schema.catalog import Category, Schema, find_schema
+
+# Words that stand where a part number stands in a path.
+RESERVED = frozenset({"by-uuid", "search", "export.csv", "import", "new"})
+NUMBER_FORM = re.compile(r"[^\s/\\?#%\x00-\x1f\x7f](?:[^/\\?#%\x00-\x1f\x7f]{0,62}[^\s/\\?#%\x00-\x1f\x7f])?")
+
+
+def check_number(number: str) -> str:
+    """A part number as given, trimmed; RejectedError where it cannot stand in a path or a cell."""
+    trimmed = number.strip()
+    if not NUMBER_FORM.fullmatch(trimmed) or trimmed.casefold() in RESERVED or trimmed in (".", ".."):
+        raise RejectedError(
+            "part_number: wanted 1 to 64 characters without / \\ ? # % and control characters, "
+            f"got {number!r}"
+        )
+    return trimmed
+
+
+def preview_number(tx: Tx, schema_name: str | None, category: str) -> str:
+    """The number the next item of the category would get; consumes nothing."""
+    schema = find_schema(schema_name)
+    found = schema.category(category)
+    last = tx.conn.scalar(
+        select(number_counters.c.last_serial).where(
+            number_counters.c.schema_name == schema.name, number_counters.c.category == found.code
+        )
+    )
+    return _next_free(tx, schema, found, last or 0)[0]
+
+
+def take_number(tx: Tx, schema: Schema, category: Category | None) -> str:
+    """The next free number of the category, taken; RejectedError without a category."""
+    if category is None:
+        raise RejectedError("category: wanted one (such as F01) or an explicit part_number, got neither")
+    where = (number_counters.c.schema_name == schema.name, number_counters.c.category == category.code)
+    _ensure_counter(tx, schema.name, category.code)
+    last = tx.conn.scalar(select(number_counters.c.last_serial).where(*where).with_for_update()) or 0
+    number, serial = _next_free(tx, schema, category, last)
+    tx.conn.execute(update(number_counters).where(*where).values(last_serial=serial))
+    return number
+
+
+def _ensure_counter(tx: Tx, schema: str, category: str) -> None:
+    make = postgresql.insert if tx.postgres else sqlite.insert
+    tx.conn.execute(
+        make(number_counters)
+        .values(schema_name=schema, category=category, last_serial=0)
+        .on_conflict_do_nothing()
+    )
+
+
+def _next_free(tx: Tx, schema: Schema, category: Category, last: int) -> tuple[str, int]:
+    # Explicit numbers may stand in the way; they are few, so that a page of candidates is looked at a time.
+    serial = last
+    while True:
+        page = {schema.number(category.code, n): n for n in range(serial + 1, serial + 65)}
+        keys = {number.casefold(): number for number in page}
+        taken = set(
+            tx.conn.scalars(select(items.c.part_number_key).where(one_of(tx, items.c.part_number_key, keys)))
+        )
+        for key, number in keys.items():
+            if key not in taken:
+                return number, page[number]
+        serial += 64
