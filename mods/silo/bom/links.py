@@ -68,9 +68,10 @@ def extract(
         top = target.obj
         entries = walker.tree(top, level)
     head = replace(walker.entry_for(top), level=level - 1, is_assembly=True)
-    if not entries and not walker.notes.any_blocking():
+    if entries or walker.notes.any_blocking():
+        walker.notes.container(top)
+    else:
         walker.notes.empty(head)
-    walker.notes.container(top)
     walker.notes.beside(links_beside(top, inspect))
     findings = (*walker.notes.findings(), *identity_findings([replace(head, children=entries)]))
     return Extraction(assembly=head, entries=entries, findings=findings)

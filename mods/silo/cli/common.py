@@ -75,6 +75,16 @@ def read_assembly(top: str, assembly: str | None = None) -> Extraction:
 
 
 def print_json(data: Any) -> None:
-    """JSON on standard output."""
-    json.dump(data, sys.stdout, indent=2, ensure_ascii=False)
-    sys.stdout.write("\n")
+    """JSON on standard output; escaped where that is not UTF-8, or a file's name is not."""
+    print(json_text(data, indent=2))
+
+
+def json_text(data: Any, indent: int | None = None) -> str:
+    """JSON that standard output can take as it is."""
+    text = json.dumps(data, indent=indent, ensure_ascii=False)
+    unicode = (getattr(sys.stdout, "encoding", None) or "utf-8").lower().replace("-", "") == "utf8"
+    try:
+        text.encode("utf-8" if unicode else "ascii")
+    except UnicodeEncodeError:
+        return json.dumps(data, indent=indent)
+    return text

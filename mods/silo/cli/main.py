@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import io
+import os
 import sys
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
@@ -59,23 +61,52 @@ def _version() -> str:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; returns its exit code."""
+    _open_streams()
     args = build_parser().parse_args(argv)
     try:
         code: int = args.run(args)
+        sys.stdout.flush()
         return code
     except KeyboardInterrupt:
         print("\nCancelled.", file=sys.stderr)
         return CANCELLED
     except BrokenPipeError:
         # The reader (head, less) has seen enough; that is no error. Nothing may be flushed any more.
-        sys.stdout = None
+        _forget_output()
         return OK
+    except OSError as error:
+        return _system_said_no(error)
     except CancelledError:
         print("Cancelled.", file=sys.stderr)
         return CANCELLED
     except SiloError as error:
         _tell(error)
         return REMOTE if isinstance(error, RemoteError | ConflictError) else BAD_INPUT
+
+
+def _open_streams() -> None:
+    """Standard streams that take any text; a job may have been started without them."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
+    for stream in (sys.stdout, sys.stderr):
+        # What a terminal or a log cannot show (a C locale knows no ×) is shown as "?", never a failure.
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
+
+
+def _forget_output() -> None:
+    """Python writes what is left at its end, which fails as what came before did."""
+    sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+
+
+def _system_said_no(error: OSError) -> int:
+    """A file that we were told to write, or the output itself: no such folder, no right, a full disk."""
+    what = error.filename or "the output cannot be written"
+    print(f"silo-mod: {what}: {error.strerror or error}", file=sys.stderr)
+    if error.filename is None:
+        _forget_output()
+    return BAD_INPUT
 
 
 def _tell(error: SiloError) -> None:

@@ -28,9 +28,15 @@ _MARK = {
 _MOST_LINES = 2000
 
 
+class _Terminal(Console):
+    def on_broken_pipe(self) -> None:
+        """The reader has seen enough; rich would end with exit code 1, the command line says what that is."""
+        raise BrokenPipeError
+
+
 def console(*, stderr: bool = False) -> Console:
     """The terminal; plain text where the output is a file or a pipe."""
-    return Console(stderr=stderr, highlight=False, soft_wrap=not sys.stdout.isatty())
+    return _Terminal(stderr=stderr, highlight=False, soft_wrap=not sys.stdout.isatty())
 
 
 def plain(text: str) -> str:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import queue
 import sys
 from typing import TYPE_CHECKING
@@ -67,10 +66,7 @@ def _print(
             continue
         shown += 1
         if args.json:
-            print(
-                json.dumps({"id": event.id, "type": event.type, "data": event.data}, ensure_ascii=False),
-                flush=True,
-            )
+            print(common.json_text({"id": event.id, "type": event.type, "data": event.data}), flush=True)
         else:
             _show(client, event)
     return 0

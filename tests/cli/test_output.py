@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Where the output goes: pipes that close, full disks, terminals without UTF-8, jobs without streams."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+SILO_MOD = shlex.join([sys.executable, "-m", "silo.cli.main"])
+ASCII = {"PYTHONIOENCODING": "ascii"}
+
+
+def shell(line: str, **env: str) -> subprocess.CompletedProcess[bytes]:
+    """Run a line of shell; ``silo-mod`` in it is ours. ``pipefail`` shows the exit code of the first."""
+    known = {name: value for name, value in os.environ.items() if name not in ("PYTHONUNBUFFERED", *ASCII)}
+    return subprocess.run(
+        ["bash", "-c", f'set -o pipefail; silo-mod() {{ {SILO_MOD} "$@"; }}; {line}'],
+        capture_output=True,
+        env={**known, **env},
+        timeout=120,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize("option", ["", "--json", "--flat"])
+def test_a_reader_that_has_seen_enough_is_no_failure(gearbox: Path, option: str) -> None:
+    """``silo-mod bom … | head -1``."""
+    ran = shell(f"silo-mod bom '{gearbox}' {option} | head -1")
+    assert (ran.returncode, ran.stderr) == (0, b"")
+    assert len(ran.stdout.splitlines()) == 1
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+@pytest.mark.parametrize("option", ["", "--json"])
+def test_a_full_disk_is_one_sentence(gearbox: Path, option: str) -> None:
+    """And not exit code 0: the answer did not arrive."""
+    ran = shell(f"silo-mod bom '{gearbox}' {option} > /dev/full")
+    assert ran.returncode == 2
+    assert len(ran.stderr.splitlines()) == 1
+
+
+def test_a_job_may_have_no_streams(gearbox: Path) -> None:
+    """Nothing to print to, nobody to ask."""
+    assert shell(f"silo-mod bom '{gearbox}' >&-").returncode == 0
+    assert shell(f"silo-mod bom '{gearbox}' --json >&- 2>&-").returncode == 0
+    ran = shell(f"silo-mod register '{gearbox}' <&-")
+    assert ran.returncode == 2
+    assert b"--yes" in ran.stderr
+
+
+def test_a_terminal_without_utf_8(gearbox: Path, tmp_path: Path) -> None:
+    """Text is shown as well as can be; JSON says the same everywhere."""
+    folder = gearbox.parent.rename(tmp_path / "Getriebe ü &")
+    ran = shell(f"silo-mod bom '{folder}/TopAssembly.FCStd'", **ASCII)
+    assert ran.returncode == 0, ran.stderr
+    assert b"1 ? Base Plate" in ran.stdout
+    top = folder / "Größe.FCStd"
+    (folder / "TopAssembly.FCStd").rename(top)
+    plain = shell(f"silo-mod bom '{top}' --json")
+    escaped = shell(f"silo-mod bom '{top}' --json", **ASCII)
+    assert json.loads(plain.stdout) == json.loads(escaped.stdout)
+    assert json.loads(plain.stdout)["assembly"]["doc_path"] == "Größe.FCStd"
+    assert "Größe".encode() in plain.stdout
+    assert escaped.stdout.isascii()
+
+
+def test_a_file_name_that_is_no_text(gearbox: Path) -> None:
+    """Names are bytes on Linux; JSON gives them as Python does, escaped."""
+    strange = os.fsencode(gearbox.parent) + b"/caf\xe9.FCStd"
+    try:
+        os.rename(gearbox, strange)
+    except OSError:
+        pytest.skip("this file system wants names to be text")
+    for option in ("--json", ""):
+        words = [sys.executable, "-m", "silo.cli.main", "bom", strange, *([option] if option else [])]
+        ran = subprocess.run(words, capture_output=True, timeout=120, check=False)
+        assert ran.returncode == 0, ran.stderr
+
+
+def test_a_report_that_cannot_be_written_is_one_sentence(run: Any, silo: Any, gearbox: Path) -> None:
+    """It names the file."""
+    ran = run("sync", gearbox, "--report", gearbox.parent / "no" / "report.md")
+    assert ran.code == 2
+    assert "report.md" in ran.err
+    assert "Traceback" not in ran.err
+
+
+def test_paths_are_those_of_the_caller(
+    run: Any, gearbox: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Relative, from another folder, through a symlink: the same BOM, told relative to the top file."""
+    told = run("bom", gearbox, "--json").out
+    monkeypatch.chdir(tmp_path)
+    assert run("bom", gearbox.relative_to(tmp_path), "--json").out == told
+    assert run("bom", Path("gearbox") / ".." / "gearbox" / gearbox.name, "--json").out == told
+    monkeypatch.chdir(gearbox.parent / "parts")
+    assert run("bom", Path("..") / gearbox.name, "--json").out == told
+    (tmp_path / "way").symlink_to(gearbox.parent)
+    assert run("bom", tmp_path / "way" / gearbox.name, "--json").out == told
+
+
+def test_a_part_has_an_empty_bom_and_nothing_beside(run: Any, gearbox: Path) -> None:
+    """One finding that says so."""
+    found = run("bom", gearbox.parent / "parts" / "Gear.FCStd", "--json").json()
+    assert found["entries"] == []
+    assert [finding["code"] for finding in found["findings"]] == ["empty_bom"]
