@@ -109,6 +109,27 @@ def stated_totals(step: StepFile, prototypes: Mapping[str, Prototype]) -> list[G
     return problems
 
 
+def lost_stretches(step: StepFile) -> list[GeometryProblem]:
+    """Transformations that scale or mirror, of which the kernel made plain ones (versions before 8 do)."""
+    placements = [child.transform for node in step.nodes.values() for child in node.children]
+    if not step.stretched or any(_stretches(np.array(placements).reshape(-1, 4, 4))):
+        return []
+    from silo.inertia.geometry.occt import VERSION
+
+    return [
+        GeometryProblem(
+            GeometryCode.SCALED,
+            f"the file scales or mirrors parts in {step.stretched} places, which the installed geometry "
+            f"kernel ({VERSION}) does not do; masses and centres are wrong there. Install "
+            "cadquery-ocp-novtk 8 or newer",
+        )
+    ]
+
+
+def _stretches(placements: Floats) -> list[bool]:
+    return [*(~rigid_mask(placements)), *(np.linalg.det(placements[:, :3, :3]) < 0)]
+
+
 def scaled_problems(instances: Sequence[Instance]) -> list[GeometryProblem]:
     """One problem for all placements that scale; mirrored ones are rigid and need none."""
     if not instances:

@@ -21,6 +21,14 @@ except ImportError as error:  # pragma: no cover - the development environment a
     ) from error
 
 from OCP.BRep import BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Surface
+from OCP.GeomAbs import (
+    GeomAbs_Cone,
+    GeomAbs_Cylinder,
+    GeomAbs_Plane,
+    GeomAbs_Sphere,
+    GeomAbs_Torus,
+)
 from OCP.Message import Message
 from OCP.TDataStd import TDataStd_Name
 from OCP.TDF import TDF_Label, TDF_Tool
@@ -40,6 +48,8 @@ LabelSequence = TDF_LabelSequence
 
 VERSION: str = OCP.__version__
 """The kernel's version; part of the key of everything that is kept of its results."""
+
+_ELEMENTARY = (GeomAbs_Plane, GeomAbs_Cylinder, GeomAbs_Cone, GeomAbs_Sphere, GeomAbs_Torus)
 
 _as_face = getattr(TopoDS, "Face_s", None) or TopoDS.Face
 
@@ -109,6 +119,11 @@ def has_edges(shape: Any) -> bool:
 def has_surface(face: Any) -> bool:
     """False for a face that holds triangles only (tessellated STEP)."""
     return BRep_Tool.Surface_s(face) is not None
+
+
+def is_elementary(face: Any) -> bool:
+    """True for a plane, a cylinder, a cone, a sphere or a torus."""
+    return BRepAdaptor_Surface(face, False).GetType() in _ELEMENTARY
 
 
 def _explored(shape: Any, kind: Any) -> list[Any]:

@@ -13,8 +13,10 @@ as 0.00785 or 7.85e-6 by the call, and not at all where the material has no name
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
+from silo.inertia.geometry.graph import IDENTITY, Child, Node, bottom_up, count_instances
 from silo.inertia.geometry.part21 import Part21, Typed, Value, number, ref, refs, text
 
 MIN_DENSITY, MAX_DENSITY = 1.0, 25_000.0
@@ -62,6 +64,8 @@ WANTED = frozenset(
         "DOCUMENT_PRODUCT_EQUIVALENCE",
         "DOCUMENT_FILE",
         "APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT",
+        "CARTESIAN_TRANSFORMATION_OPERATOR_3D",
+        "NEXT_ASSEMBLY_USAGE_OCCURRENCE",
     )
 )
 
@@ -98,11 +102,15 @@ class Products:
     """All products of a file. ``by_ordinal``: entity position in the file → PRODUCT_DEFINITION id.
 
     ``count`` is the number of entities: positions only mean something to a reader that counts as many.
+    ``stretched`` counts the transformations that scale or mirror; ``uses`` are (assembly, part) as
+    PRODUCT_DEFINITION ids.
     """
 
     facts: dict[int, ProductFacts] = field(default_factory=dict)
     by_ordinal: dict[int, int] = field(default_factory=dict)
     count: int = 0
+    stretched: int = 0
+    uses: tuple[tuple[int, int], ...] = ()
 
     def named(self, name: str) -> ProductFacts | None:
         """The facts of the only product with this name; None where there is none, or several."""
@@ -125,7 +133,13 @@ def read_products(source: Part21) -> Products:
     for pd, documents in _documents(source).items():
         if pd in facts:
             facts[pd] = replace(facts[pd], documents=documents)
-    return Products(facts, _by_ordinal(source, facts), source.count)
+    return Products(
+        facts,
+        by_ordinal=_by_ordinal(source, facts),
+        count=source.count,
+        stretched=_stretched(source),
+        uses=tuple(_uses(source, facts)),
+    )
 
 
 def _names(source: Part21, definition: tuple[Value, ...]) -> ProductFacts:
@@ -163,6 +177,34 @@ def _representation_owners(source: Part21) -> dict[int, int]:
             elif two in owner:
                 owner.setdefault(one, owner[two])
     return owner
+
+
+def _uses(source: Part21, facts: dict[int, ProductFacts]) -> Iterator[tuple[int, int]]:
+    for _, arguments in source.of("NEXT_ASSEMBLY_USAGE_OCCURRENCE"):
+        assembly, part = ref(arguments, 3), ref(arguments, 4)
+        if assembly in facts and part in facts:
+            yield assembly, part
+
+
+def count_placed(products: Products) -> int:
+    """How many placed parts the file's structure amounts to. InputError where a product contains itself."""
+    children: dict[int, list[Child]] = {pd: [] for pd in products.facts}
+    for assembly, part in products.uses:
+        children[assembly].append(Child("", str(part), IDENTITY))
+    nodes = {
+        str(pd): Node(str(pd), products.facts[pd].name, tuple(found), not found)
+        for pd, found in children.items()
+    }
+    used = {str(part) for _, part in products.uses}
+    tops = [key for key in nodes if key not in used] or list(nodes)[:1]
+    return sum(count_instances(nodes, bottom_up(nodes, top)) for top in tops)
+
+
+def _stretched(source: Part21) -> int:
+    """Transformation operators whose scale is not 1; a mirror is written as a negative one."""
+    operators = (arguments for _, arguments in source.of("CARTESIAN_TRANSFORMATION_OPERATOR_3D"))
+    scales = (number(arguments[6]) for arguments in operators if len(arguments) > 6)
+    return sum(scale is not None and abs(scale - 1) > 1e-9 for scale in scales)
 
 
 # --- material and density ---------------------------------------------------------------------------------

@@ -32,6 +32,10 @@ def read(path: str | Path, *, options: ReadOptions | None = None) -> Assembly:
     path = Path(path)
     kind = detect(path)
     if not options.isolate:
+        if not detect(path).is_mesh:
+            from silo.inertia.geometry import occt
+
+            occt.quiet()
         return read_here(path, options, _reporter(path, options)).assembly
     cache = Cache(options.cache_dir or default_folder()) if options.cache else None
     key = key_of(path, _content(kind, options)) if cache else ""

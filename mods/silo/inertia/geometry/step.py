@@ -9,6 +9,7 @@ from silo.bom.errors import DocumentError, InputError
 from silo.inertia.geometry.brep import no_solid
 from silo.inertia.geometry.checks import (
     against_stated,
+    lost_stretches,
     name_problems,
     scaled_problems,
     split_problems,
@@ -25,7 +26,7 @@ from silo.inertia.model import Assembly, GeometryCode, GeometryProblem, Prototyp
 def read_step(path: Path, options: ReadOptions, report: Report) -> Reading:
     """The assembly of a STEP file, with what belongs to it from beside it. Raises DocumentError."""
     report("reading", 0, 0)
-    step = load(path)
+    step = load(path, max_instances=options.max_instances)
     siblings = Siblings(step, options, lambda name: report(f"reading {name}", 0, 0))
     siblings.resolve()
     try:
@@ -38,7 +39,7 @@ def read_step(path: Path, options: ReadOptions, report: Report) -> Reading:
         report("measuring", number, len(placed))
         prototypes[key] = _prototype(step, key, options, siblings.problems.get(key))
     problems = [*split_problems(siblings), *stated_totals(step, prototypes)]
-    problems += scaled_problems(unfolded.instances)
+    problems += [*lost_stretches(step), *scaled_problems(unfolded.instances)]
     single = len(step.roots) == 1
     assembly = Assembly(
         name=step.nodes[step.roots[0].product].name if single else path.stem,

@@ -22,12 +22,12 @@ from OCP.TCollection import TCollection_ExtendedString
 from OCP.TDocStd import TDocStd_Document
 from OCP.XCAFDoc import XCAFDoc_Centroid, XCAFDoc_DocumentTool, XCAFDoc_Volume
 
-from silo.bom.errors import DocumentError
+from silo.bom.errors import DocumentError, InputError
 from silo.inertia.geometry import occt
 from silo.inertia.geometry.graph import Child, Node
 from silo.inertia.geometry.names import clean, is_generic
 from silo.inertia.geometry.part21 import scan
-from silo.inertia.geometry.products import WANTED, ProductFacts, Products, read_products
+from silo.inertia.geometry.products import WANTED, ProductFacts, Products, count_placed, read_products
 from silo.inertia.geometry.tessellate import MM, in_metres, trsf_matrix
 
 
@@ -41,10 +41,14 @@ class Stated:
 
 @dataclass(eq=False)
 class StepFile:
-    """The content of one file; keys are unique over all files of a split assembly."""
+    """The content of one file; keys are unique over all files of a split assembly.
+
+    ``stretched``: how many transformations the text has that scale or mirror.
+    """
 
     path: Path
     unit: str = ""
+    stretched: int = 0
     nodes: dict[str, Node] = field(default_factory=dict)
     shapes: dict[str, list[Any]] = field(default_factory=dict)
     facts: dict[str, ProductFacts] = field(default_factory=dict)
@@ -59,11 +63,13 @@ class StepFile:
         self.facts.update(other.facts)
         self.stated.update(other.stated)
         self.unnamed.update(other.unnamed)
+        self.stretched += other.stretched
 
 
-def load(path: Path, prefix: str = "") -> StepFile:
+def load(path: Path, prefix: str = "", max_instances: int = 1_000_000) -> StepFile:
     """Read one STEP file. ``prefix`` goes before every key. DocumentError where it cannot be read."""
     products, documents = _text(path)
+    _refuse_bombs(path, products, max_instances)
     with tempfile.TemporaryDirectory(prefix="silo-step-") as folder:
         source = _without_documents(path, Path(folder)) if documents else path
         document, reader = _transferred(source, path)
@@ -78,6 +84,16 @@ def _text(path: Path) -> tuple[Products, bool]:
                 str(path), "the file ends in the middle (no END-ISO-10303-21); export or copy it again"
             )
         return read_products(text), "DOCUMENT_FILE" in text.keywords.values()
+
+
+def _refuse_bombs(path: Path, products: Products, most: int) -> None:
+    # Before the kernel sees it: a kilobyte of assemblies of assemblies keeps it busy for ever.
+    try:
+        count = count_placed(products)
+    except InputError as error:
+        raise DocumentError(str(path), str(error)) from error
+    if count > most:
+        raise DocumentError(str(path), f"it unfolds to {count} placed parts, more than the {most} allowed")
 
 
 _EXTERNAL = re.compile(
@@ -116,7 +132,7 @@ class _Walk:
         self._products = products
         self._owners = _owners(reader, products)
         self._known: dict[str, ProductFacts | None] = {}
-        self._file = StepFile(path, unit=_unit(reader))
+        self._file = StepFile(path, unit=_unit(reader), stretched=products.stretched)
         self._fallback = clean(path.stem) or "part"
 
     def run(self) -> StepFile:
