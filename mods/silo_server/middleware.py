@@ -63,7 +63,8 @@ class BodyLimit:
             return
         limit = self._limit(scope["path"])
         message = f"the request is larger than this server takes ({limit / MIB:g} MiB)"
-        if self._told(scope) > limit:
+        # A browser gets its answer from inside, where errors become pages.
+        if self._told(scope) > limit and not _from_browser(scope):
             await error_answer(413, "too_large", message)(scope, receive, send)
             return
         taken = 0
@@ -90,3 +91,7 @@ class BodyLimit:
             if name == b"content-length" and value.isdigit():
                 return int(value)
         return 0
+
+
+def _from_browser(scope: Scope) -> bool:
+    return any(name == b"accept" and b"text/html" in value for name, value in scope["headers"])

@@ -1,0 +1,457 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The pages without a browser: roles, form secrets, what a strict browser needs, errors, what is escaped."""
+
+from __future__ import annotations
+
+import base64
+import re
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from html.parser import HTMLParser
+from itertools import pairwise
+from pathlib import Path
+from urllib.parse import unquote, urlencode
+
+import pytest
+from fastapi.routing import APIRoute
+
+from silo_server.run import RunningServer, running_server
+from silo_server.settings import Settings
+from silo_server.testing import Answer, Api, bom, form_body
+from silo_server.web.pages import ROUTERS
+
+TOKEN = "silo_pages"
+PUBLIC, VIEWER, EDITOR, ADMIN = "public", "viewer", "editor", "admin"
+ROLES = (VIEWER, EDITOR, ADMIN)
+HTML = {"Accept": "text/html,application/xhtml+xml"}
+FORM = {"Content-Type": "application/x-www-form-urlencoded"}
+HOSTILE = "<script>alert(1)</script>\"'&<img src=x>"
+
+TABLE = {
+    ("GET", "/login"): PUBLIC,
+    ("POST", "/login"): PUBLIC,
+    ("GET", "/login/link/{secret}"): PUBLIC,
+    ("POST", "/logout"): VIEWER,
+    ("GET", "/"): VIEWER,
+    ("GET", "/items"): VIEWER,
+    ("GET", "/items/{part_number}"): VIEWER,
+    ("GET", "/items/{part_number}/bom"): VIEWER,
+    ("GET", "/items/{part_number}/history"): VIEWER,
+    ("GET", "/items/{part_number}/compare"): VIEWER,
+    ("GET", "/activity"): VIEWER,
+    ("GET", "/account"): VIEWER,
+    ("POST", "/account/tokens"): VIEWER,
+    ("POST", "/account/tokens/{token_id}/revoke"): VIEWER,
+    ("POST", "/account/password"): VIEWER,
+    ("POST", "/items/{part_number}/bom/decide"): EDITOR,
+    ("POST", "/items/{part_number}/bom/undo"): EDITOR,
+    ("POST", "/items/{part_number}/bom/lines"): EDITOR,
+    ("POST", "/items/{part_number}/bom/lines/{child}"): EDITOR,
+    ("POST", "/items/{part_number}/bom/lines/{child}/remove"): EDITOR,
+    ("POST", "/items/{part_number}/restore"): EDITOR,
+    ("GET", "/items/{part_number}/import"): EDITOR,
+    ("POST", "/items/{part_number}/import/check"): EDITOR,
+    ("POST", "/items/{part_number}/import"): EDITOR,
+    ("GET", "/users"): ADMIN,
+    ("POST", "/users"): ADMIN,
+    ("POST", "/users/{username}"): ADMIN,
+    ("POST", "/users/{username}/login-link"): ADMIN,
+    ("POST", "/mode"): ADMIN,
+    ("GET", "/audit"): ADMIN,
+}
+CHANGING = [path for (method, path), role in TABLE.items() if method == "POST" and role != PUBLIC]
+
+
+def fill(path: str) -> str:
+    """The path of something that does not exist, so that nothing is harmed."""
+    return re.sub(r"{(\w+)}", lambda found: "999999" if found[1] == "token_id" else "NO-SUCH", path)
+
+
+@dataclass(frozen=True)
+class Visitor:
+    """Somebody with a session: the cookie, and the secret for forms."""
+
+    api: Api
+    cookie: str
+    csrf: str
+
+    def get(self, path: str, **headers: str) -> Answer:
+        """A page."""
+        return self.api.call("GET", path, headers={"Cookie": self.cookie, **HTML, **headers})
+
+    def post(self, path: str, *, csrf: str | None = None, **fields: str) -> Answer:
+        """A form, with the secret unless another is given."""
+        sent = urlencode({"csrf_token": self.csrf if csrf is None else csrf, **fields}).encode()
+        return self.api.call("POST", path, body=sent, headers={"Cookie": self.cookie, **HTML, **FORM})
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningServer]:
+    """A server over an empty database."""
+    folder = tmp_path_factory.mktemp("pages")
+    with running_server(f"sqlite:///{folder / 'silo.db'}", token=TOKEN) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def api(server: RunningServer) -> Iterator[Api]:
+    """The admin's token."""
+    with Api(server.base_url, TOKEN) as caller:
+        yield caller
+
+
+@pytest.fixture(scope="module")
+def visitors(api: Api) -> dict[str, Visitor]:
+    """A session per role."""
+    for role in (VIEWER, EDITOR):
+        api.good("POST", "/api/users", {"username": role, "role": role})
+    return {role: enter(api, role) for role in ROLES}
+
+
+def enter(api: Api, username: str) -> Visitor:
+    """A new session by a login link."""
+    browser = api.as_(None)
+    path = api.good("POST", f"/api/users/{username}/login-link")["path"]
+    cookie = browser.call("GET", path).headers["set-cookie"].split(";")[0]
+    page = browser.call("GET", "/account", headers={"Cookie": cookie}).body.decode()
+    found = re.search(r'name="csrf_token" value="([^"]+)"', page)
+    assert found is not None
+    return Visitor(browser, cookie, found[1])
+
+
+# --- who may ------------------------------------------------------------------------------------------------
+
+
+def test_the_table_knows_every_page() -> None:
+    """A new page is added here with its role, or this fails; and none is in the API's document."""
+    routes = [route for router in ROUTERS for route in router.routes if isinstance(route, APIRoute)]
+    assert {(method, route.path) for route in routes for method in route.methods} == set(TABLE)
+    assert not any(route.include_in_schema for route in routes)
+
+
+@pytest.mark.parametrize(("method", "path"), [key for key, role in TABLE.items() if role != PUBLIC])
+def test_a_page_lets_in_who_may(visitors: dict[str, Visitor], api: Api, method: str, path: str) -> None:
+    """Nobody is led to the login page, who may not gets a page that says so, who may gets in."""
+    if path == "/logout":  # its own test
+        return
+    stranger = api.as_(None).call(method, fill(path), headers=HTML)
+    assert stranger.status == 303
+    assert stranger.headers["location"].startswith("/login?next=")
+    needed = ROLES.index(TABLE[(method, path)])
+    for role in ROLES:
+        visitor = visitors[role]
+        # "password" and "mode" without fields are refused by their content, so nothing is harmed.
+        answer = visitor.get(fill(path)) if method == "GET" else visitor.post(fill(path))
+        assert (answer.status == 403) == (ROLES.index(role) < needed), (role, answer.status, answer.body)
+        assert answer.status < 500
+        if answer.status == 403:
+            assert f"this needs {TABLE[(method, path)]}" in answer.body.decode()
+
+
+@pytest.mark.parametrize("path", CHANGING)
+@pytest.mark.parametrize("csrf", ["", "wrong", "ü"])
+def test_every_form_needs_its_secret(visitors: dict[str, Visitor], path: str, csrf: str) -> None:
+    """403 with a page in words for each form without the session's own secret, whoever sends it."""
+    answer = visitors[ADMIN].post(fill(path), csrf=csrf)
+    assert answer.status == 403
+    assert "load the page again" in answer.body.decode()
+
+
+def test_a_login_form_from_another_site_is_refused(api: Api) -> None:
+    """Nobody is logged in under a stranger's name by a page elsewhere."""
+    body = urlencode({"username": "admin", "password": "whatever it is"}).encode()
+    for headers in ({"Sec-Fetch-Site": "cross-site"}, {"Origin": "https://elsewhere.example"}):
+        answer = api.as_(None).call("POST", "/login", body=body, headers={**FORM, **HTML, **headers})
+        assert answer.status == 403
+    answer = api.as_(None).call(
+        "POST", "/login", body=body, headers={**FORM, **HTML, "Sec-Fetch-Site": "same-origin"}
+    )
+    assert answer.status == 401
+
+
+def test_logging_out_ends_the_session(api: Api) -> None:
+    """Afterwards the cookie is worth nothing."""
+    visitor = enter(api, VIEWER)
+    assert visitor.get("/items").status == 200
+    answer = visitor.post("/logout")
+    assert (answer.status, answer.headers["location"]) == (303, "/login")
+    assert visitor.get("/items").status == 303
+
+
+def test_the_way_back_after_a_login(api: Api) -> None:
+    """The login page knows the whole address; after a lost form it is the page that the form was on."""
+    browser = api.as_(None)
+    asked = browser.call("GET", "/items?q=a+b&type=part", headers=HTML)
+    assert unquote(asked.headers["location"]) == "/login?next=/items?q=a+b&type=part"
+    host = api.base_url.removeprefix("http://")
+    sent = browser.call(
+        "POST", "/items/X/bom/decide", body=b"", headers={**HTML, "Referer": f"http://{host}/items/X/bom"}
+    )
+    assert unquote(sent.headers["location"]) == "/login?next=/items/X/bom"
+    foreign = browser.call("POST", "/mode", body=b"", headers={**HTML, "Referer": "https://elsewhere/x"})
+    assert unquote(foreign.headers["location"]) == "/login?next=/"
+
+
+def test_a_used_link_leads_on_where_the_session_lives(api: Api) -> None:
+    """Opening the same link twice in the browser that it let in is no error."""
+    browser = api.as_(None)
+    path = api.good("POST", f"/api/users/{ADMIN}/login-link")["path"] + "?next=/activity"
+    cookie = browser.call("GET", path).headers["set-cookie"].split(";")[0]
+    again = browser.call("GET", path, headers={"Cookie": cookie})
+    assert (again.status, again.headers["location"]) == (303, "/activity")
+
+
+# --- what is sent -------------------------------------------------------------------------------------------
+
+
+class Strict(HTMLParser):
+    """Collects what a strict policy would refuse, and forms without a secret."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.problems: list[str] = []
+        self.open_form: str | None = None
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        values = dict(attrs)
+        self.problems += [f"{tag} {name}" for name in values if name == "style" or name.startswith("on")]
+        if tag == "style" or (tag == "script" and not values.get("src")):
+            self.problems.append(f"inline {tag}")
+        for name in ("src", "href", "action"):
+            link = values.get(name) or ""
+            if "//" in link or link.startswith("javascript"):
+                self.problems.append(f"{tag} {name}={link}")
+        if tag == "form" and values.get("method") == "post":
+            self.open_form = str(values.get("action"))
+        if tag == "input" and values.get("name") == "csrf_token" and values.get("value"):
+            self.open_form = None
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag == "form" and self.open_form not in (None, "/login"):
+            self.problems.append(f"the form {self.open_form} has no secret")
+        if tag == "form":
+            self.open_form = None
+
+
+@pytest.fixture(scope="module")
+def busy(api: Api) -> dict[str, str]:
+    """A BOM with everything on it, and hostile texts everywhere."""
+    parent = api.item(name=HOSTILE)
+    used, gone, other, disputed = (api.item(name=HOSTILE, long_description=HOSTILE) for _ in range(4))
+    api.merge(parent, {used: 1, gone: 2, other: 3, disputed: 4}, document={"file": HOSTILE})
+    api.good("PUT", bom(parent, disputed), {"quantity": 6, "notes": HOSTILE, "find_number": HOSTILE[:30]})
+    api.merge(parent, {used: 1, disputed: 5}, document={"file": HOSTILE})
+    api.good("PUT", f"/api/items/{used}", {"properties": {HOSTILE: HOSTILE}, "comment": HOSTILE})
+    body, headers = form_body({"file": ("<b>x</b>.txt", b"x"), "comment": HOSTILE})
+    assert api.call("POST", f"/api/items/{used}/file", body=body, headers=headers).status == 201
+    api.good("POST", "/api/auth/tokens", {"name": HOSTILE})
+    api.good("POST", "/api/users", {"username": "odd", "display_name": HOSTILE})
+    return {"parent": parent, "used": used, "disputed": disputed}
+
+
+PAGES = (
+    "/login",
+    "/items",
+    "/items?q=%3Cscript%3E&type=%22%3E%3Cb%3E",
+    "/items/{parent}",
+    "/items/{parent}?view=flat",
+    "/items/{used}",
+    "/items/{parent}/bom",
+    "/items/{parent}/bom?edit={disputed}",
+    "/items/{parent}/history",
+    "/items/{parent}/compare?old=0&all=1",
+    "/items/{parent}/import",
+    "/activity",
+    "/account",
+    "/users",
+    "/audit",
+    "/items/%3Cscript%3E",
+    "/%3Cscript%3Ealert(1)%3C/script%3E",
+    "/items/{parent}/compare?old=%3Cscript%3E",
+)
+
+
+@pytest.mark.parametrize("path", PAGES)
+def test_pages_are_strict_and_escaped(
+    visitors: dict[str, Visitor], busy: dict[str, str], api: Api, path: str
+) -> None:
+    """Nothing inline, nothing from elsewhere, every form with its secret, hostile texts as text."""
+    shown = visitors[ADMIN].get(path.format(**busy)) if path != "/login" else api.as_(None).call("GET", path)
+    text = shown.body.decode()
+    assert shown.headers["content-type"] == "text/html; charset=utf-8"
+    assert "script-src 'self'" in shown.headers["content-security-policy"]
+    assert shown.headers["cache-control"] == "no-store"
+    assert "<script>" not in text
+    assert "<img src=x" not in text
+    strict = Strict()
+    strict.feed(text)
+    assert strict.problems == []
+
+
+def test_static_files(api: Api) -> None:
+    """Style and scripts need no login, are typed, and are asked for again only by their tag."""
+    browser = api.as_(None)
+    for name, kind in (("style.css", "text/css"), ("live.js", "javascript"), ("icon.svg", "image/svg")):
+        answer = browser.call("GET", f"/static/{name}")
+        assert answer.status == 200
+        assert kind in answer.headers["content-type"]
+        assert answer.headers["cache-control"] == "no-cache"
+        again = browser.call("GET", f"/static/{name}", headers={"If-None-Match": answer.headers["etag"]})
+        assert again.status == 304
+    for path in ("/static/", "/static/../templates/base.html", "/static/%2e%2e/render.py"):
+        assert browser.call("GET", path).status == 404
+
+
+def test_browsers_get_pages_and_programs_json(visitors: dict[str, Visitor], api: Api) -> None:
+    """The same error, as a page for a browser and as JSON for everybody else; the API is always JSON."""
+    page = visitors[VIEWER].get("/items/NO-SUCH")
+    assert (page.status, page.headers["content-type"]) == (404, "text/html; charset=utf-8")
+    assert "does not exist on this server" in page.body.decode()
+    assert api.call("GET", "/items/NO-SUCH").json()["error"] == "not_found"
+    assert api.call("GET", "/api/items/NO-SUCH", headers=HTML).json()["error"] == "not_found"
+    stranger = api.as_(None).call("GET", "/nowhere", headers=HTML)
+    assert stranger.status == 404
+    assert "Log out" not in stranger.body.decode()
+
+
+def test_a_notice_is_shown_once_and_by_nobody_else(visitors: dict[str, Visitor], api: Api) -> None:
+    """It travels in a cookie that the next page takes away; an address cannot put words on a page."""
+    parent, child = api.items(2)
+    visitor = visitors[EDITOR]
+    done = visitor.post(f"/items/{parent}/bom/lines", child=child, quantity="2")
+    assert (done.status, done.headers["location"]) == (303, f"/items/{parent}/bom")
+    notice = done.headers["set-cookie"].split(";")[0]
+    assert "HttpOnly" in done.headers["set-cookie"]
+    first = visitor.get(f"/items/{parent}/bom", Cookie=f"{visitor.cookie}; {notice}")
+    assert f"✓ {child} added." in first.body.decode()
+    assert 'silo_notice=""' in first.headers["set-cookie"]
+    assert "Send money" not in visitor.get(f"/items/{parent}/bom?notice=Send+money").body.decode()
+
+
+# --- forms --------------------------------------------------------------------------------------------------
+
+
+def test_keeping_without_a_reason_says_so_on_the_line(visitors: dict[str, Visitor], api: Api) -> None:
+    """A kept line always has a reason to show."""
+    parent, child = api.items(2)
+    api.merge(parent, {child: 1})
+    api.merge(parent, {})
+    visitors[EDITOR].post(f"/items/{parent}/bom/decide", chosen=child, action="keep")
+    line = api.lines(parent)[child]
+    assert (line["source"], line["reason"]) == ("manual", "kept on purpose, not in the CAD model")
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"action": "explode"}, "wanted one of the buttons"),
+        ({"action": "keep", "chosen": "NO-SUCH"}, "has no line for"),
+        ({"action": "keep", "reason": "x" * 501}, "wanted at most 500 characters"),
+    ],
+)
+def test_a_form_that_makes_no_sense(
+    visitors: dict[str, Visitor], api: Api, fields: dict[str, str], words: str
+) -> None:
+    """A page with the reason, not a fault; nothing is changed."""
+    parent, child = api.items(2)
+    api.merge(parent, {child: 1})
+    api.merge(parent, {})
+    before = api.lines(parent)
+    answer = visitors[EDITOR].post(f"/items/{parent}/bom/decide", **{"chosen": child, **fields})
+    assert 400 <= answer.status < 500
+    assert words in answer.body.decode()
+    assert api.lines(parent) == before
+
+
+def test_a_long_bom_is_shown_in_part_first(visitors: dict[str, Visitor], api: Api) -> None:
+    """500 lines at once, all of them one click away."""
+    parent, *children = api.items(503)
+    api.merge(parent, dict.fromkeys(children, 1))
+    page = visitors[VIEWER].get(f"/items/{parent}/bom").body.decode()
+    assert page.count("<tr id=") == 500
+    assert "Show all 502 lines" in page
+    assert visitors[VIEWER].get(f"/items/{parent}/bom?all=1").body.decode().count("<tr id=") == 502
+
+
+def test_a_carried_file_that_was_tampered_with(visitors: dict[str, Visitor], api: Api) -> None:
+    """What comes back between check and import is checked again; a bomb is not unpacked."""
+    parent, child = api.items(2)
+    bomb = base64.b64encode(zlib.compress(b"\n" * 50_000_000)).decode()
+    for packed, status in (
+        ("%%%", 400),
+        (base64.b64encode(b"no zlib").decode(), 400),
+        (bomb, 413),
+        ("", 413),
+    ):
+        answer = visitors[EDITOR].post(f"/items/{parent}/import", packed=packed, name="x.csv")
+        assert answer.status == status, packed[:20]
+    forged = base64.b64encode(zlib.compress(f"Part number,Quantity\n{child},-1\n".encode())).decode()
+    answer = visitors[EDITOR].post(f"/items/{parent}/import", packed=forged, name="x.csv")
+    assert answer.status == 400
+    assert api.lines(parent) == {}
+
+
+def test_a_file_that_is_no_bom(visitors: dict[str, Visitor], api: Api) -> None:
+    """No file, a picture, a table without the columns: a page that says what is wanted."""
+    parent = api.item()
+    visitor = visitors[EDITOR]
+    for content in (b"", b"\x89PNG\r\n\x1a\n\x00\x00", b"a,b\n1,2\n"):
+        body, headers = form_body({"csrf_token": visitor.csrf, "file": ("x.csv", content)})
+        sent = {"Cookie": visitor.cookie, **HTML, **headers}
+        answer = visitor.api.call("POST", f"/items/{parent}/import/check", body=body, headers=sent)
+        assert answer.status == 400
+        assert "Part number" in answer.body.decode()
+    assert visitor.post(f"/items/{parent}/import/check").status == 400
+
+
+def test_activity_gives_only_what_is_new(visitors: dict[str, Visitor], api: Api) -> None:
+    """With ``after`` the page holds the later events only, and says up to where it knows."""
+    first = visitors[VIEWER].get("/activity").body.decode()
+    last = re.search(r'data-last="(\d+)"', first)
+    assert last is not None
+    number = api.item()
+    news = visitors[VIEWER].get(f"/activity?after={last[1]}").body.decode()
+    assert news.count('<li class="entry">') == 1
+    assert number in news
+
+
+def test_a_file_too_large_is_a_page(tmp_path: Path) -> None:
+    """What the server does not take is told in a page to a browser, and as JSON to a program."""
+    url = f"sqlite:///{tmp_path / 'small.db'}"
+    small = Settings(database_url=url, max_body_bytes=10_000)
+    with running_server(url, token=TOKEN, settings=small) as server, Api(server.base_url, TOKEN) as api:
+        parent = api.item()
+        visitor = enter(api, ADMIN)
+        body, headers = form_body({"csrf_token": visitor.csrf, "file": ("x.csv", b"x" * 12_000)})
+        path = f"/items/{parent}/import/check"
+        page = visitor.api.call(
+            "POST", path, body=body, headers={"Cookie": visitor.cookie, **HTML, **headers}
+        )
+        assert (page.status, page.headers["content-type"]) == (413, "text/html; charset=utf-8")
+        assert "larger than this server takes" in page.body.decode()
+        assert (
+            api.bad(413, "POST", f"{bom(parent)}/import", body=body, headers=headers)["error"] == "too_large"
+        )
+
+
+def test_a_giant_tree_is_shown_less_deep(visitors: dict[str, Visitor], api: Api) -> None:
+    """A tree too large for a page is shown less deep, and says so."""
+    levels = [api.items(14) for _ in range(3)]
+    root = api.item()
+    api.merge(root, dict.fromkeys(levels[0], 1))
+    for upper, lower in pairwise(levels):
+        for number in upper:
+            api.merge(number, dict.fromkeys(lower, 1))
+    page = visitors[VIEWER].get(f"/items/{root}").body.decode()
+    assert "This BOM is large: the first 2 levels are shown" in page
+    assert page.count('<div class="line">') == 14 + 14 * 14
+
+
+def test_the_package_holds_its_files() -> None:
+    """Templates and static files are found beside the code, as an installed package has them."""
+    import silo_server.web
+
+    folder = Path(silo_server.web.__file__).parent
+    assert (folder / "templates" / "base.html").is_file()
+    assert (folder / "static" / "style.css").is_file()

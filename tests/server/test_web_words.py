@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Numbers, times and changes in plain words."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from silo_server.services.events import DatedEvent
+from silo_server.values import LineState
+from silo_server.web.activity_page import entry_of
+from silo_server.web.render import plural, quantity, segment, size, when
+from silo_server.web.words import changes
+
+LINE = LineState(4.0, "assembly")
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "words"),
+    [
+        (12.0, None, "12"),
+        (2.5, "m", "2.5 m"),
+        (0.02, "l", "0.02 l"),
+        (1_000_000.0, None, "1000000"),
+        (0.1 + 0.2, None, "0.3"),
+        (1e9, None, "1000000000"),
+        (None, None, "–"),
+    ],
+)
+def test_quantities_read_as_people_write_them(value: float | None, unit: str | None, words: str) -> None:
+    """A count is a count, nothing is rounded away that counts, no exponent for what a BOM holds."""
+    assert quantity(value, unit) == words
+
+
+def test_small_words() -> None:
+    """Singular and plural, sizes, times with their machine form, part numbers in a path."""
+    assert (plural(1, "item is", "items are"), plural(0, "item is", "items are")) == (
+        "1 item is",
+        "0 items are",
+    )
+    assert (size(812), size(14_300), size(3_200_000), size(None)) == ("812 bytes", "14 kB", "3.2 MB", "")
+    assert when("2026-02-08T22:15:00.123456Z") == (
+        '<time datetime="2026-02-08T22:15:00Z">2026-02-08 22:15</time>'
+    )
+    assert when(None) == "–"
+    assert segment("A/B 1#") == "A%2FB%201%23"
+
+
+@pytest.mark.parametrize(
+    ("after", "said"),
+    [
+        (replace(LINE, quantity=6.0), ["quantity 4 → 6"]),
+        (replace(LINE, unit="m"), ["quantity 4 → 4 m"]),
+        (replace(LINE, unreferenced_since="2026"), ["no longer referenced by the assembly"]),
+        (replace(LINE, source="manual", reason="glue"), ["now a manual line", "reason: glue"]),
+        (replace(LINE, notes="x"), ["notes none → “x”"]),
+        (replace(LINE, reference_designators=("R1", "R2")), ["reference designators none → R1 R2"]),
+        (LINE, []),
+    ],
+)
+def test_what_differs_between_two_states(after: LineState, said: list[str]) -> None:
+    """Each difference in words, and nothing where there is none."""
+    assert changes(LINE, after) == said
+
+
+def test_a_line_that_comes_back() -> None:
+    """Unreferenced before, referenced now; owned by the assembly again."""
+    gone = replace(LINE, unreferenced_since="2026")
+    assert changes(gone, LINE) == ["referenced again"]
+    assert changes(replace(LINE, source="manual"), LINE) == ["owned by the assembly again"]
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "words"),
+    [
+        ("item.created", {"part_number": "A", "name": "Bolt"}, "Bolt registered"),
+        ("item.deleted", {"part_number": "A"}, "archived"),
+        ("revision.created", {"part_number": "A", "revision_number": 2, "comment": "x"}, "revision 2: x"),
+        ("server.state", {"mode": "read-only"}, "The server takes no changes at the moment"),
+        ("server.state", {"mode": "normal"}, "The server takes changes again"),
+        ("something.new", {}, "something.new"),
+    ],
+)
+def test_events_in_words(name: str, data: dict[str, object], words: str) -> None:
+    """Each kind of event has its words; an unknown one shows its name."""
+    assert entry_of(DatedEvent(1, name, "2026-02-08T22:15:00.000000Z", data)).words == words
+
+
+def test_a_merge_has_its_counts() -> None:
+    """Added, changed, unreferenced, to decide; a merge that changed nothing says that."""
+    data = {
+        "item": "A/1",
+        "user": "designer",
+        "diff": {"added": [1], "quantity_changed": [1, 2], "removed": [1]},
+        "warnings": [{"type": "unreferenced"}, {"type": "conflict"}],
+    }
+    entry = entry_of(DatedEvent(1, "bom_merge", "2026", data))
+    assert [(mark, count) for mark, count, _ in entry.counts] == [
+        ("added", 1),
+        ("changed", 2),
+        ("warn", 1),
+        ("conflict", 1),
+    ]
+    assert (entry.link, entry.user) == ("/items/A%2F1/bom", "designer")
+    assert entry_of(DatedEvent(1, "bom_merge", "2026", {"item": "A", "diff": {}})).counts[0][1] == 0
