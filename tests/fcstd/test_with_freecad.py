@@ -256,13 +256,28 @@ def test_freecad_reads_a_stamp_where_meta_was_missing(freecad: Run, tmp_path: Pa
 
 
 def test_links_by_symlinks_as_freecad(freecad: Run, tmp_path: Path) -> None:
-    """Relative paths are joined as FreeCAD joins them: as text, from the folder as it was opened."""
+    """Relative paths are joined as FreeCAD 0.20 and 1.0 join them: as text, from the folder as it was opened.
+
+    FreeCAD 1.1 joins them from where the owning file really lies; a link that leads to a file in that way only
+    is found by us too.
+    """
     part(uuid="elsewhere").save(tmp_path / "elsewhere" / "parts" / "p.FCStd")
     part(uuid="project").save(tmp_path / "project" / "parts" / "p.FCStd")
     Doc().link("L", "../parts/p.FCStd", "Box").save(tmp_path / "elsewhere" / "asm" / "top.FCStd")
     (tmp_path / "project" / "asm").symlink_to("../elsewhere/asm")
     path = tmp_path / "project" / "asm" / "top.FCStd"
-    script = "d = App.openDocument(args['path']); answer(d.L.LinkedObject.Document.Meta)"
-    with Library() as library:
-        ours = library.open(path).Objects[0].LinkedObject.Document.Meta
-    assert freecad(script, path=str(path)) == ours == {"SiloUUID": "project"}
+    script = """
+d = App.openDocument(args["path"])
+answer([[int(n) for n in App.Version()[:2]], d.L.LinkedObject.Document.Meta["SiloUUID"]])
+"""
+
+    def ours() -> str:
+        with Library() as library:
+            meta: dict[str, str] = library.open(path).Objects[0].LinkedObject.Document.Meta
+            return meta["SiloUUID"]
+
+    version, told = freecad(script, path=str(path))
+    assert told == ("project" if version < [1, 1] else "elsewhere")
+    assert ours() == "project"
+    (tmp_path / "project" / "parts" / "p.FCStd").unlink()
+    assert ours() == "elsewhere"

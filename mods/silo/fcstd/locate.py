@@ -3,7 +3,8 @@
 
 FreeCAD records paths relative to the folder of the owning file as it was opened, always with ``/``, and joins
 them as text: ``..`` takes one name away, symlinks are not followed first (``src/App/PropertyLinks.cpp``,
-observed with FreeCAD 0.20). We do the same, and try the folder where the owning file really lies after that.
+observed with FreeCAD 0.20 and 1.0). We do the same, and try the folder where the owning file really lies
+after that; FreeCAD 1.1 goes from there alone. Only where both ways lead to a file do the versions differ.
 """
 
 from __future__ import annotations

@@ -32,9 +32,12 @@ App::LinkGroup: LinkGroupPython
 App::LocalCoordinateSystem: Origin Part::LocalCoordinateSystem
 App::MaterialObject: MaterialObjectPython
 App::OriginFeature: Line Plane
-App::DatumElement: Line Plane Point Part::DatumPlane Part::DatumLine Part::DatumPoint
+App::DatumElement: Line Plane Point
+App::Line: Part::DatumLine
 App::Part: Assembly::AssemblyObject Assembly::AssemblyLink
 App::Placement: PlacementPython
+App::Plane: Part::DatumPlane
+App::Point: Part::DatumPoint
 Assembly::AssemblyObject: AssemblyObjectPython
 Mesh::Feature: Cone Cube Cylinder Ellipsoid FeatureCustom FeaturePython FixDefects Import SegmentByMesh
 Mesh::Feature: SetOperations Sphere Torus Transform
