@@ -132,9 +132,10 @@ class Hub:
 
     async def place(self, last_event_id: int | None) -> tuple[int, bool]:
         """(cursor to begin at, whether a ``reset`` is due) for a client that says what it saw last."""
-        if last_event_id is None:
-            return self.head, False
+        # The log and not the ring says where "now" is: the ring may be a moment behind a commit.
         horizon, head = await asyncio.to_thread(self._read_bounds)
+        if last_event_id is None:
+            return head, False
         # An id from the future is of another database (or of the real Silo before a restart).
         if last_event_id < horizon or last_event_id > max(head, self.head):
             return max(head, self.head), True

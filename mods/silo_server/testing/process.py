@@ -22,7 +22,7 @@ class ServerProcess:
         self, database_url: str, files_dir: Path, token: str, *, workers: int = 1, **settings: str
     ) -> None:
         environ = {**os.environ, "SILO_API_TOKEN": token, "SILO_STORAGE_ROOT_DIR": str(files_dir), **settings}
-        command = [sys.executable, "-m", "silo_server", "--port", "0", "--database", database_url]
+        command = [sys.executable, "-P", "-m", "silo_server", "--port", "0", "--database", database_url]
         self._process = subprocess.Popen(
             [*command, "--workers", str(workers)], env=environ, stdout=subprocess.PIPE, text=True
         )
