@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""A fault of ours is told in one sentence; what is wrong goes to the log only."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from sqlalchemy.exc import DataError, IntegrityError, OperationalError
+
+from silo_server.app import create_app
+from silo_server.bootstrap import prepare
+from silo_server.db.engine import Database
+from silo_server.run import RunningServer, running_server
+from silo_server.settings import Settings
+from silo_server.testing import Api
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[RunningServer]:
+    """A server over a database of its own."""
+    with running_server(f"sqlite:///{tmp_path / 'x.db'}", token="silo_failures") as running:
+        yield running
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "code"),
+    [
+        (ZeroDivisionError("secret inside"), 500, "server_fault"),
+        (OperationalError("SELECT secret inside", {}, Exception("x")), 503, "unavailable"),
+        (DataError("INSERT secret inside", {}, Exception("x")), 400, "rejected"),
+        (IntegrityError("INSERT secret inside", {}, Exception("x")), 409, "conflict"),
+        (UnicodeEncodeError("utf-8", "secret inside", 0, 1, "lone"), 400, "rejected"),
+    ],
+)
+def test_what_goes_wrong_inside_stays_inside(
+    server: RunningServer, error: Exception, status: int, code: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Whatever a route raises becomes the one shape; neither SQL nor stack trace reaches the client."""
+
+    def fail() -> None:
+        raise error
+
+    server.app.add_api_route("/fail", fail)
+    server.app.router.routes.insert(0, server.app.router.routes.pop())
+    with Api(server.base_url, "silo_failures") as api:
+        answer = api.bad(status, "GET", "/fail")
+    assert answer["error"] == code
+    assert "secret" not in str(answer)
+
+
+def test_a_database_that_is_away_is_503_and_not_ready(tmp_path: Path) -> None:
+    """``/health`` still answers, ``/ready`` says no, requests may be sent again later."""
+    path = tmp_path / "x.db"
+    with running_server(f"sqlite:///{path}", token="silo_failures") as running:
+        server = running.app.state.server
+        with Api(running.base_url, "silo_failures") as api:
+            api.item("BEFORE")
+            server.db.engine.dispose()
+            away = path.rename(tmp_path / "away.db")
+            path.mkdir()  # where the file was is now something that is no database
+            try:
+                assert api.bad(503, "GET", "/api/items/BEFORE")["error"] == "unavailable"
+                assert api.call("GET", "/ready").status == 503
+                assert api.get("/health")["mode"] == "degraded"
+            finally:
+                path.rmdir()
+                away.rename(path)
+            assert api.get("/api/items/BEFORE")["part_number"] == "BEFORE"
+            assert api.get("/ready")["status"] == "ready"
+
+
+def test_a_store_that_cannot_be_written_is_degraded(tmp_path: Path) -> None:
+    """The mode says so before somebody loses an upload."""
+    blocked = tmp_path / "blocked"
+    blocked.write_text("a file where the folder should be")
+    with (
+        running_server(f"sqlite:///{tmp_path / 'x.db'}", token="silo_failures", files_dir=blocked) as running,
+        Api(running.base_url, None) as api,
+    ):
+        assert api.get("/ready")["mode"] == "degraded"
+
+
+def test_the_document_promises_only_what_we_answer(tmp_path: Path) -> None:
+    """No 422 anywhere: we answer 400; every operation documents its errors in the one shape."""
+    document = create_app(Settings(database_url=f"sqlite:///{tmp_path / 'x.db'}")).openapi()
+    for path, operations in document["paths"].items():
+        for method, operation in operations.items():
+            assert "422" not in operation["responses"], (method, path)
+            if path.startswith("/api/"):
+                assert "401" in operation["responses"], (method, path)
+
+
+def test_the_first_start_makes_an_admin_and_later_ones_do_not(tmp_path: Path) -> None:
+    """A token without SILO_API_TOKEN is new at each start; the admin and the data are the same."""
+    db = Database(Settings(database_url=f"sqlite:///{tmp_path / 'x.db'}"))
+    first, second = prepare(db), prepare(db)
+    db.close()
+    assert (first.first_start, second.first_start) == (True, False)
+    assert first.username == second.username == "admin"
+    assert first.token != second.token
+    assert first.token.startswith("silo_")

@@ -1,0 +1,250 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The services' pure parts, and what both databases must do alike underneath."""
+
+from __future__ import annotations
+
+import uuid
+from contextlib import suppress
+from dataclasses import fields, replace
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from sqlalchemy import select
+
+from silo.bom.errors import RejectedError
+from silo_server.clock import stamp, utc_now, wire
+from silo_server.db.bulk import insert_rows, one_of, update_rows
+from silo_server.db.engine import Database
+from silo_server.db.tables import bom_syncs, items
+from silo_server.services.edits import check_state, edited_state
+from silo_server.services.exports import _item_numbers, plain_cell, safe_cell
+from silo_server.services.items import NewItem, create_item
+from silo_server.services.lines import state_from_json, state_to_json
+from silo_server.services.merge_request import quantity_problem, read_merge_order
+from silo_server.services.rollup import positive_number
+from silo_server.values import LineState, Role, number
+
+text = st.text(max_size=20)
+states = st.builds(
+    LineState,
+    quantity=st.floats(1e-6, 1e9),
+    source=st.sampled_from(["assembly", "manual"]),
+    rel_type=st.sampled_from(["component", "alternate", "reference"]),
+    unit=st.none() | text,
+    reference_designators=st.lists(text, max_size=3).map(tuple),
+    find_number=st.none() | text,
+    notes=st.none() | text,
+    child_revision=st.none() | st.integers(0, 9),
+    unreferenced_since=st.none() | st.just("2026-02-08T22:15:00.000000Z"),
+    override=st.booleans(),
+    cad_quantity=st.none() | st.floats(1e-6, 1e9),
+    reason=st.none() | text,
+    metadata=st.dictionaries(text, st.integers() | text, max_size=2),
+)
+
+
+@given(states)
+def test_a_state_comes_back_from_the_history_as_it_was(state: LineState) -> None:
+    """Every field survives being stored; a field that is added must too."""
+    assert state_from_json(state_to_json(state)) == state
+    assert {f.name for f in fields(LineState)} >= set(state_to_json(state))
+
+
+@given(states, st.floats(1e-3, 1e6))
+def test_a_person_s_quantity_always_ends_up_a_person_s_or_the_assembly_s_own(
+    state: LineState, quantity: float
+) -> None:
+    """After another quantity by hand a line is manual, unless it is what the assembly said."""
+    after = edited_state(state, {"quantity": quantity})
+    if quantity == state.quantity:
+        assert after == state
+    elif after.source == "assembly":
+        assert state.override
+        assert not after.override
+        assert after.cad_quantity is None
+    elif state.source == "assembly":
+        assert after.override
+        assert after.cad_quantity == state.quantity
+        assert after.unreferenced_since is None
+    kept = replace(after, quantity=0, source="", override=False, cad_quantity=None, unreferenced_since=None)
+    was = replace(state, quantity=0, source="", override=False, cad_quantity=None, unreferenced_since=None)
+    assert kept == was
+
+
+@given(states)
+def test_a_source_that_is_given_wins(state: LineState) -> None:
+    """What a client says of the owner holds, whatever the quantity does."""
+    ours = edited_state(state, {"quantity": state.quantity + 1, "source": "assembly"})
+    assert (ours.source, ours.override, ours.cad_quantity) == ("assembly", False, None)
+    theirs = edited_state(state, {"source": "manual"})
+    assert (theirs.source, theirs.unreferenced_since) == ("manual", None)
+
+
+def test_all_that_is_wrong_with_a_line_is_told_at_once() -> None:
+    """Quantity, relation, source and lengths together."""
+    bad = LineState(-1.0, "dream", "friend", unit="x" * 40)
+    with pytest.raises(RejectedError) as caught:
+        check_state(bad)
+    assert [problem.split(":")[0] for problem in caught.value.problems] == [
+        "quantity",
+        "rel_type",
+        "source",
+        "unit",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("value", "fine"),
+    [
+        (1, True),
+        (0.5, True),
+        (1000000000.0, True),
+        (1000000000.0 + 1, False),
+        (0, False),
+        (-1, False),
+        (10**400, False),
+        (True, False),
+        ("1", False),
+        (None, False),
+        (float("nan"), False),
+        (float("inf"), False),
+    ],
+)
+def test_quantities(value: Any, fine: bool) -> None:
+    """A finite number above zero, of a size that a tree can be multiplied with."""
+    assert (quantity_problem(value) is None) == fine
+
+
+@given(
+    st.recursive(
+        st.none() | st.booleans() | st.floats() | text, lambda x: st.lists(x) | st.dictionaries(text, x)
+    )
+)
+def test_no_body_breaks_the_reader(body: Any) -> None:
+    """Whatever JSON comes, it is read or refused in words."""
+    for candidate in (body, {"entries": body}, {"entries": [body], "document": body, "sync_id": body}):
+        with suppress(RejectedError):
+            order = read_merge_order(candidate, 100)
+            assert len(order.entries) + len(order.problems) >= len(candidate["entries"])
+
+
+@given(st.text(max_size=30))
+def test_a_safe_cell_is_no_formula_and_comes_back(cell: str) -> None:
+    """CSV injection: never begins like a formula; the import reads what the export was given."""
+    safe = safe_cell(cell)
+    assert not safe.startswith(("=", "+", "-", "@", "\t", "\r", "\n"))
+    if not cell.startswith("'"):
+        assert plain_cell(safe) == cell
+
+
+def test_numbers_stay_numbers_in_cells() -> None:
+    """A quantity is no text, whatever its sign."""
+    assert safe_cell(-1.5) == -1.5
+
+
+def test_item_numbers_follow_the_depth() -> None:
+    """1, 1.1, 1.2, 1.2.1, 2, 2.1."""
+    assert list(_item_numbers([1, 2, 2, 3, 1, 2])) == ["1", "1.1", "1.2", "1.2.1", "2", "2.1"]
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [
+        (1, 1.0),
+        ("0.25", 0.25),
+        (0, 0.0),
+        (-1, None),
+        ("1 kg", None),
+        (True, None),
+        (None, None),
+        (10**400, None),
+        ("nan", None),
+        ("inf", None),
+        ([], None),
+    ],
+)
+def test_a_property_is_a_number_or_missing(value: Any, expected: float | None) -> None:
+    """Never guessed: what is no plain number is missing."""
+    assert positive_number({"mass_kg": value}, "mass_kg") == expected
+
+
+def test_roles_include_the_lower_ones() -> None:
+    """viewer < editor < admin."""
+    assert [[a.covers(b) for b in Role] for a in Role] == [
+        [True, False, False],
+        [True, True, False],
+        [True, True, True],
+    ]
+
+
+def test_times_sort_as_they_read() -> None:
+    """Stored with microseconds, told in the spec's seconds."""
+    first, second = stamp(utc_now()), stamp(utc_now())
+    assert first <= second
+    assert len(first) == len("2026-02-08T22:15:00.000000Z")
+    assert wire("2026-02-08T22:15:00.123456Z") == "2026-02-08T22:15:00Z"
+    assert wire(None) is None
+    assert number(12.0) == 12
+    assert isinstance(number(12.0), int)
+    assert number(0.5) == 0.5
+
+
+def test_many_rows_go_in_and_change_in_one_statement_each(db: Database) -> None:
+    """Both databases take thousands of rows, nulls and any text, and find them by a set."""
+    with db.write() as tx:
+        create_item(tx, NewItem(part_number="X", name="x"))
+        item_id = tx.conn.scalar(select(items.c.id))
+        rows = [
+            {
+                "parent_id": item_id,
+                "sync_id": f"s{n}",
+                "request_hash": "h",
+                "answer": "Ünïcode '\" \\ {} , NULL \n" + str(n),
+                "version": n,
+                "at": "t",
+            }
+            for n in range(5000)
+        ]
+        insert_rows(tx, bom_syncs, rows)
+        insert_rows(tx, bom_syncs, [])
+        wanted = [f"s{n}" for n in range(0, 5000, 2)] + ["none", "'; DROP TABLE items; --"]
+        query = select(bom_syncs.c.sync_id, bom_syncs.c.answer)
+        found = tx.conn.execute(query.where(one_of(tx, bom_syncs.c.sync_id, wanted))).all()
+        assert len(found) == 2500
+        assert dict(found)["s42"] == rows[42]["answer"]
+        assert tx.conn.execute(query.where(one_of(tx, bom_syncs.c.sync_id, []))).all() == []
+
+
+def test_a_bulk_update_changes_only_its_rows(db: Database) -> None:
+    """By key, several columns, with nulls."""
+    with db.write() as tx:
+        for n in range(20):
+            create_item(tx, NewItem(part_number=f"X-{n}", name="x"))
+        ids = tx.conn.scalars(select(items.c.id).order_by(items.c.id)).all()
+        update_rows(
+            tx,
+            items,
+            "id",
+            [{"id": i, "name": f"n{i}", "sourcing_type": None if i % 2 else "purchased"} for i in ids[:10]],
+        )
+        update_rows(tx, items, "id", [])
+        names = {row.id: (row.name, row.sourcing_type) for row in tx.conn.execute(select(items))}
+    assert names[ids[0]] == (f"n{ids[0]}", None if ids[0] % 2 else "purchased")
+    assert names[ids[15]] == ("x", None)
+
+
+def test_a_failed_transaction_leaves_nothing(db: Database) -> None:
+    """All or nothing, the item's event and number included."""
+    name = uuid.uuid4().hex
+
+    def fail() -> None:
+        with db.write() as tx:
+            create_item(tx, NewItem(category="F01", name=name))
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fail()
+    with db.write() as tx:
+        assert create_item(tx, NewItem(category="F01", name=name))[0].part_number == "F01-0001"
