@@ -24,6 +24,7 @@ from gearbox_story import GearboxStory  # noqa: E402
 
 from silo.api.client import SiloClient  # noqa: E402
 from silo_server.run import RunningServer, running_server  # noqa: E402
+from silo_server.settings import Settings  # noqa: E402
 
 DOCS = ROOT / "docs" / "images"
 WIDE, NARROW = {"width": 1200, "height": 800}, {"width": 390, "height": 844}
@@ -61,8 +62,10 @@ def main() -> None:
 
 @contextmanager
 def _server(folder: Path) -> Iterator[tuple[RunningServer, GearboxStory]]:
+    url = f"sqlite:///{folder / 'silo.db'}"
+    settings = Settings(database_url=url, admin_username="designer")
     with (
-        running_server(f"sqlite:///{folder / 'silo.db'}", token="silo_" + "0" * 40) as server,
+        running_server(url, token="silo_" + "0" * 40, settings=settings) as server,
         SiloClient(server.base_url, server.token) as client,
     ):
         yield server, GearboxStory(folder, client)
