@@ -32,7 +32,7 @@ def bolt() -> Any:
 
 def end(link: Any) -> tuple[Any, int]:
     target = resolve_target(link)
-    return target.obj, target.count
+    return target.obj, target.instances
 
 
 # --- chains -----------------------------------------------------------------------------------------------

@@ -41,6 +41,7 @@ _MAX_NESTING = 32
 
 _COUNTABLE = COMPONENTS | {Kind.DRAFT_ARRAY}
 _REPEATABLE = _COUNTABLE | INLINE
+_WIDER = _REPEATABLE - COMPONENTS
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,9 +117,8 @@ class Reader:
         """The end of a link."""
         return resolve_target(link, self._inspect)
 
-    def no_component(self, target: Any) -> str:
-        """What the target is instead of a component."""
-        key = self.key(target)
+    def no_component(self, key: Key, target: Any) -> str:
+        """What the target is instead of a component; "" where it may be one."""
         if key not in self._not_components:
             self._not_components[key] = no_component(target)
         return self._not_components[key]
@@ -178,7 +178,8 @@ class _Reading:
         return leaves
 
     def _left_out(self, found: list[_Member]) -> set[Key]:
-        marked = [member for member in found if member[2] in _REPEATABLE and _left_out_by(member[1])]
+        """Containers and arrays that are left out, with what they hold; links are asked when followed."""
+        marked = [member for member in found if member[2] in _WIDER and _left_out_by(member[1])]
         inside: set[Key] = set()
         for key, obj, kind in marked:
             if kind in INLINE and key not in inside:
@@ -186,7 +187,7 @@ class _Reading:
         for key, obj, kind in marked:
             if key not in inside:  # what goes with its container needs no word of its own
                 self._tell_left_out(obj)
-            self._holds_components |= kind not in INLINE
+                self._holds_components |= kind not in INLINE
         return inside.union(key for key, _, _ in marked)
 
     def _tell_left_out(self, obj: Any) -> bool:
@@ -247,6 +248,9 @@ class _Reading:
         return worth
 
     def _link(self, key: Key, link: Any) -> _Worth:
+        if self._tell_left_out(link):
+            self._holds_components = True
+            return {}
         target = self._reader.resolve(link)
         if target.obj is None:
             self._holds_components = True
@@ -256,19 +260,22 @@ class _Reading:
         elif target.excluded:
             self._holds_components = True
             self._notes.excluded(link, target.obj)
-        elif self._is_here(target.obj):
-            return self._in_document(link, target)
-        elif words := self._reader.no_component(target.obj):
-            self._notes.no_component(link, target.obj, words)
         else:
-            return self._component(key, link, target)
+            return self._whole_object(key, link, target)
         return {}
 
-    def _is_here(self, obj: Any) -> bool:
+    def _whole_object(self, key: Key, link: Any, target: Target) -> _Worth:
+        name = self._key(target.obj)
         # FreeCAD makes two documents of one file that it opened by two paths; the path tells.
-        if same_document(obj.Document, self._document):
-            return True
-        return bool(self._path) and self._key(obj)[0] == self._path
+        if same_document(target.obj.Document, self._document) or (self._path and name[0] == self._path):
+            return self._in_document(link, target)
+        if words := self._reader.no_component(name, target.obj):
+            self._notes.no_component(link, target.obj, words)
+            return {}
+        if is_link(link):
+            self._links.add(key)
+        self._remarks(link, target)
+        return {name: (target.obj, target.instances)}
 
     def _in_document(self, link: Any, target: Target) -> _Worth:
         if not derived(target.obj, "App::LinkGroup"):
@@ -276,14 +283,12 @@ class _Reading:
             self._notes.in_document(link, target.obj, holds_components=bundles)
             return {}
         worth: _Worth = {}
-        _add(worth, self._worth(self._key(target.obj), target.obj, Kind.LINK_GROUP), target.count)
+        _add(worth, self._worth(self._key(target.obj), target.obj, Kind.LINK_GROUP), target.instances)
         if worth and target.mirrored:
             self._notes.mirrored(link, target.obj)
         return worth
 
-    def _component(self, key: Key, link: Any, target: Target) -> _Worth:
-        if is_link(link):
-            self._links.add(key)
+    def _remarks(self, link: Any, target: Target) -> None:
         if target.mirrored:
             self._notes.mirrored(link, target.obj)
         if target.variant:
@@ -292,4 +297,3 @@ class _Reading:
             gone, new = stale_copies(link, target.obj, self._key)
             if gone or new:
                 self._notes.stale(link, target.obj, gone, new)
-        return {self._key(target.obj): (target.obj, target.count)}

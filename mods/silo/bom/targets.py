@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from silo.bom.document import LinkProblem, derived, object_name, own, same_document
 from silo.bom.findings import FindingCode
@@ -22,12 +22,11 @@ _MAX_HOPS = 256
 _MAX_NESTING = 16
 
 
-@dataclass(frozen=True, slots=True)
-class Target:
+class Target(NamedTuple):
     """The end of a link. ``obj`` is None where ``problem`` says why.
 
-    count
-        instances: every array on the way multiplies, an element of an array is one.
+    instances
+        every array on the way multiplies, an element of an array is one.
     element
         the sub-element ("Face1") where the link is a reference to geometry, not a component.
     excluded
@@ -35,7 +34,7 @@ class Target:
     """
 
     obj: Any
-    count: int = 1
+    instances: int = 1
     mirrored: bool = False
     variant: bool = False
     excluded: bool = False
