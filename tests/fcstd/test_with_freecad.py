@@ -258,8 +258,8 @@ def test_freecad_reads_a_stamp_where_meta_was_missing(freecad: Run, tmp_path: Pa
 def test_links_by_symlinks_as_freecad(freecad: Run, tmp_path: Path) -> None:
     """Relative paths are joined as FreeCAD 0.20 and 1.0 join them: as text, from the folder as it was opened.
 
-    FreeCAD 1.1 joins them from where the owning file really lies; a link that leads to a file in that way only
-    is found by us too.
+    FreeCAD 1.1 joins them from where the owning file really lies; a link that leads to a file in that way
+    only is found by us too.
     """
     part(uuid="elsewhere").save(tmp_path / "elsewhere" / "parts" / "p.FCStd")
     part(uuid="project").save(tmp_path / "project" / "parts" / "p.FCStd")
