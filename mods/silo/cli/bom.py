@@ -38,9 +38,10 @@ def run(args: argparse.Namespace) -> int:
     if args.resolve:
         with common.client_of(args) as client:
             resolved = resolve(extraction, client)
+        unresolved = {entry.key for entry in resolved.unresolved}
         extraction = Extraction(
             resolved.assembly,
-            (*resolved.entries, *(e for e in extraction.entries if e in resolved.unresolved)),
+            (*resolved.entries, *(entry for entry in extraction.entries if entry.key in unresolved)),
             resolved.findings,
         )
     else:
