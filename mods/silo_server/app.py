@@ -10,6 +10,7 @@ from typing import Any
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 
+from silo.api.wire import MergeRequest
 from silo_server import failures
 from silo_server.clock import Clock, utc_now
 from silo_server.db.engine import Database
@@ -81,5 +82,8 @@ def _openapi(app: FastAPI) -> dict[str, Any]:
                 operation.get("responses", {}).pop("422", None)
         for name in ("HTTPValidationError", "ValidationError"):
             document.get("components", {}).get("schemas", {}).pop(name, None)
+        # The merge reads its body by itself (services.merge_request); its form is the wire model's.
+        merge = MergeRequest.model_json_schema(ref_template="#/components/schemas/{model}")
+        document["components"]["schemas"].update(merge.pop("$defs"), MergeRequest=merge)
         app.openapi_schema = document
     return app.openapi_schema

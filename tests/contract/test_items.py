@@ -207,3 +207,12 @@ def test_schemas(api: Api) -> None:
     }
     assert "mass_kg" in [field["name"] for field in form["field_groups"][0]["fields"]]
     api.bad(404, "GET", "/api/schemas/nothing")
+
+
+def test_the_list_is_in_one_order_on_both_databases(api: Api) -> None:
+    """By code point: a PostgreSQL would sort by its language else."""
+    word = uuid.uuid4().hex[:8]
+    for ending in ("b", "-a", "_c", "ä", "Z", "10", "9"):
+        api.item(f"{word}{ending}")
+    found = [item["part_number"].removeprefix(word) for item in api.get(f"/api/items?search={word}")]
+    assert found == ["-a", "10", "9", "_c", "b", "Z", "ä"]

@@ -9,7 +9,7 @@ import anyio.to_thread
 from fastapi import APIRouter, Query, Request
 from starlette.responses import Response
 
-from silo.api.wire import MergeRequest, MergeResult
+from silo.api.wire import MergeResult
 from silo.bom.errors import RejectedError
 from silo_server.routes.context import (
     READ_ERRORS,
@@ -38,7 +38,7 @@ Depth = Annotated[int, Query(ge=1, le=tree.MAX_DEPTH)]
 MERGE_BODY = {
     "requestBody": {
         "required": True,
-        "content": {"application/json": {"schema": MergeRequest.model_json_schema()}},
+        "content": {"application/json": {"schema": {"$ref": "#/components/schemas/MergeRequest"}}},
     }
 }
 

@@ -124,13 +124,11 @@ def list_items(tx: Tx, query: ItemQuery) -> tuple[list[Item], int]:
         conditions.append(items.c.item_type == query.item_type)
     if query.category:
         conditions.append(items.c.category == query.category.upper())
+    # By code point on both databases, whatever language a PostgreSQL sorts in by itself.
+    order = items.c.part_number_key.collate("C") if tx.postgres else items.c.part_number_key
     total = tx.conn.scalar(select(func.count()).select_from(items).where(*conditions)) or 0
     rows = tx.conn.execute(
-        select(items)
-        .where(*conditions)
-        .order_by(items.c.part_number_key)
-        .limit(query.limit)
-        .offset(query.offset)
+        select(items).where(*conditions).order_by(order).limit(query.limit).offset(query.offset)
     ).all()
     return [to_item(row) for row in rows], total
 
