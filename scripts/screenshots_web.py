@@ -105,7 +105,7 @@ def _shots(top: str) -> list[Shot]:
         Shot("merge", f"/items/{top}/bom", ".banner.warn"),
         Shot("edit", f"/items/{top}/bom?edit=F01-0001", "#edit"),
         Shot("history", f"/items/{top}/history"),
-        Shot("compare", f"/items/{top}/compare?old=0"),
+        Shot("compare", f"/items/{top}/compare?old=2", ".compare"),
         Shot("activity", "/activity", ".live.on"),
         Shot("import", f"/items/{top}/import"),
         Shot("account", "/account"),

@@ -75,16 +75,19 @@ def compare_page(
         first, second = sorted((first, second))
         rows = history.compare(history.state_at(tx, item, first), history.state_at(tx, item, second))
     counts = {status: sum(row.status == status for row in rows) for status in STATUSES}
-    said = {row.child.id: changes(row.before, row.after) for row in rows if row.before and row.after}
+    shown = [
+        (row, changes(row.before, row.after) if row.before and row.after else [])
+        for row in rows
+        if all or row.status != "unchanged"
+    ]
     return page(
         request,
         "compare.html",
         caller,
         item=item,
-        rows=[row for row in rows if all or row.status != "unchanged"],
+        rows=shown,
         counts=counts,
         summary=", ".join(f"{count} {status}" for status, count in counts.items() if count),
-        said=said,
         old=first,
         new=second,
         known=known,
