@@ -485,3 +485,13 @@ def test_the_order_of_sub_assemblies_does_not_matter(assemble: Fixture, compute:
     rows = "1,1,,,2.000 kg,unit\n1.1,1,,,0.900 kg,motor\n1.2,1,,,1.100 kg,case\n"
     report = compute(asm, HEAD + rows)
     assert report.total.mass == pytest.approx(2.0)
+
+
+def test_a_sub_assemblys_material_on_a_part_without_a_solid(
+    assemble: Fixture, compute: Fixture, part: Fixture, codes: Fixture
+) -> None:
+    """The row around it has a material, the part no volume: zero, and told."""
+    asm = assemble(("arm/print/a", cube("a")), ("arm/print/wires", shape_only("wires")))
+    report = compute(asm, HEAD + "1,1,,PLA,,print\n")
+    assert part(report, "wires").mass == 0
+    assert codes(report) == ["no_volume"]

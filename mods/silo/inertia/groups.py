@@ -44,7 +44,7 @@ class Groups:
     decisions: list[Decision]
     counted: NDArray[np.bool_]
     rule: MassRule
-    _made: dict[tuple[Match, Decision], Decision] = field(default_factory=dict)
+    _made: dict[tuple[Match, Decision, bool], Decision] = field(default_factory=dict)
 
     def apply(self, matches: Mapping[str, Match]) -> None:
         """Use or compare every matched row, once per placed sub-assembly. ``matches``: by product name."""
@@ -138,7 +138,7 @@ class Groups:
                 density=found.density,
                 density_source=found.where,
                 material=match.row.material,
-                notes=(*_doubt(match), *found.notes),
+                notes=(*_doubt(match), *found.notes, *(() if self.volume[index] > 0 else (_NO_VOLUME,))),
             )
             self.mass[index] = found.density * self.volume[index]
 
@@ -163,7 +163,10 @@ class Groups:
         lines = tuple(row.line for row in match.bundle.rows)
         common = {"rule": Rule.SUB_ASSEMBLY, "decided": match.decided, "lines": lines}
         new = Decision(**{**old.__dict__, **common, **changes})
-        self.decisions[index] = self._made.setdefault((match, old), new)
+        self.decisions[index] = self._made.setdefault((match, old, bool(self.volume[index] > 0)), new)
+
+
+_NO_VOLUME = Note(MassCode.NO_VOLUME, "the part has no solid to multiply a density with: counted as 0 kg")
 
 
 def _has_data(decision: Decision) -> bool:
