@@ -37,6 +37,7 @@ def run(args: argparse.Namespace) -> int:
     extraction = common.read_assembly(args.top, args.assembly)
     if args.resolve:
         with common.client_of(args) as client:
+            common.reach(client, extraction)
             resolved = resolve(extraction, client)
         unresolved = {entry.key for entry in resolved.unresolved}
         extraction = Extraction(

@@ -7,11 +7,13 @@ import argparse
 import json
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from silo.bom.errors import NotFoundError
 from silo.bom.findings import respelt_findings
+from silo.bom.identity import walk_entries
 from silo.bom.links import extract
 from silo.bom.model import Extraction
 from silo.bom.roots import choose_assembly
@@ -72,6 +74,14 @@ def read_assembly(top: str, assembly: str | None = None) -> Extraction:
         found = extract(choose_assembly(document, assembly))
         told = respelt_findings(library.notes, document.FileName)
     return replace(found, findings=(*found.findings, *told))
+
+
+def reach(client: SiloClient, extraction: Extraction) -> None:
+    """Tell a wrong address or token also where no component has an identity to ask the server about."""
+    if any(entry.silo_uuid for entry in walk_entries((extraction.assembly, *extraction.entries))):
+        return
+    with suppress(NotFoundError):  # a server that does not tell who we are has answered all the same
+        client.whoami()
 
 
 def print_json(data: Any) -> None:

@@ -36,6 +36,7 @@ def run(args: argparse.Namespace) -> int:
     """Print the comparison; with ``--check`` 1 on drift, on broken links and on unregistered components."""
     extraction = common.read_assembly(args.top, args.assembly)
     with common.client_of(args) as client:
+        common.reach(client, extraction)
         whole = resolve(extraction, client)
         chosen = list(assemblies(whole)) if args.recursive else [whole]
         lines = [server_lines(one, client) for one in chosen]

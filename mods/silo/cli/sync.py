@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from silo.batch import Options, TopResult, result_json, sync_top
-from silo.bom.errors import InputError, SiloError
+from silo.bom.errors import InputError, RemoteError, SiloError
 from silo.bom.model import Extraction
 from silo.bom_sync import Status
 from silo.cli import common
@@ -49,7 +49,7 @@ def register(commands: Commands) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Sync each file; one failure does not stop the rest. 1 where anything was left undone."""
+    """Sync each file; one failure does not stop the rest. 1 or 3 where anything was left undone."""
     tops = documents_in(args.tops)
     if not tops:
         raise InputError(f"no FreeCAD files (*.FCStd) in {', '.join(args.tops)}")
@@ -64,6 +64,8 @@ def run(args: argparse.Namespace) -> int:
         for number, (top, found) in enumerate(_extractions(args, tops), start=1):
             if len(tops) > 1 and sys.stderr.isatty():
                 print(f"[{number}/{len(tops)}] {top}", file=sys.stderr)
+            if number == 1 and isinstance(found, Extraction):
+                common.reach(client, found)
             results.append(sync_top(top, found, client, options))
             if not args.json:
                 _show(results[-1])
@@ -73,7 +75,18 @@ def run(args: argparse.Namespace) -> int:
         Path(args.report).write_text(markdown(results), encoding="utf-8")
     if args.json:
         common.print_json({"results": [result_json(result) for result in results]})
-    return 0 if all(result.fine for result in results) else 1
+    return _exit_code(results)
+
+
+def _exit_code(results: list[TopResult]) -> int:
+    """3 where nothing but the server, or the way to it, stood in the way."""
+    left = [result for result in results if not result.fine]
+    causes = [
+        cause for result in left for cause in (result.error, *(o.error for o in result.outcomes)) if cause
+    ]
+    if left and len(causes) >= len(left) and all(isinstance(cause, RemoteError) for cause in causes):
+        return 3
+    return 1 if left else 0
 
 
 def _extractions(args: argparse.Namespace, tops: list[str]) -> Iterator[tuple[str, Extraction | SiloError]]:
