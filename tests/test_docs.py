@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The documentation names what there is: commands, options, files, findings, exit codes, make targets."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from pathlib import Path
+
+import pytest
+
+from silo.bom.findings import FindingCode
+from silo.cli.main import build_parser
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = [
+    *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")),
+    *sorted((ROOT / "docs").rglob("*.md")),
+    *sorted((ROOT / "examples").rglob("*.md")),
+]
+IDS = [str(page.relative_to(ROOT)) for page in PAGES]
+# Other programs have options too; what stands behind these words is theirs.
+_OTHERS = re.compile(
+    r"^\s*(?:\$ )?(?:sudo )?(docker|podman|pip|python3?|curl|git|psql|make|freecadcmd|apt)\b"
+)
+
+
+def commands() -> dict[str, argparse.ArgumentParser]:
+    """The sub-commands of ``silo-mod``."""
+    actions = build_parser()._subparsers._group_actions  # type: ignore[union-attr]
+    return dict(actions[0].choices)  # type: ignore[arg-type]
+
+
+def told_lines(text: str) -> list[tuple[str, str]]:
+    """(command, the words behind it) of each ``silo-mod …`` in code."""
+    text = text.replace("\\\n", " ")
+    code = re.findall(r"```[^\n]*\n(.*?)```", text, re.DOTALL) + re.findall(r"`([^`\n]+)`", text)
+    lines = [line for block in code for line in block.split("\n") if not _OTHERS.match(line)]
+    found = [re.search(r"\bsilo-mod ([a-z][a-z-]*)\b([^|;#>]*)", line) for line in lines]
+    return [(match[1], match[2]) for match in found if match]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=IDS)
+def test_every_command_and_option_exists(page: Path) -> None:
+    """A line that is copied from a page is understood."""
+    known = commands()
+    for command, words in told_lines(page.read_text("utf-8")):
+        assert command in known, f"{page.name}: silo-mod {command}"
+        options = known[command]._option_string_actions
+        for option in re.findall(r"(?<![\w-])--[a-z][a-z-]*", words):
+            assert option in options, f"{page.name}: silo-mod {command} {option}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=IDS)
+def test_every_link_leads_somewhere(page: Path) -> None:
+    """Relative links and pictures point at files of the repository."""
+    for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", page.read_text("utf-8")):
+        if not re.match(r"[a-z]+:", target):
+            assert (page.parent / target).exists(), f"{page.name}: {target}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=IDS)
+def test_every_module_and_target_exists(page: Path) -> None:
+    """``silo.x.y``, ``mods/…`` and ``make x`` are there."""
+    text = page.read_text("utf-8")
+    for name in re.findall(r"`(silo(?:_server)?(?:\.[a-z_]+)+)`", text):
+        # The last word may be a name in a module.
+        homes = [name.replace(".", "/"), name.rpartition(".")[0].replace(".", "/")]
+        found = [(ROOT / "mods" / f"{home}{end}").exists() for home in homes for end in ("", ".py")]
+        assert any(found), f"{page.name}: {name}"
+    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE))
+    for target in re.findall(r"(?:^|`)make ([a-z-]+)", text, re.MULTILINE):
+        assert target in targets, f"{page.name}: make {target}"
+
+
+def test_every_command_is_in_the_readme_or_a_page() -> None:
+    """Nobody finds a command that no page names."""
+    named = {command for page in PAGES for command, _ in told_lines(page.read_text("utf-8"))}
+    assert set(commands()) <= named | {"demo"}
+
+
+def test_every_finding_is_explained() -> None:
+    """Each code that a BOM may show stands on the page about counting."""
+    page = (ROOT / "docs" / "counting.md").read_text("utf-8")
+    missing = [code for code in FindingCode if f"`{code}`" not in page and f"*{code}*" not in page]
+    assert missing == []
+
+
+def test_the_exit_codes_are_the_same_everywhere() -> None:
+    """``--help`` and the README say what ``silo.cli.main`` returns."""
+    codes = "0 done, 1 differences or something left undone, 2 bad input, 3 server, 130 cancelled"
+    assert codes in build_parser().format_help().replace("\n", " ")
+    assert codes in (ROOT / "README.md").read_text("utf-8").replace("\n", " ").replace("codes: ", "")
