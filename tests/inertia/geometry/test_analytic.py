@@ -19,6 +19,7 @@ from OCP.BRepPrimAPI import (
 )
 
 from silo.inertia.core import MassProps, combine, combine_arrays, place
+from silo.inertia.geometry import occt
 from silo.inertia.model import Assembly, GeometryCode, Prototype
 
 EXACT = 1e-9
@@ -143,6 +144,8 @@ def test_an_off_axis_assembly_is_exact(box: Any, trsf: Any, step: Any, tmp_path:
 @pytest.mark.parametrize("unit", ["M", "INCH", "CM", "FT"])
 def test_the_file_s_unit_does_not_change_the_part(unit: str, box: Any, step_part: Any, read_in: Any) -> None:
     """The same box written in metres, inches, centimetres and feet is the same box."""
+    if occt.VERSION.startswith("7.8"):
+        pytest.skip("the writer of this version names the unit without converting the numbers")
     assembly = read_in(step_part(box(10, 20, 30), unit=unit))
     assert_body(only(assembly), 6000, (5, 10, 15), box_tensor(10, 20, 30), 30)
     assert assembly.unit == {"M": "m", "INCH": "inch", "CM": "cm", "FT": "foot"}[unit]

@@ -16,7 +16,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
@@ -25,11 +25,14 @@ from silo.bom.errors import CancelledError, ConfigError, DocumentError
 from silo.inertia.geometry.options import Progress, ReadOptions
 
 POLL_SECONDS = 0.05
+_OUT_OF_MEMORY = ("MemoryError", "bad_alloc", "Cannot allocate memory", "failed to map segment")
 _WORKER = "from silo.inertia.geometry.worker import main; main()"
 
 
-def run(path: Path, options: ReadOptions, result: Path) -> None:
+def run(path: Path, options: ReadOptions, result: Path, command: Sequence[str] = ()) -> None:
     """Read ``path`` in a child process; the stored geometry is at ``result`` afterwards.
+
+    ``command`` starts another child than the usual worker, speaking like it.
 
     Raises DocumentError (bad file, crash, time or memory limit), ConfigError (kernel not installed) and
     CancelledError.
@@ -41,7 +44,7 @@ def run(path: Path, options: ReadOptions, result: Path) -> None:
         "memory_mb": options.memory_mb,
         "cpu_s": options.timeout_s,
     }
-    with tempfile.TemporaryFile() as errors, _child(errors) as process:
+    with tempfile.TemporaryFile() as errors, _child(command or [python(), "-c", _WORKER], errors) as process:
         answer = _talk(process, path, options, task)
         process.wait()
         if answer is None:
@@ -93,9 +96,9 @@ def _pump(stream: IO[bytes] | None, lines: queue.Queue[bytes | None]) -> None:
 
 
 @contextmanager
-def _child(errors: IO[bytes]) -> Iterator[subprocess.Popen[bytes]]:
+def _child(command: Sequence[str], errors: IO[bytes]) -> Iterator[subprocess.Popen[bytes]]:
     process = subprocess.Popen(
-        [python(), "-c", _WORKER],
+        command,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=errors,
@@ -136,7 +139,7 @@ def _environment() -> dict[str, str]:
 def _death(code: int, errors: IO[bytes], options: ReadOptions) -> str:
     errors.seek(0)
     words = errors.read()[-4000:].decode("utf-8", errors="replace")
-    if "MemoryError" in words or "bad_alloc" in words or "Cannot allocate memory" in words:
+    if any(sign in words for sign in _OUT_OF_MEMORY):
         return f"needs more than the {options.memory_mb} MB allowed to read it; allow more memory"
     if code < 0:
         name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"

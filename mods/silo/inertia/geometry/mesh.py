@@ -64,16 +64,23 @@ def mesh_volume(mesh: Mesh) -> float:
     from trimesh.triangles import mass_properties
 
     corners = _centred(mesh)[0][mesh.faces]
-    return float(mass_properties(corners, skip_inertia=True).volume)
+    with np.errstate(all="ignore"):  # the centre of a flat mesh is 0/0; nobody asks for it here
+        return float(mass_properties(corners, skip_inertia=True).volume)
 
 
 def mesh_solid(mesh: Mesh) -> SolidProps:
-    """Volume, centre and tensor of a closed mesh (exact for its polyhedron), the sign turned if need be."""
+    """Volume, centre and tensor of a closed mesh (exact for its polyhedron), the sign turned if need be.
+
+    A mesh without volume has its middle as centre, and no tensor.
+    """
     from trimesh.triangles import mass_properties
 
     vertices, centre = _centred(mesh)
-    moments = mass_properties(vertices[mesh.faces], density=1.0)
+    with np.errstate(all="ignore"):
+        moments = mass_properties(vertices[mesh.faces], density=1.0)
     volume = float(moments.volume)
+    if volume == 0.0 or not np.isfinite(moments.center_mass).all():
+        return SolidProps(0.0, centre, np.zeros((3, 3)))
     sign = -1.0 if volume < 0 else 1.0
     com = np.asarray(moments.center_mass, dtype=np.float64) + centre
     inertia = sign * np.asarray(moments.inertia, dtype=np.float64)

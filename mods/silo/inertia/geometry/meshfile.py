@@ -89,7 +89,8 @@ def _scene(path: Path, kind: Kind) -> MeshScene:
         ) from error
     try:
         with path.open("rb") as stream:
-            loaded = trimesh.load_scene(stream, file_type=kind.value)
+            # Unprocessed: what trimesh would mend in silence is what we have to tell.
+            loaded = trimesh.load_scene(stream, file_type=kind.value, process=False)
     except MemoryError:
         raise
     except Exception as error:

@@ -63,7 +63,7 @@ def save(assembly: Assembly, path: Path, extra: dict[str, Any] | None = None) ->
 def load(path: Path) -> tuple[Assembly, dict[str, Any]]:
     """The assembly in ``path`` and what was kept beside it. InputError where the file is not one of ours."""
     try:
-        with np.load(path, allow_pickle=False) as arrays:
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as arrays:
             return _assembly_in(arrays)
     except (OSError, ValueError, KeyError, IndexError, TypeError, EOFError, zipfile.BadZipFile) as error:
         raise InputError(f"{path}: is no stored geometry of format {FORMAT}: {error}") from error

@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What was read is kept by content, and given back only while it still holds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from silo.bom.errors import DocumentError, InputError
+from silo.inertia.geometry import Mesh, ReadOptions, read, store
+from silo.inertia.geometry.cache import Cache, default_folder, key_of
+from silo.inertia.model import Assembly, GeometryProblem, Instance, Prototype, SolidProps
+
+IMPOSSIBLE = 1
+"""[MB] of memory with which nothing can be read: what is answered then comes from the cache."""
+
+
+@pytest.fixture(name="kept")
+def _kept(tmp_path: Path) -> Any:
+    """``kept(**options)``: options with a cache folder of the test's own."""
+
+    def kept(**more: Any) -> ReadOptions:
+        return ReadOptions(cache_dir=tmp_path / "cache", **more)
+
+    return kept
+
+
+def files(folder: Path) -> list[Path]:
+    """All files below."""
+    return sorted(path for path in folder.rglob("*") if path.is_file())
+
+
+def test_the_second_reading_comes_from_the_cache(box: Any, step_part: Any, kept: Any) -> None:
+    """Equal to the first, without the kernel: with 1 MB nothing could be read."""
+    path = step_part(box(1, 2, 3), "bracket")
+    first = read(path, options=kept())
+    again = read(path, options=kept(memory_mb=IMPOSSIBLE))
+    assert again.source == str(path)
+    (one,), (two,) = first.prototypes.values(), again.prototypes.values()
+    assert one.volume_m3 == two.volume_m3
+    assert one.inertia_unit.tolist() == two.inertia_unit.tolist()
+
+
+def test_other_content_or_options_are_read_anew(box: Any, step_part: Any, kept: Any) -> None:
+    """A changed byte and a changed option each miss the cache; limits and callbacks do not."""
+    path = step_part(box(1, 2, 3))
+    read(path, options=kept())
+    with pytest.raises(DocumentError):
+        read(path, options=kept(memory_mb=IMPOSSIBLE, eps=1e-6))
+    assert read(path, options=kept(memory_mb=IMPOSSIBLE, timeout_s=5)).instances
+    path.write_bytes(path.read_bytes() + b"\n")
+    with pytest.raises(DocumentError):
+        read(path, options=kept(memory_mb=IMPOSSIBLE))
+
+
+def test_without_a_cache_nothing_is_written(box: Any, step_part: Any, tmp_path: Path) -> None:
+    """The cache can be switched off."""
+    read(step_part(box(1, 2, 3)), options=ReadOptions(cache=False, cache_dir=tmp_path / "cache"))
+    assert not (tmp_path / "cache").exists()
+
+
+def test_a_damaged_entry_counts_as_none(box: Any, step_part: Any, kept: Any, tmp_path: Path) -> None:
+    """A half-written or foreign file in the cache is overwritten by a new reading."""
+    path = step_part(box(1, 2, 3))
+    read(path, options=kept())
+    (entry,) = files(tmp_path / "cache")
+    entry.write_bytes(entry.read_bytes()[:100])
+    assert read(path, options=kept()).instances
+    assert read(path, options=kept(memory_mb=IMPOSSIBLE)).instances
+
+
+def test_no_temporary_file_is_left(box: Any, step_part: Any, kept: Any, tmp_path: Path) -> None:
+    """Entries appear whole, by renaming."""
+    read(step_part(box(1, 2, 3)), options=kept())
+    assert [path.suffix for path in files(tmp_path / "cache")] == [".npz"]
+
+
+def test_a_cache_that_cannot_be_written_is_no_error(box: Any, step_part: Any, tmp_path: Path) -> None:
+    """A file stands where the folder should be: reading works all the same."""
+    (tmp_path / "cache").write_text("in the way")
+    options = ReadOptions(cache_dir=tmp_path / "cache")
+    assert read(step_part(box(1, 2, 3)), options=options).instances
+
+
+def test_a_sibling_that_appears_or_changes_is_noticed(box: Any, step: Any, tmp_path: Path, kept: Any) -> None:
+    """A split assembly is kept with the files it was completed from, and with those it lacked."""
+    folder = tmp_path / "asm"
+    folder.mkdir()
+    document = step()
+    top = document.assembly("top")
+    document.place(top, document.part(box(3, 3, 3), "cube"), name="cube_1")
+    path = document.write(folder / "top.step", external=True)
+    (folder / "cube.stp").rename(tmp_path / "away.stp")
+
+    def volume() -> float:
+        assembly = read(path, options=kept())
+        return sum(p.volume_m3 for p in assembly.prototypes.values()) * 1e9
+
+    assert volume() == 0.0
+    (tmp_path / "away.stp").rename(folder / "cube.stp")
+    assert volume() == pytest.approx(27)
+    other = step()
+    other.part(box(4, 4, 4), "cube")
+    other.write(folder / "cube.stp")
+    assert volume() == pytest.approx(64)
+
+
+def test_the_folder_follows_the_platform(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """XDG_CACHE_HOME is honoured where it applies."""
+    monkeypatch.setattr("sys.platform", "linux")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert default_folder() == tmp_path / "silo-mod" / "geometry"
+
+
+def test_the_key_depends_on_content_name_and_options(tmp_path: Path) -> None:
+    """Unnamed parts are called after the file, so its name counts; its folder does not."""
+    one, two = tmp_path / "a" / "x.step", tmp_path / "b" / "x.step"
+    for path in (one, two):
+        path.parent.mkdir()
+        path.write_bytes(b"content")
+    same = ReadOptions().content_options()
+    assert key_of(one, same) == key_of(two, same)
+    renamed = one.rename(one.with_name("y.step"))
+    assert key_of(renamed, same) != key_of(two, same)
+    assert key_of(two, ReadOptions(mesh_check=False).content_options()) != key_of(two, same)
+
+
+def assembly() -> Assembly:
+    """One with everything in it."""
+    solid = SolidProps(2e-6, np.array([1.0, 2.0, 3.0]), np.diag([1.0, 2.0, 2.5]), reversed=True)
+    part = Prototype(
+        "k/1", "Peça ✓", (solid, solid), 4e-6, solid.com_m, solid.inertia_unit, True,
+        (GeometryProblem("name", "said"),), 7850.0, "Steel", 4.1e-6, "F01-1",
+        Mesh(np.eye(3), np.array([[0, 1, 2]])),
+    )  # fmt: skip
+    empty = Prototype("k/2", "empty", has_solid=False)
+    turn = np.eye(4)
+    turn[:3, 3] = (0.1, -0.2, 0.3)
+    return Assembly(
+        "top",
+        {part.key: part, empty.key: empty},
+        (Instance(("a", "b"), ("A", "B"), "k/1", turn), Instance(("c",), ("C",), "k/2")),
+        (GeometryProblem("units", "mm?"),),
+        "where.step",
+        "mm",
+        {("a",): turn},
+    )
+
+
+def test_a_stored_assembly_comes_back_as_it_was(tmp_path: Path) -> None:
+    """All fields, of all kinds; what is kept beside comes along."""
+    before = assembly()
+    store.save(before, tmp_path / "x.npz", {"others": {"a": "b"}})
+    after, extra = store.load(tmp_path / "x.npz")
+    assert extra == {"others": {"a": "b"}}
+    assert (after.name, after.source, after.unit) == (before.name, before.source, before.unit)
+    assert after.problems == before.problems
+    assert list(after.prototypes) == list(before.prototypes)
+    one, two = before.prototypes["k/1"], after.prototypes["k/1"]
+    for name in ("name", "volume_m3", "has_solid", "problems", "step_density", "step_material"):
+        assert getattr(one, name) == getattr(two, name)
+    assert (two.stated_volume_m3, two.part_number) == (4.1e-6, "F01-1")
+    assert [s.reversed for s in two.solids] == [True, True]
+    np.testing.assert_array_equal(two.solids[1].inertia_unit, one.solids[1].inertia_unit)
+    np.testing.assert_array_equal(two.mesh.faces, one.mesh.faces)
+    assert after.prototypes["k/2"].mesh is None
+    assert [(i.path, i.product_path, i.prototype) for i in after.instances] == [
+        (i.path, i.product_path, i.prototype) for i in before.instances
+    ]
+    np.testing.assert_array_equal(after.instances[0].transform, before.instances[0].transform)
+    np.testing.assert_array_equal(after.frames[("a",)], before.frames[("a",)])
+
+
+def test_an_assembly_without_anything_can_be_stored(tmp_path: Path) -> None:
+    """No prototypes, no instances: no error."""
+    store.save(Assembly("empty", {}, ()), tmp_path / "x.npz")
+    assert store.load(tmp_path / "x.npz")[0].instances == ()
+
+
+def test_a_pickle_in_a_stored_file_is_never_loaded(tmp_path: Path) -> None:
+    """An array of objects would run code when it is read: refused."""
+    path = tmp_path / "evil.npz"
+    np.savez(path, header=np.array([{"format": store.FORMAT}], dtype=object))
+    with pytest.raises(InputError, match="no stored geometry"):
+        store.load(path)
+    assert Cache(tmp_path).get("evil", path) is None

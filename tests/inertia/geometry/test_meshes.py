@@ -1,0 +1,269 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Mesh files: volumes where they are closed, words where they are not; and the mathematics below."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given
+from hypothesis import strategies as st
+
+from silo.bom.errors import DocumentError
+from silo.inertia.geometry.mesh import (
+    Mesh,
+    components,
+    is_inside,
+    joined,
+    mesh_solid,
+    mesh_volume,
+    simplified,
+    winding_number,
+)
+from silo.inertia.model import Assembly, GeometryCode, Prototype
+
+
+def brick(size: tuple[float, float, float] = (10, 20, 30), at: Any = (0, 0, 0)) -> Any:
+    """A closed box of trimesh, its middle at ``at``."""
+    return trimesh.creation.box(size).apply_translation(at)
+
+
+def inside_out(body: Any) -> Any:
+    """The same, its triangles looking inwards."""
+    result = body.copy()
+    result.invert()
+    return result
+
+
+def mesh_of(body: Any) -> Mesh:
+    """As our own value."""
+    return Mesh(np.array(body.vertices), np.array(body.faces))
+
+
+def only(assembly: Assembly) -> Prototype:
+    """The assembly's only prototype."""
+    (prototype,) = assembly.prototypes.values()
+    return prototype
+
+
+@pytest.mark.parametrize("suffix", ["stl", "ply", "obj"])
+def test_a_closed_mesh_is_exact_in_mm_and_says_that_it_guessed_the_unit(
+    suffix: str, tmp_path: Path, read_in: Any, codes_of: Any
+) -> None:
+    """A box of 10 x 20 x 30: volume, centre, tensor of the box in mm; the unit is told as assumed."""
+    path = tmp_path / f"part.{suffix}"
+    brick(at=(5, 10, 15)).export(path)
+    assembly = read_in(path)
+    part = only(assembly)
+    assert part.volume_m3 == pytest.approx(6e-6, rel=1e-6)
+    np.testing.assert_allclose(part.com_m, [0.005, 0.010, 0.015], atol=1e-8)
+    np.testing.assert_allclose(np.diag(part.inertia_unit) * 12 / 6e-6, [1.3e-3, 1e-3, 5e-4], rtol=1e-5)
+    assert (assembly.name, part.name) == ("part", "part")
+    assert codes_of(assembly) == [GeometryCode.UNITS]
+    assert codes_of(part) == []
+
+
+def test_an_ascii_stl_is_read_as_well(tmp_path: Path, read_in: Any) -> None:
+    """By its content, whatever its suffix says."""
+    path = tmp_path / "part.STL"
+    path.write_text(trimesh.exchange.stl.export_stl_ascii(brick()), "ascii")
+    assert only(read_in(path)).volume_m3 == pytest.approx(6e-6)
+
+
+def test_a_named_unit_is_taken_and_needs_no_word(tmp_path: Path, read_in: Any, codes_of: Any) -> None:
+    """The user says inch: 25.4 times as long, and no assumption left."""
+    path = tmp_path / "part.stl"
+    brick((1, 1, 1)).export(path)
+    assembly = read_in(path, mesh_unit="inch")
+    assert only(assembly).volume_m3 == pytest.approx(0.0254**3, rel=1e-6)
+    assert codes_of(assembly) == []
+
+
+def test_an_implausible_size_asks_for_the_unit(tmp_path: Path, read_in: Any, codes_of: Any) -> None:
+    """A part exported in metres and read in mm measures a tenth of a millimetre."""
+    path = tmp_path / "part.stl"
+    brick((0.1, 0.05, 0.02)).export(path)
+    assembly = read_in(path)
+    assert codes_of(assembly) == [GeometryCode.UNITS, GeometryCode.UNITS]
+    assert "was another unit meant" in assembly.problems[1].message
+
+
+def test_an_open_mesh_is_told(tmp_path: Path, read_in: Any, codes_of: Any) -> None:
+    """Two triangles missing: the number looks like any other, so it is marked."""
+    body = brick()
+    body.update_faces(np.arange(len(body.faces)) > 1)
+    path = tmp_path / "open.stl"
+    body.export(path)
+    part = only(read_in(path))
+    assert codes_of(part) == [GeometryCode.NOT_WATERTIGHT]
+    assert "4 free or shared edges" in part.problems[0].message
+
+
+def test_triangles_that_disagree_are_told(tmp_path: Path, read_in: Any, codes_of: Any) -> None:
+    """One triangle turned: closed, and its volume still not to be trusted."""
+    body = brick()
+    body.faces[0] = body.faces[0][::-1]
+    path = tmp_path / "winding.ply"
+    body.export(path)
+    assert codes_of(only(read_in(path))) == [GeometryCode.WINDING]
+
+
+def test_a_mesh_inside_out_is_turned(tmp_path: Path, read_in: Any, codes_of: Any) -> None:
+    """A negative volume is made positive, and said."""
+    path = tmp_path / "inverted.stl"
+    inside_out(brick()).export(path)
+    part = only(read_in(path))
+    assert part.volume_m3 == pytest.approx(6e-6)
+    assert np.linalg.eigvalsh(part.inertia_unit).min() > 0
+    assert codes_of(part) == [GeometryCode.NEGATIVE_VOLUME]
+
+
+def test_an_inner_shell_is_a_cavity_and_an_outer_one_a_body(
+    tmp_path: Path, read_in: Any, codes_of: Any
+) -> None:
+    """An inverted shell inside of another is taken off; beside it, it was exported inside out, and counts."""
+    for name, at, volume, codes in (
+        ("hollow", (0, 0, 0), 1000 - 64, []),
+        ("beside", (50, 0, 0), 1000 + 64, [GeometryCode.NEGATIVE_VOLUME]),
+    ):
+        path = tmp_path / f"{name}.stl"
+        trimesh.util.concatenate([brick((10, 10, 10)), inside_out(brick((4, 4, 4), at))]).export(path)
+        part = only(read_in(path))
+        assert part.volume_m3 * 1e9 == pytest.approx(volume)
+        assert codes_of(part) == codes
+
+
+def test_a_flat_mesh_has_no_volume(tmp_path: Path, read_in: Any, codes_of: Any) -> None:
+    """A lone triangle is a part without a solid."""
+    path = tmp_path / "flat.stl"
+    trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).export(path)
+    part = only(read_in(path))
+    assert not part.has_solid
+    assert GeometryCode.NO_SOLID in codes_of(part)
+
+
+def test_a_glb_keeps_its_tree_and_its_metres(tmp_path: Path, read_in: Any, codes_of: Any) -> None:
+    """Nodes become instances with their paths, a mesh used twice is one prototype, nothing is assumed."""
+    scene = trimesh.Scene()
+    cube = brick((0.1, 0.1, 0.1))
+    shift = trimesh.transformations.translation_matrix([0.5, 0, 0])
+    mirror = np.diag([-1.0, 1.0, 1.0, 1.0])
+    scene.graph.update("arm", "world", matrix=shift)
+    scene.add_geometry(cube, node_name="left", geom_name="cube", parent_node_name="arm", transform=shift)
+    scene.graph.update("right", "arm", matrix=mirror, geometry="cube")
+    path = tmp_path / "scene.glb"
+    scene.export(path)
+    assembly = read_in(path)
+    assert sorted(i.name for i in assembly.instances) == ["left", "right"]
+    assert len(assembly.prototypes) == 1
+    assert assembly.unit == "m"
+    assert codes_of(assembly) == []
+    by_name = {i.path[-1]: i.transform for i in assembly.instances}
+    assert by_name["left"][0, 3] == pytest.approx(1.0)
+    assert np.linalg.det(by_name["right"][:3, :3]) == pytest.approx(-1)
+
+
+@pytest.mark.parametrize("suffix", ["stl", "ply", "glb", "obj"])
+def test_damaged_meshes_are_errors(suffix: str, tmp_path: Path, read_in: Any) -> None:
+    """Cut in half: a plain sentence, of whatever the loader tripped over."""
+    path = tmp_path / f"part.{suffix}"
+    brick().export(path)
+    data = path.read_bytes()
+    path.write_bytes(data[: len(data) // 2] if suffix != "obj" else b"nothing here\n")
+    with pytest.raises(DocumentError):
+        read_in(path)
+
+
+def test_coordinates_that_are_no_numbers_are_refused(tmp_path: Path, read_in: Any) -> None:
+    """NaN would run through every sum."""
+    path = tmp_path / "nan.stl"
+    body = brick()
+    body.vertices[0] = np.nan
+    path.write_bytes(trimesh.exchange.stl.export_stl(body))
+    with pytest.raises(DocumentError, match="no numbers"):
+        read_in(path)
+
+
+def test_an_obj_does_not_reach_for_other_files(tmp_path: Path, read_in: Any) -> None:
+    """A material library that the file names is not opened, wherever it is."""
+    path = tmp_path / "part.obj"
+    text = trimesh.exchange.obj.export_obj(brick())
+    path.write_text("mtllib ../../../../etc/passwd\nusemtl x\n" + text, "ascii")
+    assert only(read_in(path)).volume_m3 == pytest.approx(6e-6)
+
+
+# --- the mathematics ---------------------------------------------------------------------------------------
+
+
+@given(
+    st.tuples(*[st.floats(0.1, 50)] * 3),
+    st.tuples(*[st.floats(-1000, 1000)] * 3),
+)
+def test_a_box_anywhere_has_its_closed_form(size: Any, at: Any) -> None:
+    """Volume and tensor do not depend on where the box is."""
+    found = mesh_solid(mesh_of(brick(size, at)))
+    x, y, z = size
+    tensor = x * y * z / 12 * np.diag([y * y + z * z, x * x + z * z, x * x + y * y])
+    assert found.volume_m3 == pytest.approx(x * y * z, rel=1e-6)
+    np.testing.assert_allclose(found.com_m, at, atol=1e-6)
+    np.testing.assert_allclose(found.inertia_unit, tensor, atol=1e-5 * tensor.max())
+
+
+def test_trimesh_agrees_on_a_scene_of_two_bodies() -> None:
+    """trimesh's own Scene is the independent witness for placing and summing."""
+    from silo.inertia.core import combine_arrays, place
+
+    one, two = trimesh.creation.icosphere(radius=0.3), brick((0.1, 0.2, 0.4))
+    turn = trimesh.transformations.rotation_matrix(0.7, [1, 2, 3], [0.1, 0, 0])
+    scene = trimesh.Scene()
+    one.density, two.density = 2700.0, 7850.0
+    scene.add_geometry(one)
+    scene.add_geometry(two, transform=turn)
+    solids = [mesh_solid(mesh_of(one)), mesh_solid(mesh_of(two))]
+    volumes, coms, units = place(
+        [s.volume_m3 for s in solids], [s.com_m for s in solids], [s.inertia_unit for s in solids],
+        [np.eye(4), turn],
+    )  # fmt: skip
+    densities = np.array([2700.0, 7850.0])
+    whole = combine_arrays(volumes * densities, coms, units * densities[:, None, None])
+    np.testing.assert_allclose(whole.com, scene.center_mass, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(whole.inertia, scene.moment_inertia, rtol=1e-9, atol=1e-9)
+
+
+def test_components_are_what_shares_no_vertex() -> None:
+    """Three boxes in one mesh are three pieces; one box is one; above the limit it stays whole."""
+    three = joined([mesh_of(brick(at=(50 * n, 0, 0))) for n in range(3)])
+    pieces = components(three, most=10)
+    assert [mesh_volume(piece) for piece in pieces] == pytest.approx([6000.0] * 3)
+    assert [len(piece.vertices) for piece in pieces] == [8, 8, 8]
+    assert len(components(mesh_of(brick()), most=10)) == 1
+    assert len(components(three, most=2)) == 1
+
+
+def test_the_winding_number_tells_inside_from_outside() -> None:
+    """1 inside, 0 outside, -1 inside of an inverted mesh."""
+    body, turned = mesh_of(brick()), mesh_of(inside_out(brick()))
+    assert winding_number(body, np.array([1.0, 2.0, 3.0])) == pytest.approx(1)
+    assert winding_number(body, np.array([9.0, 2.0, 3.0])) == pytest.approx(0, abs=1e-9)
+    assert winding_number(turned, np.array([1.0, 2.0, 3.0])) == pytest.approx(-1)
+    assert is_inside(mesh_of(brick((1, 1, 1))), body)
+    assert not is_inside(body, mesh_of(brick((1, 1, 1))))
+
+
+def test_a_mesh_for_a_picture_is_small_and_looks_alike() -> None:
+    """Simplifying keeps the box and drops triangles; what is small already is left alone."""
+    ball = mesh_of(trimesh.creation.icosphere(subdivisions=6))
+    small = simplified(ball, 5_000)
+    assert 500 < len(small) <= 5_000
+    np.testing.assert_allclose(small.extents, ball.extents, rtol=0.05)
+    assert simplified(small, 5_000) is small
+
+
+def test_an_empty_mesh_has_no_volume_and_no_size() -> None:
+    """Nothing in, nothing out."""
+    empty = joined([])
+    assert mesh_volume(empty) == 0.0
+    assert empty.extents.tolist() == [0, 0, 0]
