@@ -6,6 +6,7 @@ from __future__ import annotations
 import gc
 import ipaddress
 import multiprocessing
+import multiprocessing.connection
 import os
 import signal
 import socket
@@ -120,7 +121,8 @@ def serve(
     login_url = f"{base_url}/login/link/{welcome.login_secret}"
     database = _without_password(settings)
     greeting = Greeting(base_url, welcome.token, login_url, database, not is_loopback(host))
-    with sock:
+    # uvicorn passes Ctrl-C on when it has ended in good order; to the person that is no error.
+    with sock, suppress(KeyboardInterrupt):
         if workers == 1:
             _work(settings, sock, lambda: tell(greeting))
         else:
@@ -216,7 +218,18 @@ def _work(settings: Settings, sock: socket.socket, on_up: Callable[[], None] | N
     gc.freeze()
     gc.set_threshold(50_000, 20, 100)
     _allow_many_connections()
-    SiloServer(_config(create_app(settings)), on_up or (lambda: None)).run(sockets=[sock])
+    server = SiloServer(_config(create_app(settings)), on_up or (lambda: None))
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        # A parent that was killed cannot tell its workers; they must not serve on without it.
+        watch = threading.Thread(target=_end_with, args=(parent.sentinel, server), daemon=True)
+        watch.start()
+    server.run(sockets=[sock])
+
+
+def _end_with(sentinel: int, server: SiloServer) -> None:
+    multiprocessing.connection.wait([sentinel])
+    server.should_exit = True
 
 
 def _allow_many_connections() -> None:

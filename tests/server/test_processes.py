@@ -14,7 +14,7 @@ from silo.bom.errors import ConfigError
 from silo_server.__main__ import main
 from silo_server.run import is_loopback, running_server, serve
 from silo_server.settings import Settings
-from silo_server.testing import Api, Databases, ServerProcess
+from silo_server.testing import Api, Databases, ServerProcess, wait_until
 
 TOKEN = "silo_several"
 
@@ -94,8 +94,30 @@ def test_worker_processes_share_a_socket_and_events_cross(databases: Databases, 
         assert server.stop() == 0
 
 
-def test_a_server_ends_when_it_is_asked_to_though_somebody_listens(tmp_path: Path) -> None:
-    """SIGTERM with open event streams: they are ended, the exit is clean."""
+@pytest.mark.slow
+def test_workers_end_with_their_parent(tmp_path: Path) -> None:
+    """A parent that was killed leaves no workers behind that serve on."""
+    server = ServerProcess(f"sqlite:///{tmp_path / 'x.db'}", tmp_path, TOKEN, workers=2)
+    with Api(server.base_url, TOKEN) as api:
+        api.item()
+        server.kill()
+
+        def gone() -> bool:
+            api.forget_connection()
+            try:
+                api.call("GET", "/health")
+            except OSError:
+                return True
+            return False
+
+        wait_until(gone, "the end of the workers")
+
+
+@pytest.mark.parametrize("by", [signal.SIGTERM, signal.SIGINT])
+def test_a_server_ends_when_it_is_asked_to_though_somebody_listens(
+    tmp_path: Path, by: signal.Signals
+) -> None:
+    """SIGTERM or Ctrl-C with open event streams: they are ended, the exit is clean."""
     with (
         ServerProcess(f"sqlite:///{tmp_path / 'x.db'}", tmp_path, TOKEN) as server,
         Api(server.base_url, TOKEN) as api,
@@ -103,10 +125,10 @@ def test_a_server_ends_when_it_is_asked_to_though_somebody_listens(tmp_path: Pat
     ):
         api.item()
         events.next("item.created")
-        code = server.stop()
+        code = server.stop(by)
         with pytest.raises(AssertionError, match="the stream ended"):
             events.next("never")
-    assert code in (0, -signal.SIGTERM)
+    assert code in ((0, -signal.SIGTERM) if by == signal.SIGTERM else (0,))
 
 
 def test_two_servers_may_start_at_once(url: str, tmp_path: Path) -> None:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -42,10 +43,10 @@ class ServerProcess:
         self._process.kill()
         self._end()
 
-    def stop(self) -> int:
-        """Ask it to end, and wait; its exit code."""
+    def stop(self, by: signal.Signals = signal.SIGTERM) -> int:
+        """Ask it to end (SIGINT is Ctrl-C), and wait; its exit code."""
         if self._process.poll() is None:
-            self._process.terminate()
+            self._process.send_signal(by)
         return self._end()
 
     def _end(self) -> int:
