@@ -265,6 +265,18 @@ def test_what_lies_in_something_left_out_is_left_out(
     assert [finding.where[0].obj for finding in found.findings] == ["C"]
 
 
+@pytest.mark.parametrize("outer_first", [True, False])
+def test_what_goes_with_its_container_needs_no_word_of_its_own(
+    top: Doc, bolt: Any, outer_first: bool
+) -> None:
+    """A suppressed link in a suppressed folder in another one, all in the assembly's Group: one finding."""
+    link = top.link("L1", bolt, Suppressed=True)
+    inner = top.folder("Inner", link, Suppressed=True)
+    members = [top.folder("Outer", inner, Suppressed=True), inner, link]
+    found = extract(top.assembly(*(members if outer_first else reversed(members))))
+    assert [finding.where[0].obj for finding in found.findings_of(FindingCode.SUPPRESSED)] == ["Outer"]
+
+
 def test_a_link_to_an_excluded_group_brings_nothing(top: Doc, bolt: Any) -> None:
     """The target's own mark counts for groups as well."""
     bundle = top.link_group("Bundle", top.link("L1", bolt), SiloBomExclude=True)
