@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Every other page in a browser: items, item, history, import, activity, account, users, audit, login."""
+"""Every other page about items in a browser: items, item, history, import, activity, errors."""
 
 from __future__ import annotations
 
@@ -253,117 +253,6 @@ def test_activity_comes_back_after_it_was_turned_away(api: Api, visit: Visit) ->
     item = api.item(name="made while nobody listened")
     expect(page.locator("#state")).to_contain_text("Live")
     expect(page.locator("#entries > li").first).to_contain_text(item)
-
-
-# --- account, users, audit ----------------------------------------------------------------------------------
-
-
-def test_a_token_is_shown_once_works_and_is_revoked(api: Api, visit: Visit) -> None:
-    """Make one, use it, see that it is not shown again, revoke it."""
-    page = visit("viewer")
-    page.goto("/account")
-    page.get_by_label("Name of a new token").fill("laptop")
-    page.get_by_role("button", name="Make token").click()
-    secret = page.get_by_label("The token").input_value()
-    assert api.as_(secret).get("/api/auth/me")["username"] == "viewer"
-    page.goto("/account")
-    assert secret not in page.content()
-    page.get_by_role("button", name="Revoke laptop").click()
-    expect(page.locator(".notice")).to_contain_text("revoked")
-    assert api.as_(secret).call("GET", "/api/auth/me").status == 401
-
-
-def test_users_roles_and_login_links(api: Api, visit: Visit) -> None:
-    """A new user comes in by a link, becomes an editor, sets a password, and is locked out."""
-    page = visit("admin")
-    page.goto("/users")
-    page.get_by_label("User name").fill("newcomer")
-    page.get_by_label("Full name").fill("New <b>Comer</b>")
-    page.get_by_role("button", name="Make user").click()
-    expect(row(page, "newcomer")).to_contain_text("New <b>Comer</b>")
-    page.get_by_role("button", name="Login link for newcomer").click()
-    link = page.get_by_label("The login link").input_value()
-    other = visit(None)
-    other.goto(link)
-    expect(other.locator(".who")).to_contain_text("viewer")
-    page.get_by_label("Role of newcomer").select_option("editor")
-    page.get_by_role("button", name="Save newcomer").click()
-    expect(page.locator(".notice")).to_contain_text("newcomer is changed")
-    other.goto("/account")
-    expect(other.locator(".who")).to_contain_text("editor")
-    other.get_by_label("New password").fill("correct horse battery")
-    other.get_by_label("Once more").fill("correct horse battery")
-    other.get_by_role("button", name="Set password").click()
-    other.get_by_label("User name").fill("newcomer")
-    other.get_by_label("Password").fill("correct horse battery")
-    other.get_by_role("button", name="Log in").click()
-    expect(other.locator(".who")).to_contain_text("New <b>Comer</b>")
-    page.get_by_label("Access of newcomer").select_option("no")
-    page.get_by_role("button", name="Save newcomer").click()
-    expect(page.locator(".notice")).to_contain_text("newcomer is changed")
-    other.goto("/items")
-    expect(other.get_by_role("heading", level=1)).to_have_text("Log in")
-    page.get_by_role("link", name="Audit").click()
-    expect(page.locator("tbody")).to_contain_text("user.created")
-    expect(page.locator("tbody")).to_contain_text("login.link")
-
-
-def test_the_last_admin_stays(visit: Visit) -> None:
-    """Nobody locks everybody out; the page says why."""
-    page = visit("admin")
-    page.goto("/users")
-    page.get_by_label("Role of admin").select_option("viewer")
-    page.get_by_role("button", name="Save admin").click()
-    expect(page.get_by_role("alert")).to_contain_text("last admin")
-
-
-def test_read_only_and_back(machine: dict[str, str], visit: Visit) -> None:
-    """The server takes no changes: a decision is answered in plain words; then it takes them again."""
-    admin, editor = visit("admin"), visit("editor")
-    admin.goto("/users")
-    admin.get_by_role("button", name="Take none for now").click()
-    expect(admin.locator("#mode + form")).to_contain_text("takes no changes at the moment")
-    editor.goto(f"/items/{machine['machine']}/bom?edit={machine['plate']}")
-    editor.get_by_role("button", name="Remove from BOM").click()
-    expect(editor.get_by_role("alert")).to_contain_text("read-only at the moment")
-    admin.get_by_role("button", name="Take changes again").click()
-    expect(admin.locator(".notice")).to_contain_text("takes changes")
-
-
-# --- getting in and out -------------------------------------------------------------------------------------
-
-
-def test_login_leads_where_one_wanted_to_go(machine: dict[str, str], visit: Visit) -> None:
-    """Not logged in: the login page, and from there on to the page that was asked for; then out again."""
-    path = f"/items/{machine['machine']}?view=flat"
-    page = visit(None)
-    page.goto(path)
-    expect(page.get_by_role("heading", level=1)).to_have_text("Log in")
-    page.get_by_label("User name").fill("admin")
-    page.get_by_label("Password").fill("not the password")
-    page.get_by_role("button", name="Log in").click()
-    expect(page.get_by_role("alert")).to_contain_text("user name or password is wrong")
-    assert page.locator('input[name="next"]').input_value() == path
-    inside = visit("viewer")
-    inside.goto(path)
-    inside.get_by_role("button", name="Log out").click()
-    expect(inside.get_by_role("heading", level=1)).to_have_text("Log in")
-    inside.goto(path)
-    expect(inside.get_by_role("heading", level=1)).to_have_text("Log in")
-
-
-def test_the_keyboard_is_enough(visit: Visit) -> None:
-    """The first Tab offers to skip to the content, and every stop on the way shows where one is."""
-    page = visit("viewer")
-    page.goto("/items")
-    page.keyboard.press("Tab")
-    skip = page.get_by_role("link", name="Skip to content")
-    expect(skip).to_be_focused()
-    expect(skip).to_be_in_viewport()
-    page.keyboard.press("Enter")
-    page.keyboard.press("Tab")
-    expect(page.get_by_label("Search")).to_be_focused()
-    assert page.get_by_label("Search").evaluate("e => getComputedStyle(e).outlineStyle") == "solid"
 
 
 HOSTILE = "<img src=x onerror=alert(1)>\"'&lt;{{7*7}}\u202e</td></script>"

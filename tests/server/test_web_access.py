@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Who may see and send what on the pages: every page × every role, form secrets, login and log-out."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from urllib.parse import unquote, urlencode
+
+import pytest
+from fastapi.routing import APIRoute
+from web_visitor import FORM, HTML, ROLES, Visitor, enter, visitors_of
+
+from silo_server.run import RunningServer, running_server
+from silo_server.testing import Api
+from silo_server.web.pages import ROUTERS
+
+TOKEN = "silo_pages"
+VIEWER, EDITOR, ADMIN = ROLES
+PUBLIC = "public"
+
+TABLE = {
+    ("GET", "/login"): PUBLIC,
+    ("POST", "/login"): PUBLIC,
+    ("GET", "/login/link/{secret}"): PUBLIC,
+    ("POST", "/logout"): VIEWER,
+    ("GET", "/"): VIEWER,
+    ("GET", "/items"): VIEWER,
+    ("GET", "/items/{part_number}"): VIEWER,
+    ("GET", "/items/{part_number}/bom"): VIEWER,
+    ("GET", "/items/{part_number}/history"): VIEWER,
+    ("GET", "/items/{part_number}/compare"): VIEWER,
+    ("GET", "/activity"): VIEWER,
+    ("GET", "/account"): VIEWER,
+    ("POST", "/account/tokens"): VIEWER,
+    ("POST", "/account/tokens/{token_id}/revoke"): VIEWER,
+    ("POST", "/account/password"): VIEWER,
+    ("POST", "/items/{part_number}/bom/decide"): EDITOR,
+    ("POST", "/items/{part_number}/bom/undo"): EDITOR,
+    ("POST", "/items/{part_number}/bom/lines"): EDITOR,
+    ("POST", "/items/{part_number}/bom/lines/{child}"): EDITOR,
+    ("POST", "/items/{part_number}/bom/lines/{child}/remove"): EDITOR,
+    ("POST", "/items/{part_number}/restore"): EDITOR,
+    ("GET", "/items/{part_number}/import"): EDITOR,
+    ("POST", "/items/{part_number}/import/check"): EDITOR,
+    ("POST", "/items/{part_number}/import"): EDITOR,
+    ("GET", "/users"): ADMIN,
+    ("POST", "/users"): ADMIN,
+    ("POST", "/users/{username}"): ADMIN,
+    ("POST", "/users/{username}/login-link"): ADMIN,
+    ("POST", "/mode"): ADMIN,
+    ("GET", "/audit"): ADMIN,
+}
+CHANGING = [path for (method, path), role in TABLE.items() if method == "POST" and role != PUBLIC]
+
+
+def fill(path: str) -> str:
+    """The path of something that does not exist, so that nothing is harmed."""
+    return re.sub(r"{(\w+)}", lambda found: "999999" if found[1] == "token_id" else "NO-SUCH", path)
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningServer]:
+    """A server over an empty database."""
+    folder = tmp_path_factory.mktemp("pages")
+    with running_server(f"sqlite:///{folder / 'silo.db'}", token=TOKEN) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def api(server: RunningServer) -> Iterator[Api]:
+    """The admin's token."""
+    with Api(server.base_url, TOKEN) as caller:
+        yield caller
+
+
+@pytest.fixture(scope="module")
+def visitors(api: Api) -> dict[str, Visitor]:
+    """A session per role."""
+    return visitors_of(api)
+
+
+# --- who may ------------------------------------------------------------------------------------------------
+
+
+def test_the_table_knows_every_page() -> None:
+    """A new page is added here with its role, or this fails; and none is in the API's document."""
+    routes = [route for router in ROUTERS for route in router.routes if isinstance(route, APIRoute)]
+    assert {(method, route.path) for route in routes for method in route.methods} == set(TABLE)
+    assert not any(route.include_in_schema for route in routes)
+
+
+@pytest.mark.parametrize(("method", "path"), [key for key, role in TABLE.items() if role != PUBLIC])
+def test_a_page_lets_in_who_may(visitors: dict[str, Visitor], api: Api, method: str, path: str) -> None:
+    """Nobody is led to the login page, who may not gets a page that says so, who may gets in."""
+    if path == "/logout":  # its own test
+        return
+    stranger = api.as_(None).call(method, fill(path), headers=HTML)
+    assert stranger.status == 303
+    assert stranger.headers["location"].startswith("/login?next=")
+    needed = ROLES.index(TABLE[(method, path)])
+    for role in ROLES:
+        visitor = visitors[role]
+        # "password" and "mode" without fields are refused by their content, so nothing is harmed.
+        answer = visitor.get(fill(path)) if method == "GET" else visitor.post(fill(path))
+        assert (answer.status == 403) == (ROLES.index(role) < needed), (role, answer.status, answer.body)
+        assert answer.status < 500
+        if answer.status == 403:
+            assert f"this needs {TABLE[(method, path)]}" in answer.body.decode()
+
+
+@pytest.mark.parametrize("path", CHANGING)
+@pytest.mark.parametrize("csrf", ["", "wrong", "ü"])
+def test_every_form_needs_its_secret(visitors: dict[str, Visitor], path: str, csrf: str) -> None:
+    """403 with a page in words for each form without the session's own secret, whoever sends it."""
+    answer = visitors[ADMIN].post(fill(path), csrf=csrf)
+    assert answer.status == 403
+    assert "load the page again" in answer.body.decode()
+
+
+def test_a_login_form_from_another_site_is_refused(api: Api) -> None:
+    """Nobody is logged in under a stranger's name by a page elsewhere."""
+    body = urlencode({"username": "admin", "password": "whatever it is"}).encode()
+    for headers in ({"Sec-Fetch-Site": "cross-site"}, {"Origin": "https://elsewhere.example"}):
+        answer = api.as_(None).call("POST", "/login", body=body, headers={**FORM, **HTML, **headers})
+        assert answer.status == 403
+    answer = api.as_(None).call(
+        "POST", "/login", body=body, headers={**FORM, **HTML, "Sec-Fetch-Site": "same-origin"}
+    )
+    assert answer.status == 401
+
+
+def test_logging_out_ends_the_session(api: Api) -> None:
+    """Afterwards the cookie is worth nothing."""
+    visitor = enter(api, VIEWER)
+    assert visitor.get("/items").status == 200
+    answer = visitor.post("/logout")
+    assert (answer.status, answer.headers["location"]) == (303, "/login")
+    assert visitor.get("/items").status == 303
+
+
+def test_the_way_back_after_a_login(api: Api) -> None:
+    """The login page knows the whole address; after a lost form it is the page that the form was on."""
+    browser = api.as_(None)
+    asked = browser.call("GET", "/items?q=a+b&type=part", headers=HTML)
+    assert unquote(asked.headers["location"]) == "/login?next=/items?q=a+b&type=part"
+    host = api.base_url.removeprefix("http://")
+    sent = browser.call(
+        "POST", "/items/X/bom/decide", body=b"", headers={**HTML, "Referer": f"http://{host}/items/X/bom"}
+    )
+    assert unquote(sent.headers["location"]) == "/login?next=/items/X/bom"
+    foreign = browser.call("POST", "/mode", body=b"", headers={**HTML, "Referer": "https://elsewhere/x"})
+    assert unquote(foreign.headers["location"]) == "/login?next=/"
+
+
+def test_a_used_link_leads_on_where_the_session_lives(api: Api) -> None:
+    """Opening the same link twice in the browser that it let in is no error."""
+    browser = api.as_(None)
+    path = api.good("POST", f"/api/users/{ADMIN}/login-link")["path"] + "?next=/activity"
+    cookie = browser.call("GET", path).headers["set-cookie"].split(";")[0]
+    again = browser.call("GET", path, headers={"Cookie": cookie})
+    assert (again.status, again.headers["location"]) == (303, "/activity")

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Somebody at the web pages, without a browser: a session, its form secret, and what a browser would send."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from urllib.parse import urlencode
+
+from silo_server.testing import Answer, Api
+
+HTML = {"Accept": "text/html,application/xhtml+xml"}
+FORM = {"Content-Type": "application/x-www-form-urlencoded"}
+ROLES = ("viewer", "editor", "admin")
+
+
+@dataclass(frozen=True)
+class Visitor:
+    """Somebody with a session: the cookie, and the secret for forms."""
+
+    api: Api
+    cookie: str
+    csrf: str
+
+    def get(self, path: str, **headers: str) -> Answer:
+        """A page."""
+        return self.api.call("GET", path, headers={"Cookie": self.cookie, **HTML, **headers})
+
+    def post(self, path: str, *, csrf: str | None = None, **fields: str) -> Answer:
+        """A form, with the secret unless another is given."""
+        sent = urlencode({"csrf_token": self.csrf if csrf is None else csrf, **fields}).encode()
+        return self.api.call("POST", path, body=sent, headers={"Cookie": self.cookie, **HTML, **FORM})
+
+
+def enter(api: Api, username: str) -> Visitor:
+    """A new session by a login link."""
+    browser = api.as_(None)
+    path = api.good("POST", f"/api/users/{username}/login-link")["path"]
+    cookie = browser.call("GET", path).headers["set-cookie"].split(";")[0]
+    page = browser.call("GET", "/account", headers={"Cookie": cookie}).body.decode()
+    found = re.search(r'name="csrf_token" value="([^"]+)"', page)
+    assert found is not None
+    return Visitor(browser, cookie, found[1])
+
+
+def visitors_of(api: Api) -> dict[str, Visitor]:
+    """A session per role."""
+    for role in ROLES[:2]:
+        api.good("POST", "/api/users", {"username": role, "role": role})
+    return {role: enter(api, role) for role in ROLES}
