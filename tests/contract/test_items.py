@@ -181,6 +181,22 @@ def test_texts_that_no_database_takes_are_refused_or_kept(api: Api) -> None:
     assert (item["name"], item["description"], item["properties"]) == (text, text, {"note": text})
 
 
+@pytest.mark.parametrize(
+    "body",
+    [
+        b'{"part_number": "N-3", "name": "x", "properties": {"mass_kg": NaN}}',
+        b'{"part_number": "N-3", "name": "x", "properties": {"mass_kg": 1e999}}',
+        b'{"part_number": "N-3", "name": "x", "properties": ' + b'{"a":' * 5000 + b"1" + b"}" * 5001,
+        b"[" * 100_000,
+    ],
+    ids=["nan", "infinity", "deep", "endless"],
+)
+def test_hostile_json_is_refused(api: Api, body: bytes) -> None:
+    """What is no JSON, or would break whoever reads it back, is 400, here and in merges."""
+    api.bad(400, "POST", "/api/items", body=body, headers=JSON)
+    api.bad(400, "POST", bom(api.item(), "merge"), body=body, headers=JSON)
+
+
 JSON = {"Content-Type": "application/json"}
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
@@ -17,7 +18,18 @@ def _no_nul(text: str) -> str:
 
 Text = Annotated[str, StringConstraints(max_length=10_000), AfterValidator(_no_nul)]
 Short = Annotated[str, StringConstraints(max_length=200), AfterValidator(_no_nul)]
-Properties = dict[Short, Any]
+
+
+def _json_numbers(value: dict[str, Any]) -> dict[str, Any]:
+    # Python reads NaN and Infinity where JSON has none; whoever reads them back could not.
+    try:
+        json.dumps(value, allow_nan=False)
+    except (ValueError, RecursionError):
+        raise ValueError("wanted JSON values, got NaN, Infinity or too deep a nesting") from None
+    return value
+
+
+Properties = Annotated[dict[Short, Any], AfterValidator(_json_numbers)]
 
 
 class Body(BaseModel):

@@ -136,11 +136,11 @@ def _begin(tx: Tx, user_id: int, username: str) -> NewSession:
 def _check_rate(tx: Tx, username: str, address: str) -> None:
     window = tx.settings.login_window_seconds
     since = stamp(tx.at - timedelta(seconds=window))
-    # One name from anywhere, and one address with whatever names: both are held back, the latter later.
-    limits = (
-        (login_failures.c.username_key == username.casefold()[:64], tx.settings.login_failures),
-        (login_failures.c.address == address[:64], tx.settings.login_failures * 4),
-    )
+    name, allowed = username.casefold()[:64], tx.settings.login_failures
+    by_name, by_address = login_failures.c.username_key == name, login_failures.c.address == address[:64]
+    # One name from one address is held back soon; one address with many names later; one name from many
+    # addresses last, because that lets a stranger keep somebody out.
+    limits = ((by_name & by_address, allowed), (by_address, allowed * 4), (by_name, allowed * 20))
     for condition, limit in limits:
         count, oldest = tx.conn.execute(
             select(func.count(), func.min(login_failures.c.at)).where(condition, login_failures.c.at > since)
