@@ -11,10 +11,13 @@ import os
 import uuid
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any
 
 from silo.api.wire import SourceDocument
+from silo.bom.diff import diff_findings
 from silo.bom.errors import SiloError
+from silo.bom.findings import Finding
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.report import base_of, diff_json, entry_json, finding_json, relative
 from silo.bom_sync import Outcome, Resolved, Status, SyncApi, blocking, resolve, sync, sync_tree
@@ -57,6 +60,16 @@ class TopResult:
     @property
     def fine(self) -> bool:
         return self.error is None and all(outcome.status in _FINE for outcome in self.outcomes)
+
+
+def findings_of(result: TopResult) -> tuple[Finding, ...]:
+    """Everything worth telling of one file: of the walk, and of each comparison with the server."""
+    compared = (
+        diff_findings(outcome.plan.diff, outcome.assembly)
+        for outcome in result.outcomes
+        if outcome.plan is not None
+    )
+    return (*(result.whole.findings if result.whole is not None else ()), *chain.from_iterable(compared))
 
 
 def sync_top(top: str, found: Extraction | SiloError, api: SyncApi, options: Options) -> TopResult:
@@ -117,7 +130,7 @@ def result_json(result: TopResult) -> dict[str, Any]:
     data["assemblies"] = [outcome_json(outcome, result.base) for outcome in result.outcomes]
     if result.whole is not None:
         data["unregistered"] = [entry_json(entry, result.base) for entry in result.whole.unresolved]
-        data["findings"] = [finding_json(finding, result.base) for finding in result.whole.findings]
+        data["findings"] = [finding_json(finding, result.base) for finding in findings_of(result)]
     return data
 
 

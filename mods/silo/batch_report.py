@@ -4,14 +4,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
+from silo.batch import TopResult, findings_of
 from silo.bom.findings import Severity
 from silo.bom.report import shorten
 from silo.bom_sync import Status
-
-if TYPE_CHECKING:
-    from silo.batch import TopResult
 
 
 def cell(text: str) -> str:
@@ -62,8 +59,7 @@ def _rows(result: TopResult) -> list[str]:
 def _attention(results: Sequence[TopResult]) -> list[str]:
     lines: list[str] = []
     for result in results:
-        findings = result.whole.findings if result.whole is not None else ()
-        told = [f for f in findings if f.severity is not Severity.INFO]
+        told = [f for f in findings_of(result) if f.severity is not Severity.INFO]
         if told:
             lines += ["", f"## {cell(result.top)}", ""]
             lines += [f"- **{f.severity.value}**: {cell(shorten(f.message, result.base))}" for f in told]

@@ -7,7 +7,7 @@ import argparse
 from itertools import chain
 from typing import Any
 
-from silo.bom.diff import diff_bom
+from silo.bom.diff import diff_bom, diff_findings
 from silo.bom.model import BomDiff
 from silo.bom.naming import display_name
 from silo.bom.report import base_of, diff_json, finding_json, relative
@@ -47,7 +47,8 @@ def run(args: argparse.Namespace) -> int:
     )
     if args.json:
         data = [{**_head(one, base), "diff": diff_json(diff)} for one, diff in compared]
-        findings = [finding_json(f, base) for f in whole.findings]
+        told = chain(whole.findings, *(diff_findings(diff, one.assembly) for one, diff in compared))
+        findings = [finding_json(finding, base) for finding in told]
         common.print_json({"drift": drifted, "assemblies": data, "findings": findings})
     else:
         _show(whole, compared, names_of(whole, chain.from_iterable(lines)), base)
