@@ -73,14 +73,27 @@ def text_mask(text: str, height: float, pen: float = _PEN) -> Floats:
     return mask
 
 
+def fitted(text: str, height: float, room: float) -> str:
+    """The text, cut with "…" where it is wider than ``room`` pixels."""
+    text = unicodedata.normalize("NFC", text)
+    dots = _glyph("…", round(height, 2), _PEN).shape[1]
+    width, fitting = round(height / 6), 0
+    for count, letter in enumerate(_plain(text), start=1):
+        width += _glyph(letter, round(height, 2), _PEN).shape[1]
+        if width > room:
+            return text[:fitting] + "…"
+        if width + dots <= room:
+            fitting = count
+    return text
+
+
 def _plain(text: str) -> str:
     known = []
     for letter in unicodedata.normalize("NFC", text):
         if letter in _STROKES or letter.isspace():
             known.append(" " if letter.isspace() else letter)
         else:
-            bare = unicodedata.normalize("NFKD", letter)[0]
-            known.append(bare)
+            known.append(unicodedata.normalize("NFKD", letter)[0])
     return "".join(known)
 
 

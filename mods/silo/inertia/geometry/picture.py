@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from silo.inertia.geometry.glb import scene_corners
-from silo.inertia.geometry.lettering import text_mask
+from silo.inertia.geometry.lettering import fitted, text_mask
 from silo.inertia.geometry.mesh import Floats, simplified
 from silo.inertia.geometry.png import write_png
 from silo.inertia.geometry.raster import Canvas
@@ -329,15 +329,6 @@ def _legend(
 def _swatch(page: Floats, left: float, top: float, colour: Colour) -> None:
     rows, columns = slice(round(top), round(top) + 16), slice(round(left), round(left) + 18)
     page[rows, columns] = colour
-
-
-def fitted(text: str, size: float, room: float) -> str:
-    """The text, cut with "…" where it is wider than ``room`` pixels."""
-    if text_mask(text, size).shape[1] <= room:
-        return text
-    while text and text_mask(text + "…", size).shape[1] > room:
-        text = text[:-1]
-    return text + "…"
 
 
 def mass_words(mass: float) -> str:

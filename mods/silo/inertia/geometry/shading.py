@@ -12,6 +12,9 @@ from silo.inertia.geometry.mesh import Floats, Indices, Mesh
 CREASE = np.cos(np.radians(38.0))
 """Faces that meet at more than this angle keep their edge."""
 
+MAX_DEGREE = 100
+"""Triangles at one vertex up to which normals are smoothed; the tip of a fan looks well enough flat."""
+
 
 @dataclass(frozen=True, eq=False)
 class Shaded:
@@ -27,22 +30,35 @@ def shaded(mesh: Mesh) -> Shaded:
     if not len(mesh):
         return Shaded(mesh.vertices, np.zeros_like(mesh.vertices), mesh.faces)
     place = np.unique(mesh.vertices, axis=0, return_inverse=True)[1].reshape(-1)
-    corners = place[mesh.faces]
     a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
-    areas = np.cross(b - a, c - a)
-    flat = _unit(areas)
-    summed = np.zeros((int(place.max()) + 1, 3))
-    for column in range(3):
-        np.add.at(summed, corners[:, column], areas)
-    smooth = _unit(summed)[corners]
-    agrees = np.einsum("nij,nj->ni", smooth, flat) > CREASE
-    normals = np.where(agrees[:, :, None], smooth, flat[:, None, :]).reshape(-1, 3)
+    normals = _smoothed(place[mesh.faces].reshape(-1), np.cross(b - a, c - a))
     points = mesh.vertices[mesh.faces].reshape(-1, 3)
     rows = np.hstack([points.astype(np.float32), np.round(normals, 3).astype(np.float32)])
     unique, index = np.unique(rows, axis=0, return_inverse=True)
     return Shaded(
         unique[:, :3].astype(np.float64), _unit(unique[:, 3:].astype(np.float64)), index.reshape(-1, 3)
     )
+
+
+def _smoothed(vertex: Indices, areas: Floats) -> Floats:
+    """(3 m, 3): for each corner the mean normal of the faces at its vertex that look about its own way.
+
+    ``vertex`` (3 m,) of each corner, ``areas`` (m, 3) normals as long as the faces are large.
+    """
+    flat = _unit(areas)
+    order = np.argsort(vertex, kind="stable")
+    starts = np.flatnonzero(np.r_[True, np.diff(vertex[order]) != 0])
+    degrees = np.diff(np.r_[starts, len(order)])
+    result = flat[np.arange(len(vertex)) // 3]
+    for degree in np.unique(degrees):
+        if degree > MAX_DEGREE:
+            continue
+        corners = order[starts[degrees == degree][:, None] + np.arange(degree)]
+        face = corners // 3
+        near = np.einsum("nix,njx->nij", flat[face], flat[face]) > CREASE
+        mean = np.einsum("nij,njx->nix", near.astype(np.float64), areas[face]).reshape(-1, 3)
+        result[corners.reshape(-1)] = _unit(mean)
+    return result
 
 
 def _unit(vectors: Floats) -> Floats:
@@ -63,5 +79,10 @@ def ellipsoid(rings: int = 20, sectors: int = 32) -> Mesh:
         for j in range(sectors):
             a, b = i * sectors + j, i * sectors + (j + 1) % sectors
             c, d = a + sectors, b + sectors
-            faces += [(a, c, b)] if i == 0 else [(a, c, d)] if i == rings - 1 else [(a, c, b), (b, c, d)]
+            if i == 0:
+                faces.append((a, c, d))
+            elif i == rings - 1:
+                faces.append((a, c, b))
+            else:
+                faces += [(a, c, b), (b, c, d)]
     return Mesh(grid, np.array(faces))
