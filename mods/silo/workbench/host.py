@@ -10,12 +10,14 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from typing import Any
 
 import FreeCAD
 
 from silo.bom.errors import DocumentError
 from silo.bom.identity import meta_key
+from silo.workbench.saved_marks import SavedMarks
 
 # --- FreeCAD itself --------------------------------------------------------------------------------------
 
@@ -110,6 +112,10 @@ def is_modified(doc: Any) -> bool:
     """True where the document has edits that are not on disk."""
     if not has_gui():
         return bool(doc.isTouched()) if hasattr(doc, "isTouched") else False
+    return _is_marked(doc) and not (version() < (0, 21) and _marks().is_clean(doc))
+
+
+def _is_marked(doc: Any) -> bool:
     view = _gui_document(doc)
     return bool(view is not None and view.Modified)
 
@@ -186,18 +192,25 @@ def _save(doc: Any) -> None:
     elif version() >= (0, 21):
         doc.save()
         view.Modified = False
-    elif _asks_before_saving(doc):
+    elif view.ActiveView is None or _asks_before_saving(doc):
         doc.save()
+        _marks().saved(doc)
     else:
-        # In FreeCAD 0.20 only its own command takes the mark of unsaved edits away.
         with same_active_document():
             FreeCAD.setActiveDocument(doc.Name)
             gui().runCommand("Std_Save")
 
 
+@cache
+def _marks() -> SavedMarks:
+    marks = SavedMarks()
+    add_document_observer(marks)
+    return marks
+
+
 def _asks_before_saving(doc: Any) -> bool:
     """True where FreeCAD's own save command would ask about further modified files."""
-    return any(other != doc and is_modified(other) for other in doc.getDependentDocuments())
+    return any(other != doc and _is_marked(other) for other in doc.getDependentDocuments())
 
 
 def _stamp(path: str) -> tuple[int, int, int]:

@@ -58,7 +58,7 @@ class RegisterFlow:
         schema = self._preferences.text("Schema")
         self._session.ask(
             translate("Silo", "Looking for components without a part number"),
-            lambda client, control: offer(extraction, seen, client, schema, control),
+            lambda client, control: offer(extraction, seen, client, schema, control, self._journal.pending()),
             done=lambda found: self._with_dialog(taken.path, lambda dialog: dialog.fill(found)),
             failed=lambda error: self._with_dialog(taken.path, lambda dialog: dialog.fail(error)),
         )

@@ -21,7 +21,7 @@ from silo.bom.findings import FindingCode
 from silo.bom.identity import walk_entries
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.naming import Proposal, clean_name, crowded_files, propose
-from silo.registration import Journal, Registration, RegistrationApi, register
+from silo.registration import Journal, Registration, RegistrationApi, component_key, register
 from silo.workbench.jobs import Control
 from silo.workbench.words import translate
 
@@ -143,8 +143,20 @@ def copied(extraction: Extraction) -> tuple[BomEntry, ...]:
     return tuple(e for e in walk_entries((extraction.assembly, *extraction.entries)) if e.key in places)
 
 
-def offer(extraction: Extraction, seen: Mapping[str, Seen], api: Any, schema: str, control: Control) -> Offer:
-    """What the dialog shows. Worker."""
+def offer(
+    extraction: Extraction,
+    seen: Mapping[str, Seen],
+    api: Any,
+    schema: str,
+    control: Control,
+    begun: Mapping[str, str] | None = None,
+) -> Offer:
+    """What the dialog shows. Worker.
+
+    begun
+        registrations that were interrupted (:meth:`silo.registration.Journal.pending`): the item that such a
+        one made is no look-alike of the component, it is its own.
+    """
     from silo.bom_sync import resolve
 
     resolved = resolve(extraction, api)
@@ -161,7 +173,7 @@ def offer(extraction: Extraction, seen: Mapping[str, Seen], api: Any, schema: st
         if (entry.silo_uuid or "").lower() in numbers
     ]
     control.check()
-    looked = _with_look_alikes(candidates, api, control)
+    looked = _with_look_alikes(candidates, api, control, begun or {})
     return Offer(_with_twins(looked), categories, _next_numbers(looked, api, schema))
 
 
@@ -210,13 +222,16 @@ def _sha256(path: str) -> str:
         return ""
 
 
-def _with_look_alikes(candidates: Sequence[Candidate], api: Any, control: Control) -> list[Candidate]:
+def _with_look_alikes(
+    candidates: Sequence[Candidate], api: Any, control: Control, begun: Mapping[str, str]
+) -> list[Candidate]:
     first, rest = candidates[:MOST_LOOKED_UP], candidates[MOST_LOOKED_UP:]
 
     def one(candidate: Candidate) -> Candidate:
         if control.cancelled.is_set():
             return candidate
-        return replace(candidate, similar=_look_alikes(candidate, api))
+        own = begun.get(component_key(candidate.entry), "")
+        return replace(candidate, similar=_look_alikes(candidate, api, own))
 
     if not first:
         return list(rest)
@@ -224,7 +239,7 @@ def _with_look_alikes(candidates: Sequence[Candidate], api: Any, control: Contro
         return [*pool.map(one, first), *rest]
 
 
-def _look_alikes(candidate: Candidate, api: Any) -> tuple[Similar, ...]:
+def _look_alikes(candidate: Candidate, api: Any, own: str) -> tuple[Similar, ...]:
     name = candidate.proposal.name
     try:
         found = api.search_items(name, limit=8)
@@ -232,7 +247,7 @@ def _look_alikes(candidate: Candidate, api: Any) -> tuple[Similar, ...]:
         for item in found:
             same_name = clean_name(item.name).casefold() == name.casefold()
             same_file = bool(candidate.sha256) and candidate.sha256 in _checksums(item, api)
-            if (same_name or same_file) and item.part_number != candidate.same_as:
+            if (same_name or same_file) and item.part_number != candidate.same_as and item.id != own:
                 told.append(Similar(item.part_number, item.id, item.name, same_file))
     except SiloError:
         # Suggestions are a courtesy; registering must not fail for want of them.

@@ -214,7 +214,7 @@ class Sending:
         plan = compare(resolved, client)
         if blocking(resolved) and not commit.allow_missing:
             return replace(sent, status=Status.BLOCKED, plan=plan), None
-        if not plan.writes:
+        if not plan.news:
             return replace(sent, status=Status.UNCHANGED, plan=plan), None
         request = merge_request(resolved, commit.key)
         return replace(sent, status=Status.MERGED, plan=plan), request

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import faulthandler
 import json
 import os
 import sys
@@ -24,7 +25,8 @@ except ImportError:
 
 FOLDER = Path(os.environ["SILO_TEST_FOLDER"])
 VAULT = FOLDER / "vault"
-WAIT_S = 60
+WAIT_S = 40
+LONGEST_S = 60
 
 _told: dict[str, Any] = {}
 
@@ -43,7 +45,20 @@ def run(story: Callable[[], None]) -> None:
         sys.stdout.flush()
         os._exit(code)
 
+    # A modal window that nobody expects would hold the story up for ever.
+    trace = (FOLDER / "trace.txt").open("w")
+    faulthandler.dump_traceback_later(LONGEST_S, file=trace, exit=True)
+    watch = QtCore.QTimer(Gui.getMainWindow())
+    watch.timeout.connect(lambda: note_modal(trace))
+    watch.start(2000)
     QtCore.QTimer.singleShot(500, go)
+
+
+def note_modal(trace: Any) -> None:
+    """Write down what a modal window says, for the message of a test that fails because of it."""
+    found = QtWidgets.QApplication.activeModalWidget()
+    if found is not None:
+        print("modal window:", found.objectName(), labels(found), file=trace, flush=True)
 
 
 def tell(**values: Any) -> None:

@@ -141,6 +141,7 @@ class Window:
                 ended = process.wait(TIMEOUT_S)
             except subprocess.TimeoutExpired:
                 os.killpg(process.pid, signal.SIGKILL)
+                process.wait()
                 raise AssertionError(f"FreeCAD did not end\n{self._report(log)}") from None
         wanted = {code, 128 - code if code < 0 else code}
         assert ended in wanted, f"FreeCAD ended with {ended}\n{self._report(log)}"
