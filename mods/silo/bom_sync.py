@@ -172,7 +172,7 @@ def sync(
             return Outcome(Status.BLOCKED, resolved, plan, names=names)
         if dry_run:
             return Outcome(Status.DRY_RUN, resolved, plan, names=names)
-        if not plan.writes:
+        if not plan.news:
             return Outcome(Status.UNCHANGED, resolved, plan, names=names)
         result = api.merge_bom(number, merge_request(resolved, sync_id, document))
     except SiloError as error:

@@ -141,7 +141,11 @@ class Item(Record):
 
 
 class BomLine(Record):
-    """A BOM line as the server has it. ``unreferenced_since`` is set while no assembly component uses it."""
+    """A BOM line as the server has it. ``unreferenced_since`` is set while no assembly component uses it.
+
+    ``assembly_told``: the server has heard what the assembly says of this line that people own, namely
+    ``assembly_quantity``; None where the server does not keep that.
+    """
 
     id: str | None = None
     parent_part_number: str | None = None
@@ -161,6 +165,9 @@ class BomLine(Record):
     effective_revision: int | None = None
     source: Annotated[Source, BeforeValidator(_known_source)] = "assembly"
     unreferenced_since: Time = None
+    override: bool = False
+    assembly_told: bool | None = None
+    assembly_quantity: Number | None = None
     depth: int | None = None
     metadata: dict[str, Any] = Field(default_factory=dict)
 

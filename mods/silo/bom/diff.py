@@ -76,6 +76,11 @@ def _summed(lines: Iterable[_Line]) -> dict[str, float | None]:
     return {pn: _whole(q) for pn, q in total.items()}
 
 
+def local_quantities(entries: Iterable[BomEntry | Mapping[str, Any]]) -> dict[str, float | None]:
+    """The assembly's direct children by part number, summed; entries without a number are left out."""
+    return _summed(line for entry in entries if (line := _local(entry)) is not None)
+
+
 def is_manual(line: Mapping[str, Any]) -> bool:
     """True where a line belongs to people: a relation that is no component, or any source but assembly.
 
@@ -98,7 +103,7 @@ def diff_bom(
     remote_entries
         mappings with ``child_part_number``, ``quantity``, ``source`` and optionally ``rel_type``.
     """
-    local = _summed(line for entry in local_entries if (line := _local(entry)) is not None)
+    local = local_quantities(local_entries)
     assembly_lines: list[_Line] = []
     manual_lines: list[_Line] = []
     manual_components: list[_Line] = []

@@ -18,22 +18,33 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from silo.bom.diff import diff_bom, is_manual
+from silo.bom.diff import diff_bom, is_manual, local_quantities, same_quantity
 from silo.bom.model import BomDiff, BomEntry
 
 
 @dataclass(frozen=True)
 class MergePlan:
-    """What a merge will write: the diff, and which unreferenced flags it sets and clears (part numbers)."""
+    """What a merge will write: the diff, and which unreferenced flags it sets and clears (part numbers).
+
+    ``tell`` names the lines that people own and of which the server has not yet heard what the assembly says
+    now: a new conflict, a changed one, or one that is over. No line is written for them, but the server must
+    know to ask a person, or to stop asking.
+    """
 
     diff: BomDiff
     flag: tuple[str, ...] = ()
     unflag: tuple[str, ...] = ()
+    tell: tuple[str, ...] = ()
 
     @property
     def writes(self) -> bool:
-        """True where applying the plan changes anything on the server."""
+        """True where applying the plan changes a line on the server."""
         return bool(self.diff.added or self.diff.quantity_changed or self.flag or self.unflag)
+
+    @property
+    def news(self) -> bool:
+        """True where the server learns anything from this merge: else it need not be sent."""
+        return self.writes or bool(self.tell)
 
 
 def plan_merge(
@@ -45,9 +56,11 @@ def plan_merge(
         as in :func:`silo.bom.diff.diff_bom`.
     lines
         the server's lines; ``unreferenced_since`` (any true value) marks those flagged before.
+        ``assembly_told`` says whether the server heard of the assembly's quantity for a line that people own,
+        ``assembly_quantity`` which; a server that says neither is not told of conflicts alone.
     """
-    known = list(lines)
-    diff = diff_bom(entries, known)
+    local, known = list(entries), list(lines)
+    diff = diff_bom(local, known)
     flagged = {
         line["child_part_number"] for line in known if line.get("unreferenced_since") and not is_manual(line)
     }
@@ -56,7 +69,26 @@ def plan_merge(
         diff=diff,
         flag=tuple(number for number in gone if number not in flagged),
         unflag=tuple(sorted(flagged.difference(gone))),
+        tell=_untold(diff, local_quantities(local), known),
     )
+
+
+def _untold(
+    diff: BomDiff, local: Mapping[str, float | None], lines: Iterable[Mapping[str, Any]]
+) -> tuple[str, ...]:
+    in_conflict = {change.part_number for change in diff.conflicts}
+    untold = []
+    for line in lines:
+        number, told = line["child_part_number"], line.get("assembly_told")
+        if told is None or not is_manual(line) or (line.get("rel_type") or "component") != "component":
+            continue
+        # An override of a line that the assembly once owned is in conflict too when the assembly drops it.
+        now = local.get(number, 0.0)
+        dropped = number not in local and bool(line.get("override"))
+        changed = told and not same_quantity(line.get("assembly_quantity"), now)
+        if changed or (not told and (number in in_conflict or dropped)):
+            untold.append(number)
+    return tuple(untold)
 
 
 def apply_merge(lines: Sequence[Mapping[str, Any]], plan: MergePlan, when: str) -> list[dict[str, Any]]:

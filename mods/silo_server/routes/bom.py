@@ -23,13 +23,14 @@ from silo_server.routes.context import (
     json_body,
     raw_json,
 )
-from silo_server.routes.models import ExpandedLineOut, LineChangeBody, LineOut, NewLineBody
+from silo_server.routes.models import BomLineOut, ExpandedLineOut, LineChangeBody, LineOut, NewLineBody
 from silo_server.routes.render import render_expanded
 from silo_server.services import edits, rollup, tree
 from silo_server.services.items import get_item
 from silo_server.services.lines import line_to_wire, lines_of
 from silo_server.services.merge import MergeOutcome, merge_bom, preview_merge
 from silo_server.services.merge_request import MergeOrder, read_merge_order
+from silo_server.services.review import told_quantities
 from silo_server.values import Actor, number
 
 router = APIRouter(prefix="/api/items/{part_number}/bom", tags=["bom"])
@@ -43,15 +44,22 @@ MERGE_BODY = {
 }
 
 
-@router.get("", response_model=list[LineOut], responses=READ_ERRORS)
+@router.get("", response_model=list[BomLineOut], responses=READ_ERRORS)
 def get_bom(server: ServerDep, caller: Viewer, part_number: str) -> Response:
     """The lines of one level. ``ETag`` is the BOM's version, for ``If-Match``."""
     with server.db.read(caller) as tx:
         item = get_item(tx, part_number)
         lines = lines_of(tx, item)
-    return json_answer(
-        [line_to_wire(line, item.part_number) for line in lines], headers={"ETag": etag_of(item.bom_version)}
-    )
+        told = told_quantities(tx, item)
+    rows = [
+        {
+            **line_to_wire(line, item.part_number),
+            "assembly_told": line.child_id in told,
+            "assembly_quantity": number(told.get(line.child_id)),
+        }
+        for line in lines
+    ]
+    return json_answer(rows, headers={"ETag": etag_of(item.bom_version)})
 
 
 @router.post("", status_code=201, response_model=LineOut, responses=WRITE_ERRORS)

@@ -171,6 +171,13 @@ class LineOut(BaseModel):
     metadata: dict[str, Any]
 
 
+class BomLineOut(LineOut):
+    """A line of one level. ``assembly_told``: the last merge said another quantity, ``assembly_quantity``."""
+
+    assembly_told: bool
+    assembly_quantity: float | None
+
+
 class ExpandedLineOut(LineOut):
     """A line somewhere down the tree; ``total_quantity`` is per one of the top item."""
 

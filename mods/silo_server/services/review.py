@@ -88,6 +88,16 @@ def open_conflicts(tx: Tx, parent: Item, lines: Sequence[Line]) -> list[Conflict
     ]
 
 
+def told_quantities(tx: Tx, parent: Item) -> dict[int, float]:
+    """What the last merge said of people's lines, by the child's internal id; 0: not in the assembly."""
+    rows = tx.conn.execute(
+        select(bom_conflicts.c.child_id, bom_conflicts.c.cad_quantity).where(
+            bom_conflicts.c.parent_id == parent.id
+        )
+    )
+    return {row.child_id: row.cad_quantity for row in rows}
+
+
 def resolve(
     tx: Tx, part_number: str, decisions: Sequence[Decision], expected: int | None = None
 ) -> tuple[int, int]:
