@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,13 @@ from OCP.XCAFDoc import XCAFDoc_DocumentTool
 
 from silo.inertia.geometry import ReadOptions, occt, read
 from silo.inertia.model import Assembly, GeometryProblem
+
+_TESTS = Path(__file__).parents[2]
+for _folder in (_TESTS / "fcstd", _TESTS / "freecad"):
+    # Test folders are no packages (import mode "importlib"): the FCStd writer and the list of this machine's
+    # FreeCADs are made known by their folders.
+    if str(_folder) not in sys.path:
+        sys.path.insert(0, str(_folder))
 
 
 class StepDocument:
