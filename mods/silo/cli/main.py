@@ -29,6 +29,7 @@ _COMMANDS = (
     "inertia",
     "mass",
     "demo",
+    "install_addon",
 )
 
 _EPILOG = """exit codes: 0 done, 1 differences or something left undone, 2 bad input, 3 server, 130 cancelled

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The add-on into a FreeCAD on this machine: its folder into ``Mod``, its packages where FreeCAD looks.
+
+FreeCAD itself is asked where that is and which Python it has (facts §7.2, §7.3): 0.20 takes packages from
+``AdditionalPythonPackages``, later ones from ``AdditionalPythonPackages/py<XY>``. The packages are chosen for
+FreeCAD's Python, not for the one that runs this.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from silo.bom.errors import ConfigError, InputError
+from silo.freecad_run import find_freecadcmd
+
+# As package.xml declares them to the Addon Manager.
+PACKAGES = ("requests>=2.31", "sseclient-py>=1.8", "pydantic>=2.7")
+FOLDER = "Silo"
+# A checkout has what FreeCAD's loaders want at its root.
+CHECKOUT = Path(__file__).resolve().parents[2]
+
+_ASK = """
+import json, os, sys
+import FreeCAD
+with open(os.environ["SILO_ASK_OUT"], "w", encoding="utf-8") as out:
+    json.dump({"data": FreeCAD.getUserAppDataDir(), "freecad": FreeCAD.Version()[:2],
+               "python": list(sys.version_info[:2])}, out)
+"""
+_ASK_SECONDS = 60.0
+_PIP_SECONDS = 600.0
+
+
+@dataclass(frozen=True)
+class Place:
+    """A FreeCAD: its data folder, its version and its Python's."""
+
+    data: Path
+    freecad: tuple[int, int]
+    python: tuple[int, int]
+
+    @property
+    def mod(self) -> Path:
+        """Where the add-on goes."""
+        return self.data / "Mod" / FOLDER
+
+    @property
+    def packages(self) -> Path:
+        """Where FreeCAD finds additional Python packages."""
+        base = self.data / "AdditionalPythonPackages"
+        return base if self.freecad < (1, 0) else base / "py{}{}".format(*self.python)
+
+
+def ask_freecad(freecadcmd: str | None = None, data: Path | None = None) -> Place:
+    """Ask FreeCAD for its folders and versions. ``data`` stands for the data folder that it names."""
+    command = find_freecadcmd(freecadcmd)
+    with tempfile.TemporaryDirectory(prefix="silo-ask-") as folder:
+        out = Path(folder) / "answer.json"
+        try:
+            run = subprocess.run(
+                [command, "-c", _ASK],
+                env={**os.environ, "SILO_ASK_OUT": str(out)},
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                text=True,
+                timeout=_ASK_SECONDS,
+                cwd=folder,
+                check=False,
+            )
+        except (OSError, subprocess.TimeoutExpired) as error:
+            raise ConfigError(f"{command} does not answer: {error}") from error
+        if not out.is_file():
+            last = (run.stderr or run.stdout).strip().splitlines()[-1:] or ["it said nothing"]
+            raise ConfigError(f"{command} did not tell where its folders are: {last[0]}")
+        told = json.loads(out.read_text(encoding="utf-8"))
+    major, minor = (int(part) for part in told["freecad"])
+    return Place(data or Path(told["data"]), (major, minor), (told["python"][0], told["python"][1]))
+
+
+def install_folder(place: Place, source: Path = CHECKOUT, *, copy: bool = False) -> str:
+    """Link (or copy) the add-on into ``Mod``; returns what was done. A stranger's folder is left alone."""
+    if not (source / "package.xml").is_file():
+        raise InputError(
+            f"{source} holds no package.xml: install the add-on from a checkout of silo-mod, or clone it "
+            f"into {place.mod}"
+        )
+    target = place.mod
+    if target.is_symlink() and target.resolve() == source:
+        return f"{target} leads to this checkout already"
+    if target.exists() or target.is_symlink():
+        if not copy or target.is_symlink() or not (target / "package.xml").is_file():
+            raise InputError(f"{target} is there already; move it away, then repeat")
+        shutil.rmtree(target)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    if copy:
+        names = ("Init.py", "InitGui.py", "package.xml", "LICENSE", "README.md")
+        target.mkdir()
+        for name in names:
+            shutil.copy2(source / name, target / name)
+        shutil.copytree(
+            source / "mods" / "silo", target / "mods" / "silo", ignore=shutil.ignore_patterns("__pycache__")
+        )
+        return f"copied to {target}"
+    target.symlink_to(source, target_is_directory=True)
+    return f"{target} now leads to this checkout"
+
+
+def install_packages(place: Place) -> str:
+    """Install what the add-on needs for FreeCAD's own Python; returns where."""
+    version = "{}.{}".format(*place.python)
+    if place.python < (3, 11):
+        raise ConfigError(f"this FreeCAD has Python {version}; the add-on needs 3.11 or newer")
+    command = [
+        *(sys.executable, "-m", "pip", "install", "--quiet", "--upgrade", "--target", str(place.packages)),
+        *("--python-version", version, "--only-binary=:all:", *PACKAGES),
+    ]
+    run = subprocess.run(
+        command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=_PIP_SECONDS, check=False
+    )
+    if run.returncode:
+        last = (run.stderr or run.stdout).strip().splitlines()[-1:] or ["it said nothing"]
+        raise ConfigError(f"pip could not install {', '.join(PACKAGES)} for Python {version}: {last[0]}")
+    return str(place.packages)
