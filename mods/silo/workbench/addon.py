@@ -168,14 +168,14 @@ class AddOn:
         self._hook.watch(name)
 
     def _find_foreign_commit(self) -> None:
-        """Add-ons that were loaded after this one may have brought a commit of their own."""
+        """The Kindred workbench has further commands that upload a revision; connect to what is there."""
         from silo.workbench.commands import COMMIT, commands
         from silo.workbench.hooks import FOREIGN
 
-        ours = {name: command.text for name, command in commands(self).items()}
+        ours = commands(self)[COMMIT].text
         for name in FOREIGN:
             told = host.command_info(name).get("menuText")
-            if told is not None and told not in (ours.get(name), ours[COMMIT]):
+            if told is not None and told != ours:
                 self.hook_commit(name)
         if self._hook is not None:
             self._hook.connect()

@@ -318,6 +318,19 @@ def add_workbench(workbench: Any) -> None:
     gui().addWorkbench(workbench)
 
 
+def has_active_workbench() -> bool:
+    """False while FreeCAD is still loading add-ons."""
+    try:
+        return gui().activeWorkbench() is not None
+    except AssertionError:  # FreeCAD's own choice of exception for "none yet"
+        return False
+
+
+def reload_workbench() -> None:
+    """Build the menus and toolbars of the active workbench anew, with commands that are new."""
+    gui().activeWorkbench().reloadActive()
+
+
 def add_workbench_manipulator(manipulator: Any) -> bool:
     """Have an object put commands into every workbench's menus; False where FreeCAD (0.20) cannot."""
     add = getattr(gui(), "addWorkbenchManipulator", None)

@@ -10,8 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from silo.workbench import host
-from silo.workbench.commands import BOM, COMMIT, OWN_COMMIT
+from silo.workbench import host, qt
 from silo.workbench.qt import QtGui, QtWidgets
 
 AFTER = "Std_Save"
@@ -19,12 +18,13 @@ AFTER = "Std_Save"
 
 def place(names: list[str], wanted: Callable[[], bool]) -> Any:
     """Put the commands in place; the result must be kept alive."""
-    shown = [name for name in (COMMIT, OWN_COMMIT, BOM) if name in names]
-    manipulator = Manipulator(shown, wanted)
+    manipulator = Manipulator(names, wanted)
     if host.add_workbench_manipulator(manipulator):
         return manipulator
-    by_hand = ByHand(shown, wanted)
+    by_hand = ByHand(names, wanted)
     host.main_window().workbenchActivated.connect(by_hand.put)
+    # A reloaded workbench is not activated anew, so it does not tell.
+    qt.later(0, by_hand.put)
     return by_hand
 
 

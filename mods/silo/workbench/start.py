@@ -7,16 +7,18 @@ add-on may cost FreeCAD's start 50 ms.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from silo.workbench import dependencies, host, words
+from silo.workbench import dependencies, host, qt, words
 from silo.workbench.addon import AddOn
-from silo.workbench.commands import ACTIVITY, BOM, COMMIT, OWN_COMMIT, REGISTER, SETTINGS, commands
+from silo.workbench.commands import ACTIVITY, BOM, COMMIT, OWN_COMMIT, REGISTER, SETTINGS, Command, commands
 from silo.workbench.placement import place
 
 RESOURCES = Path(__file__).parent / "resources"
 PREFERENCE_GROUP = "Silo"
+LOADING_MS = 30
 
 # Kept for FreeCAD's whole run: its C++ side holds no reference to what Python hands over.
 _kept: list[Any] = []
@@ -30,30 +32,39 @@ def start() -> None:
         host.error(dependencies.sentence(missing))
         return
     addon = AddOn()
-    names = register_commands(addon)
-    host.add_workbench(silo_workbench(names))
+    known = commands(addon)
+    for name in (BOM, REGISTER, ACTIVITY, SETTINGS):
+        host.add_command(name, known[name])
+    host.add_workbench(silo_workbench())
     host.add_preference_page(addon.preference_page(), PREFERENCE_GROUP)
-    _kept.extend((addon, place(names, addon.shown_everywhere)))
+    _kept.append(addon)
+    qt.later(0, lambda: when_loaded(lambda: finish(addon, known)))
     addon.begin()
 
 
-def register_commands(addon: AddOn) -> list[str]:
-    """Register the commands; gives their names as they are, in the order of the menu."""
-    names = []
-    for name, command in commands(addon).items():
-        if host.add_command(name, command):
-            names.append(name)
-        elif name == COMMIT:
-            # FreeCAD, or a fork of it, commits by itself: its command stays, its end is hooked.
-            addon.hook_commit(COMMIT)
-            if host.add_command(OWN_COMMIT, command):
-                names.append(OWN_COMMIT)
-            else:
-                addon.hook_commit(OWN_COMMIT)
-    return names
+def when_loaded(call: Callable[[], None]) -> None:
+    """Call once all add-ons are loaded. A timer alone does not tell: the splash screen lets timers pass."""
+    if host.has_active_workbench():
+        call()
+    else:
+        qt.later(LOADING_MS, lambda: when_loaded(call))
 
 
-def silo_workbench(names: list[str]) -> Any:
+def finish(addon: AddOn, known: dict[str, Command]) -> None:
+    """The rest, once all add-ons are loaded: one of them may have brought an ``Origin_Commit`` of its own."""
+    if host.add_command(COMMIT, known[COMMIT]):
+        commit = COMMIT
+    else:
+        # FreeCAD, or a fork of it, commits by itself: its command stays, its end is hooked.
+        addon.hook_commit(COMMIT)
+        commit = OWN_COMMIT
+        if not host.add_command(OWN_COMMIT, known[COMMIT]):
+            addon.hook_commit(OWN_COMMIT)
+    _kept.append(place([commit, BOM], addon.shown_everywhere))
+    host.reload_workbench()
+
+
+def silo_workbench() -> Any:
     """The Silo workbench: a toolbar and a menu with all commands."""
 
     class SiloWorkbench(host.gui().Workbench):  # type: ignore[misc]  # FreeCAD has no types
@@ -62,9 +73,8 @@ def silo_workbench(names: list[str]) -> Any:
         Icon = str(RESOURCES / "icons" / "silo.svg")
 
         def Initialize(self) -> None:
-            order = [n for n in (COMMIT, OWN_COMMIT, BOM, REGISTER, ACTIVITY, SETTINGS) if n in names]
-            self.appendToolbar("Silo", order[:-1])
-            self.appendMenu("&Silo", order)
+            self.appendToolbar("Silo", [COMMIT, BOM, REGISTER, ACTIVITY])
+            self.appendMenu("&Silo", [COMMIT, BOM, REGISTER, ACTIVITY, SETTINGS])
 
         def GetClassName(self) -> str:
             return "Gui::PythonWorkbench"

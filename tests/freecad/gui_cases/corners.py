@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Inside FreeCAD: partly loaded documents with edits, unnamed documents, copied identities."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from typing import Any
+
+sys.path.insert(0, os.environ["SILO_TEST_CASES"])
+
+from inside import (
+    VAULT,
+    App,
+    Gui,
+    addon,
+    assembly,
+    boxes,
+    close_all,
+    dialog,
+    part,
+    register,
+    run,
+    settled,
+    tell,
+    unmark,
+    wait,
+)
+
+
+def partly_loaded(one: Any) -> None:
+    """FreeCAD loads of a linked file only what is linked, and cannot save that."""
+    bolt = part("Bolt")
+    bolt.Document.addObject("Part::Cylinder", "Unused")
+    bolt.Document.recompute()
+    bolt.Document.save()
+    unmark(bolt.Document)
+    top = assembly("Top", ("B1", bolt, 0))
+    register(bolt.Document, top.Document)
+    close_all()
+    opened = App.openDocument(str(VAULT / "Top.FCStd"))
+    loaded = App.getDocument("Bolt")
+    loaded.getObject("Box").Length = 44
+    before = (VAULT / "Bolt.FCStd").read_bytes()
+    seen: list[list[Any]] = []
+
+    def answer(found: Any) -> None:
+        for number in range(found.files.topLevelItemCount()):
+            item = found.files.topLevelItem(number)
+            seen.append(
+                [item.text(0), item.text(1), int(item.checkState(0) == type(item.checkState(0)).Checked)]
+            )
+        found.commit.click()
+
+    App.setActiveDocument(opened.Name)
+    with dialog("SiloCommitDialog", answer):
+        Gui.runCommand("Origin_Commit")
+    wait(lambda: boxes("BOM Updated") and settled())
+    tell(
+        partial=bool(loaded.Partial),
+        partial_dialog=seen,
+        partial_edit=float(App.getDocument("Bolt").getObject("Box").Length),
+        partial_file_untouched=(VAULT / "Bolt.FCStd").read_bytes() == before,
+    )
+    close_all()
+
+
+def unnamed(one: Any) -> None:
+    """A document that has no file: FreeCAD asks for a name; cancelled, nothing happens."""
+    doc = App.newDocument("Nameless")
+    from silo.workbench.commit import plan
+    from silo.workbench.commit_dialog import refusal
+    from silo.workbench.commit_flow import LiveDocuments
+
+    tell(unnamed=refusal(plan(doc, LiveDocuments())))
+    close_all()
+
+
+def copied(one: Any) -> None:
+    """Save As is how people begin a new part: two files, one identity."""
+    bracket = part("Bracket")
+    register(bracket.Document)
+    shutil.copy(VAULT / "Bracket.FCStd", VAULT / "Bracket2.FCStd")
+    other = App.openDocument(str(VAULT / "Bracket2.FCStd"))
+    top = assembly("Frame", ("B1", bracket, 0), ("B2", other.getObject("Box"), 0))
+    register(top.Document)
+    App.setActiveDocument(top.Document.Name)
+    unmark(top.Document)
+    one.preferences.set("AskComment", False)
+    Gui.runCommand("Origin_Commit")
+    wait(lambda: boxes("BOM Updated: A01-0002") and settled())
+    tell(copied_box=boxes("BOM Updated: A01-0002")[0])
+
+    # "New part": the second file gets an item of its own.
+    Gui.runCommand("Silo_RegisterParts")
+    window = wait(lambda: next(iter(one.registrations._open.values()), None))
+    wait(lambda: window.rows)
+    tell(copied_rows=[[row.component(), row.number, row.checked] for row in window.rows])
+    second = next(row for row in window.rows if row.component() == "Bracket2.FCStd")
+    second.number, second.checked = "new", True
+    window._register_checked()
+    wait(lambda: second.finished and settled())
+    count = len(boxes("BOM Updated: A01-0002"))
+    wait(lambda: count and settled())
+    window.close()
+    Gui.runCommand("Origin_Commit")
+    wait(
+        lambda: (
+            settled() and "copied" not in boxes("Committed: A01-0002")[0]
+            if boxes("Committed: A01-0002")
+            else False
+        )
+    )
+    tell(copied_after=boxes("Committed: A01-0002")[0])
+
+
+def story() -> None:
+    one = addon()
+    one.preferences.set("AskRegister", False)
+    wait(lambda: one.session.shown.connection == "online")
+    partly_loaded(one)
+    unnamed(one)
+    copied(one)
+
+
+run(story)

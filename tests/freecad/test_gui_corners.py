@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The add-on as a guest: partial documents, forks, missing packages, its dock, files of newer FreeCADs."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from freecad_cases.machines import REPOSITORY, WANTED
+from gui_cases.window import window
+
+pytestmark = [pytest.mark.freecad, pytest.mark.slow]
+
+# An add-on as a fork's own workbench would be; it loads before "Silo".
+FORK = """
+class Commit:
+    def __init__(self, text, saves):
+        self.text, self.saves = text, saves
+    def GetResources(self):
+        return {"MenuText": self.text, "ToolTip": "the fork's own"}
+    def Activated(self):
+        if self.saves:
+            import FreeCAD
+            FreeCAD.ActiveDocument.save()
+
+class ForkWorkbench(Workbench):
+    MenuText = "Fork"
+    def Initialize(self):
+        self.appendToolbar("Fork", ["Origin_Commit"])
+    def GetClassName(self):
+        return "Gui::PythonWorkbench"
+
+FreeCADGui.addCommand("Origin_Commit", Commit("Fork commit", False))
+FreeCADGui.addCommand("Fork_SaveAndCommit", Commit("Save and commit", True))
+FreeCADGui.addWorkbench(ForkWorkbench())
+"""
+
+
+@pytest.fixture(name="corners", scope="module", params=WANTED)
+def _corners(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[dict[str, Any]]:
+    with window(request.param, tmp_path_factory.mktemp("corners").resolve()) as freecad:
+        freecad.prepare()
+        yield freecad.run("corners.py")
+
+
+def test_a_partly_loaded_document_with_edits_is_told_and_kept(corners: dict[str, Any]) -> None:
+    """FreeCAD would write nothing, or half of it; it is neither saved nor reloaded."""
+    assert corners["partial"]
+    (first, top) = corners["partial_dialog"]
+    assert first[0] == "Bolt.FCStd"
+    assert first[1].startswith("FreeCAD has loaded it only in part and cannot save these edits")
+    assert (first[2], top[2]) == (0, 1)
+    assert corners["partial_edit"] == 44.0
+    assert corners["partial_file_untouched"]
+
+
+def test_a_document_without_a_file_is_told(corners: dict[str, Any]) -> None:
+    """In words that say what to do."""
+    assert corners["unnamed"] == "Nameless has no file yet. Save it under a name first."
+
+
+def test_a_copied_identity_asks(corners: dict[str, Any]) -> None:
+    """The box tells it and offers the decision."""
+    box = corners["copied_box"]
+    assert "2 files carry the same Silo identity" in box
+    assert "[Same or new part…]" in box
+    rows = {component: (number, checked) for component, number, checked in corners["copied_rows"]}
+    assert rows == {"Bracket.FCStd": ("same", False), "Bracket2.FCStd": ("same", False)}
+
+
+def test_a_new_part_has_its_own_identity_then(corners: dict[str, Any]) -> None:
+    """And nothing is asked any more."""
+    assert "identity" not in corners["copied_after"]
+
+
+@pytest.mark.parametrize("version", WANTED)
+def test_a_forks_commit_is_hooked_and_not_replaced(version: str, tmp_path: Path) -> None:
+    """By its QAction, by the save, by its origin; the BOM follows once each time."""
+    with window(version, tmp_path.resolve()) as freecad:
+        freecad.prepare()
+        fork = freecad.home / "Mod" / "AFork"
+        fork.mkdir()
+        (fork / "InitGui.py").write_text(FORK)
+        said = freecad.run("fork.py")
+    assert (said["text"], said["own"]) == ("Fork commit", "Commit to Silo")
+    assert said["committed"] == ["Top"]
+    counts = [box.splitlines()[1] for box in reversed(said["boxes"])]
+    assert counts == ["+1 added", "~1 qty changed", "~1 qty changed", "~1 qty changed"]
+
+
+@pytest.mark.parametrize("version", WANTED)
+def test_missing_packages_are_one_plain_sentence(version: str, tmp_path: Path) -> None:
+    """FreeCAD starts as ever, no traceback."""
+    with window(version, tmp_path.resolve()) as freecad:
+        freecad.prepare(dependencies=False)
+        said = freecad.run("bare.py")
+    assert said["commands"] == []
+    (line,) = said["report"]
+    assert line.endswith(
+        "Silo needs the Python packages requests, pydantic, sseclient-py. Install them with the Addon "
+        "Manager, or with: silo-mod install-addon"
+    )
+
+
+@pytest.mark.parametrize("version", WANTED)
+def test_the_dock_is_where_the_user_left_it(version: str, tmp_path: Path) -> None:
+    """Hidden until it is first wanted; then FreeCAD keeps its place over a restart."""
+    with window(version, tmp_path.resolve()) as freecad:
+        freecad.prepare()
+        first = freecad.run("dock.py")
+        second = freecad.run("dock.py", env={"SILO_TEST_SECOND": "1"})
+    assert first == {"docks": 1, "title": "Database Activity", "visible": False, "left": False}
+    assert second == {"docks": 1, "title": "Database Activity", "visible": True, "left": True}
+
+
+def test_an_assembly_of_a_newer_freecad_is_not_saved(tmp_path: Path) -> None:
+    """FreeCAD 0.20 has dropped its assemblies already; saving would write that down."""
+    with window("0.20", tmp_path.resolve()) as freecad:
+        freecad.prepare()
+        shutil.copytree(REPOSITORY / "examples" / "gearbox", freecad.vault, dirs_exist_ok=True)
+        said = freecad.run("newer.py")
+    assert said["untouched"]
+    (text,) = said["told"]
+    assert text.startswith("TopAssembly.FCStd: made by a newer FreeCAD: saving it here would destroy")
