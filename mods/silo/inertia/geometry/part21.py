@@ -8,17 +8,15 @@ regular expression finds where every entity stands, and only wanted ones are tak
 
 from __future__ import annotations
 
+import mmap
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 from silo.bom.errors import InputError
 
-if TYPE_CHECKING:
-    import mmap
-
-    Buffer: TypeAlias = bytes | mmap.mmap
+Buffer: TypeAlias = bytes | mmap.mmap
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,12 +42,12 @@ MAX_ENTITY_BYTES = 4_000_000
 
 _ENTITY = re.compile(rb"#(\d+)\s*=\s*([A-Z_0-9]*)\s*\(")
 _BODY = re.compile(rb"(?:[^';]|'[^']*')*")
+_REFERENCE = re.compile(rb"'(?:[^']|'')*'|#(\d+)")
 _TOKEN = re.compile(
     rb"\s*(?:(?P<string>'(?:[^']|'')*')|#(?P<ref>\d+)|(?P<enum>\.[A-Za-z0-9_]+\.)"
     rb"|(?P<number>[+-]?\d+\.?\d*(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z_!][A-Za-z0-9_]*)"
     rb'|(?P<binary>"[0-9A-Fa-f]*")|(?P<mark>[(),$*]))'
 )
-_UNIT_HINT = b"UNIT"
 _END = b"END-ISO-10303-21"
 
 
@@ -61,8 +59,8 @@ class Part21:
         id → keyword ("" for a complex entity).
     ordinals
         id → position among all entities of the file, counted from 1: the kernel numbers them so.
-    count
-        how many entities there are.
+    count, highest
+        how many entities there are, and the largest id.
     complete
         False where the file lacks its end mark, so that it was cut off.
     """
@@ -72,6 +70,7 @@ class Part21:
     ordinals: dict[int, int] = field(default_factory=dict)
     starts: dict[int, int] = field(default_factory=dict)
     count: int = 0
+    highest: int = 0
     complete: bool = False
 
     def of(self, *keywords: str) -> Iterator[tuple[int, tuple[Value, ...]]]:
@@ -82,28 +81,42 @@ class Part21:
 
     def arguments(self, number: int) -> tuple[Value, ...]:
         """The arguments of entity ``number``; of a complex one, its parts as Typed. () where unreadable."""
-        start = self.starts.get(number)
-        if start is None:
-            return ()
-        match = _BODY.match(self.data, start, min(len(self.data), start + MAX_ENTITY_BYTES))
-        if match is None:
-            return ()
         try:
-            return _parsed(match[0])
+            return _parsed(self.body(number))
         except InputError:
             return ()
 
+    def references(self, number: int) -> tuple[int, ...]:
+        """All ids that entity ``number`` refers to, in order, wherever they stand in it. Quick."""
+        return tuple(int(found) for found in _REFERENCE.findall(self.body(number)) if found)
 
-def scan(data: Buffer, wanted: frozenset[str]) -> Part21:
-    """Find the entities whose keyword is in ``wanted`` or ends in SHAPE_REPRESENTATION, and all units."""
+    def listed(self, *keywords: str) -> Iterator[int]:
+        """The ids of all wanted entities with one of these keywords, in file order."""
+        return (number for number, keyword in self.keywords.items() if keyword in keywords)
+
+    def body(self, number: int) -> bytes:
+        """The text of entity ``number`` from its bracket to before its semicolon; b"" where there is none."""
+        start = self.starts.get(number)
+        if start is None:
+            return b""
+        match = _BODY.match(self.data, start, min(len(self.data), start + MAX_ENTITY_BYTES))
+        return match[0] if match is not None else b""
+
+
+def scan(data: Buffer, wanted: frozenset[str], complex_hint: bytes = b"UNIT") -> Part21:
+    """Find the entities whose keyword is in ``wanted`` or ends in SHAPE_REPRESENTATION.
+
+    Of complex entities, those with ``complex_hint`` near their beginning: as it stands, the units.
+    """
     result = Part21(data)
     wanted_bytes = frozenset(k.encode("ascii") for k in wanted)
     for ordinal, match in enumerate(_ENTITY.finditer(data), start=1):
         result.count = ordinal
+        result.highest = max(result.highest, int(match[1]))
         keyword = match[2]
         if keyword in wanted_bytes or keyword.endswith(b"SHAPE_REPRESENTATION"):
             name = keyword.decode("ascii")
-        elif not keyword and _UNIT_HINT in data[match.end() : match.end() + 200]:
+        elif not keyword and complex_hint in data[match.end() : match.end() + 400]:
             name = ""
         else:
             continue

@@ -162,7 +162,7 @@ def _by_ordinal(source: Part21, facts: dict[int, ProductFacts]) -> dict[int, int
 
 def _representation_owners(source: Part21) -> dict[int, int]:
     """Representation id → PRODUCT_DEFINITION id, also over SHAPE_REPRESENTATION_RELATIONSHIPs."""
-    shapes = {n: ref(a, 2) for n, a in source.of("PRODUCT_DEFINITION_SHAPE")}
+    shapes = {n: next(iter(source.references(n)), 0) for n in source.listed("PRODUCT_DEFINITION_SHAPE")}
     owner: dict[int, int] = {}
     for _, arguments in source.of("SHAPE_DEFINITION_REPRESENTATION"):
         pd = shapes.get(ref(arguments, 0) or 0)
@@ -180,10 +180,10 @@ def _representation_owners(source: Part21) -> dict[int, int]:
 
 
 def _uses(source: Part21, facts: dict[int, ProductFacts]) -> Iterator[tuple[int, int]]:
-    for _, arguments in source.of("NEXT_ASSEMBLY_USAGE_OCCURRENCE"):
-        assembly, part = ref(arguments, 3), ref(arguments, 4)
-        if assembly in facts and part in facts:
-            yield assembly, part
+    for number_ in source.listed("NEXT_ASSEMBLY_USAGE_OCCURRENCE"):
+        ends = source.references(number_)
+        if len(ends) >= 2 and ends[0] in facts and ends[1] in facts:
+            yield ends[0], ends[1]
 
 
 def count_placed(products: Products) -> int:

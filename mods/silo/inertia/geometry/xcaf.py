@@ -12,6 +12,7 @@ from __future__ import annotations
 import mmap
 import re
 import tempfile
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,7 @@ from silo.inertia.geometry.graph import Child, Node
 from silo.inertia.geometry.names import clean, is_generic
 from silo.inertia.geometry.part21 import scan
 from silo.inertia.geometry.products import WANTED, ProductFacts, Products, count_placed, read_products
+from silo.inertia.geometry.regroup import MARK, regrouped
 from silo.inertia.geometry.tessellate import MM, in_metres, trsf_matrix
 
 
@@ -68,22 +70,41 @@ class StepFile:
 
 def load(path: Path, prefix: str = "", max_instances: int = 1_000_000) -> StepFile:
     """Read one STEP file. ``prefix`` goes before every key. DocumentError where it cannot be read."""
-    products, documents = _text(path)
-    _refuse_bombs(path, products, max_instances)
+    with path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        products, documents = _text(path, data)
+        _refuse_bombs(path, products, max_instances)
+        changed = _for_the_kernel(data, products, documents)
+    if changed is not None:
+        products = read_products(scan(changed, WANTED))
     with tempfile.TemporaryDirectory(prefix="silo-step-") as folder:
-        source = _without_documents(path, Path(folder)) if documents else path
+        source = path
+        if changed is not None:
+            source = Path(folder) / "part.step"
+            source.write_bytes(changed)
+            del changed
         document, reader = _transferred(source, path)
     return _Walk(path, prefix, document, reader, products).run()
 
 
-def _text(path: Path) -> tuple[Products, bool]:
-    with path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
-        text = scan(data, WANTED)
-        if not text.complete:
-            raise DocumentError(
-                str(path), "the file ends in the middle (no END-ISO-10303-21); export or copy it again"
-            )
-        return read_products(text), "DOCUMENT_FILE" in text.keywords.values()
+def _text(path: Path, data: mmap.mmap) -> tuple[Products, bool]:
+    text = scan(data, WANTED)
+    if not text.complete:
+        raise DocumentError(
+            str(path), "the file ends in the middle (no END-ISO-10303-21); export or copy it again"
+        )
+    return read_products(text), "DOCUMENT_FILE" in text.keywords.values()
+
+
+def _for_the_kernel(data: mmap.mmap, products: Products, documents: bool) -> bytes | None:
+    """The text as the kernel is to see it, None where that is the file's own.
+
+    Names of other files are taken out: the kernel would open them, in any folder, without asking. Flat
+    assemblies of thousands get groups, for it would take the square of their number.
+    """
+    changed = regrouped(data, products)
+    if documents:
+        changed = _EXTERNAL.sub(rb"\1'silo-looks-for-it'", changed if changed is not None else data[:])
+    return changed
 
 
 def _refuse_bombs(path: Path, products: Products, most: int) -> None:
@@ -99,13 +120,6 @@ def _refuse_bombs(path: Path, products: Products, most: int) -> None:
 _EXTERNAL = re.compile(
     rb"((?:DOCUMENT_FILE|APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT|EXTERNALLY_DEFINED\w*)\s*\(\s*)'(?:[^']|'')*'"
 )
-
-
-def _without_documents(path: Path, folder: Path) -> Path:
-    """A copy that names no other file: the kernel would open them, in any folder, without asking."""
-    copy = folder / "part.step"
-    copy.write_bytes(_EXTERNAL.sub(rb"\1'silo-looks-for-it'", path.read_bytes()))
-    return copy
 
 
 def _transferred(source: Path, named: Path) -> tuple[Any, Any]:
@@ -180,12 +194,7 @@ class _Walk:
         inside: list[Any] = []
         own: list[Any] = []
         known: ProductFacts | None = None
-        components = occt.LabelSequence()
-        if self._tool.IsAssembly_s(label):
-            self._tool.GetComponents_s(label, components)
-        for component in occt.labels(components):
-            target = occt.new_label()
-            self._tool.GetReferredShape_s(component, target)
+        for component, target in self._components(label):
             facts = self._facts(target)
             if self._is_made_up(target, facts):
                 own.append(self._tool.GetShape_s(component))
@@ -194,6 +203,19 @@ class _Walk:
                 children.append(self._child(component, target))
                 inside.append(target)
         return children, inside, own, known
+
+    def _components(self, label: Any) -> Iterator[tuple[Any, Any]]:
+        """Uses and what they use; groups of our own making are seen through."""
+        components = occt.LabelSequence()
+        if self._tool.IsAssembly_s(label):
+            self._tool.GetComponents_s(label, components)
+        for component in occt.labels(components):
+            target = occt.new_label()
+            self._tool.GetReferredShape_s(component, target)
+            if occt.name_of(target).startswith(MARK):
+                yield from self._components(target)
+            else:
+                yield component, target
 
     def _is_made_up(self, target: Any, facts: ProductFacts | None) -> bool:
         """True for a leaf that the kernel made of a product's mixed bodies, and that is no product itself."""
