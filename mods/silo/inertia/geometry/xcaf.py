@@ -73,9 +73,12 @@ def load(path: Path, prefix: str = "", max_instances: int = 1_000_000) -> StepFi
     with path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
         products, documents = _text(path, data)
         _refuse_bombs(path, products, max_instances)
-        changed = _for_the_kernel(data, products, documents)
-    if changed is not None:
-        products = read_products(scan(changed, WANTED))
+        changed = regrouped(data, products)
+        if changed is not None:
+            products = read_products(scan(changed, WANTED))
+        if documents:
+            # The kernel would open the files that are named, in any folder, without asking.
+            changed = _EXTERNAL.sub(rb"\1'silo-looks-for-it'", data[:] if changed is None else changed)
     with tempfile.TemporaryDirectory(prefix="silo-step-") as folder:
         source = path
         if changed is not None:
@@ -93,18 +96,6 @@ def _text(path: Path, data: mmap.mmap) -> tuple[Products, bool]:
             str(path), "the file ends in the middle (no END-ISO-10303-21); export or copy it again"
         )
     return read_products(text), "DOCUMENT_FILE" in text.keywords.values()
-
-
-def _for_the_kernel(data: mmap.mmap, products: Products, documents: bool) -> bytes | None:
-    """The text as the kernel is to see it, None where that is the file's own.
-
-    Names of other files are taken out: the kernel would open them, in any folder, without asking. Flat
-    assemblies of thousands get groups, for it would take the square of their number.
-    """
-    changed = regrouped(data, products)
-    if documents:
-        changed = _EXTERNAL.sub(rb"\1'silo-looks-for-it'", changed if changed is not None else data[:])
-    return changed
 
 
 def _refuse_bombs(path: Path, products: Products, most: int) -> None:
