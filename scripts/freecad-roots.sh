@@ -19,7 +19,7 @@ set -euo pipefail
 
 REPO=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd -P)
 CACHE=${SILO_FREECAD_ROOTS:-${XDG_CACHE_HOME:-$HOME/.cache}/silo-mod/freecad}
-SELF="$REPO/scripts/freecad-roots.sh"
+SELF=$(realpath "${BASH_SOURCE[0]}")
 # Debian releases and the FreeCAD that each has; together all that the add-on must work in.
 SUITES=(bookworm trixie sid)
 declare -A FREECAD_OF=([bookworm]=0.20 [trixie]=1.0 [sid]=1.1)
@@ -161,11 +161,14 @@ install_dependencies() {
 }
 
 write_wrappers() {
-  local name=$1 command
+  local name=$1 command enter="$CACHE/bin/freecad-roots.sh"
   mkdir -p "$CACHE/bin/$name"
+  # The roots outlive the checkout that made them, and so must the way into them.
+  cp "$SELF" "$enter.$$"
+  mv "$enter.$$" "$enter"
   for command in freecadcmd freecad xvfb-run; do
     printf '#!/bin/sh\nSILO_FREECAD_ROOTS="%s" exec "%s" run "%s" %s "$@"\n' \
-      "$CACHE" "$SELF" "$name" "$command" >"$CACHE/bin/$name/$command"
+      "$CACHE" "$enter" "$name" "$command" >"$CACHE/bin/$name/$command"
     chmod +x "$CACHE/bin/$name/$command"
   done
 }
