@@ -10,11 +10,10 @@ from typing import Any
 import pytest
 
 from silo.bom.errors import ConfigError
+from silo.workbench.preferences import DEFAULTS, Preferences
 from silo.workbench.settings import (
-    DEFAULTS,
     Known,
     Origin,
-    Preferences,
     Server,
     choose_server,
     read_known,

@@ -142,7 +142,7 @@ def test_shared_sub_assemblies_are_written_once() -> None:
     finding = Finding(FindingCode.MIRRORED, Severity.WARNING, "m", (Place("/v/0.FCStd", "O"),))
     taken = Snapshot("/v/t", "t", "id", Extraction(BomEntry("/v/t"), (entry,), (finding,)))
     data = to_json(taken)
-    assert len(data["bom"]["nodes"]) == 42
+    assert len(data["bom"]["table"]) == 42
     again = from_json(data)
     assert again.extraction is not None
     assert again.extraction.findings == (finding,)
@@ -152,9 +152,9 @@ def test_shared_sub_assemblies_are_written_once() -> None:
     "damage",
     [
         lambda data: data.pop("path"),
-        lambda data: data["bom"]["nodes"][0].update(children=[5]),
+        lambda data: data["bom"]["table"][0].update(children=[5]),
         lambda data: data["bom"].update(entries=["x"]),
-        lambda data: data["bom"].update(findings=[["no such code", "info", "", []]]),
+        lambda data: data["bom"].update(findings=[{"code": "no such code"}]),
         lambda data: data.update(format=99),
         lambda data: data.update(bom=[]),
     ],

@@ -3,24 +3,21 @@
 
 from __future__ import annotations
 
-import traceback
 from typing import TYPE_CHECKING, Any
 
-from silo.workbench import host, qt, widgets
-from silo.workbench.activity import Action, Do
-from silo.workbench.pane import ActivityDock
-from silo.workbench.prefs import page_class
-from silo.workbench.session import Session, Shown, Told
-from silo.workbench.settings import GROUP, Preferences, read_known
-from silo.workbench.tokens import Keyring
+from silo.workbench import host, qt
+from silo.workbench.dock import ActivityDock
+from silo.workbench.preferences import GROUP, Preferences
 from silo.workbench.words import plain, translate
 
 if TYPE_CHECKING:
+    from silo.workbench.activity import Action
     from silo.workbench.commit_flow import CommitFlow
     from silo.workbench.hooks import CommitHook
     from silo.workbench.preview_flow import PreviewFlow
     from silo.workbench.register_flow import RegisterFlow
     from silo.workbench.sending import Sent
+    from silo.workbench.session import Session, Shown
 
 # FreeCAD's window comes first; a server is not talked to before it stands.
 BEGIN_AFTER_MS = 1500
@@ -34,7 +31,6 @@ class AddOn:
     """One per FreeCAD. Made at start, so everything that costs time is made when it is first needed."""
 
     def __init__(self) -> None:
-        widgets.use_icons(host.icon)
         self.preferences = Preferences(host.parameters(GROUP))
         self.dock = ActivityDock(host.main_window(), self.act)
         self.relay = qt.Relay(self._bug)
@@ -64,6 +60,10 @@ class AddOn:
     def session(self) -> Session:
         """The session; made when first needed."""
         if self._session is None:
+            from silo.workbench.session import Session, Told
+            from silo.workbench.settings import read_known
+            from silo.workbench.tokens import Keyring
+
             self._session = Session(
                 self.relay.post,
                 read_known(self.preferences),
@@ -107,6 +107,8 @@ class AddOn:
 
     def settings_changed(self) -> None:
         """The preference page was saved."""
+        from silo.workbench.settings import read_known
+
         host.save_parameters()
         self.session.settings_changed(
             read_known(self.preferences), live=self.preferences.flag("LiveActivity")
@@ -136,6 +138,8 @@ class AddOn:
 
     def _bug(self, error: BaseException) -> None:
         host.error(plain(f"[Silo] unexpected problem: {type(error).__name__}: {error}", 500))
+        import traceback
+
         host.log("".join(traceback.format_exception(error)))
 
     # -- commands ---------------------------------------------------------------------------------------
@@ -148,9 +152,17 @@ class AddOn:
         """True where Commit belongs into every workbench's File menu."""
         return self.preferences.flag("ShowEverywhere")
 
-    def preference_page(self) -> Any:
-        """The class of the preference page."""
-        return page_class(self.preferences, lambda: self.session, self.settings_changed)
+    def preference_page(self) -> type:
+        """What FreeCAD makes the preference page with; it wants a class, and calls it when the page opens."""
+        addon = self
+
+        class Page:
+            def __new__(cls, _parent: object = None) -> Any:
+                from silo.workbench.prefs import PreferencePage
+
+                return PreferencePage(addon.preferences, addon.session, addon.settings_changed)
+
+        return Page
 
     def hook_commit(self, name: str) -> None:
         """Sync the BOM after this command, which is not ours."""
@@ -220,6 +232,8 @@ class AddOn:
 
     def act(self, action: Action) -> None:
         """Do what a button of the pane asks for."""
+        from silo.workbench.activity import Do
+
         if action.do is Do.VIEW:
             self.open_page(action.target)
         elif action.do is Do.SHOW:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 from silo.workbench.words import translate
@@ -19,21 +18,23 @@ ACTIVITY = "Silo_Activity"
 SETTINGS = "Silo_Settings"
 
 
-@dataclass(frozen=True)
 class Command:
     """A command as FreeCAD wants it: an object with ``GetResources``, ``Activated`` and ``IsActive``."""
 
-    text: str
-    tip: str
-    icon: str
-    run: Callable[[], None]
-    active: Callable[[], bool] = lambda: True
-    shortcut: str = ""
+    def __init__(
+        self,
+        *,
+        text: str,
+        tip: str,
+        icon: str,
+        run: Callable[[], None],
+        active: Callable[[], bool] = lambda: True,
+    ) -> None:
+        self.text, self.tip, self.icon, self.run, self.active = text, tip, icon, run, active
 
     def GetResources(self) -> dict[str, str]:
         """What FreeCAD shows."""
-        resources = {"MenuText": self.text, "ToolTip": self.tip, "Pixmap": self.icon}
-        return resources | ({"Accel": self.shortcut} if self.shortcut else {})
+        return {"MenuText": self.text, "ToolTip": self.tip, "Pixmap": self.icon}
 
     def Activated(self, _index: int = 0) -> None:
         """Chosen from a menu, a toolbar, or by ``Gui.runCommand``."""

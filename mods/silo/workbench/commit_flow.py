@@ -20,8 +20,8 @@ from silo.workbench.activity import Action, Do, Entry, Line, Tone
 from silo.workbench.commit import Plan, Row, State, Taken, Taker, plan
 from silo.workbench.commit_dialog import CommitDialog, refusal
 from silo.workbench.decisions import Decisions
+from silo.workbench.preferences import ALLOW, Preferences
 from silo.workbench.session import Session
-from silo.workbench.settings import ALLOW, Preferences
 from silo.workbench.snapshot import Snapshot
 from silo.workbench.spool import Commit, new_key
 from silo.workbench.words import translate
@@ -39,10 +39,10 @@ class LiveDocuments:
 
 def take_snapshot(doc: Any) -> Snapshot:
     """Snapshot of a live document; the assembly that is active in the 3D view decides between several."""
-    hint = host.active_assembly() if host.has_gui() else None
-    if hint is not None and hint.Document != doc:
-        hint = None
-    return snapshot.take(doc, assembly=hint, walk=live.extract_object)
+    quick = live.behind_glass(doc)
+    active = host.active_assembly() if host.has_gui() else None
+    hint = quick.getObject(active.Name) if active is not None and active.Document == doc else None
+    return snapshot.take(quick, assembly=hint, walk=live.extract_object)
 
 
 class CommitFlow:

@@ -3,6 +3,7 @@
 
 Everything here belongs into FreeCAD's main thread, except the console functions. Behaviour that differs
 between FreeCAD 0.20, 1.0 and 1.1 was measured and is handled here, so that nobody else needs to know it.
+Imported at FreeCAD's start: what only some functions need, they import themselves.
 """
 
 from __future__ import annotations
@@ -15,8 +16,6 @@ from typing import Any
 
 import FreeCAD
 
-from silo.bom.errors import DocumentError
-from silo.bom.identity import meta_key
 from silo.workbench.saved_marks import SavedMarks
 
 # --- FreeCAD itself --------------------------------------------------------------------------------------
@@ -88,6 +87,11 @@ def documents() -> list[Any]:
     return list(FreeCAD.listDocuments().values())
 
 
+def is_object(value: Any) -> bool:
+    """True for an object of a document."""
+    return isinstance(value, FreeCAD.DocumentObject)
+
+
 def active_document() -> Any:
     """The document that a person works in, or None."""
     return FreeCAD.ActiveDocument
@@ -145,6 +149,8 @@ def open_fully(path: str) -> Any:
     FreeCAD completes a partly loaded document by closing and reading it again, so unsaved edits in it would
     be lost: then, and where the file cannot be read, :class:`DocumentError`.
     """
+    from silo.bom.errors import DocumentError
+
     known = find_document(path)
     if known is not None and not is_partial(known):
         return known
@@ -169,6 +175,8 @@ def close_all() -> None:
 
 def save(doc: Any) -> None:
     """Save a document to its file; :class:`DocumentError` unless the file really was written."""
+    from silo.bom.errors import DocumentError
+
     path = doc.FileName
     if not path:
         raise DocumentError(doc.Label, "it has never been saved; save it under a name first")
@@ -239,6 +247,9 @@ def write_identity(doc: Any, name: str, identity: str, *, whole_document: bool) 
         the document is this one component, so it carries the identity as well. Otherwise the identity is the
         object's only (:mod:`silo.bom.identity` says where it is looked for).
     """
+    from silo.bom.errors import DocumentError
+    from silo.bom.identity import meta_key
+
     obj = doc.getObject(name) if name else None
     if name and obj is None:
         raise DocumentError(doc.FileName, f"it has no object {name} any more")
@@ -353,8 +364,10 @@ def show_preferences(group: str, page: int = 0) -> None:
 def add_resources(icons: str, translations: str) -> None:
     """Make folders of icons and of translations known."""
     gui().addIconPath(icons)
-    gui().addLanguagePath(translations)
-    gui().updateLocale()
+    # Loading the translations anew takes FreeCAD 10 ms, so it is done where there are any.
+    if any(name.endswith(".qm") for name in os.listdir(translations)):
+        gui().addLanguagePath(translations)
+        gui().updateLocale()
 
 
 def selected_objects() -> list[Any]:

@@ -25,6 +25,7 @@ from silo.bom.links import extract
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.roots import choose_assembly
 from silo.workbench import host
+from silo.workbench.quick import Glass, QuickDocument
 
 # <XLink file="parts/b.FCStd" stamp="…" name="Box" …>, written by FreeCAD itself into memory just now.
 _XLINK = re.compile(r"<XLink\b([^>]*)>")
@@ -79,11 +80,17 @@ def extract_live(document: Any, assembly: str | None = None) -> Extraction:
     """
     if lost := lost_assemblies(document):
         return _lost(document, lost)
-    return extract_object(choose_assembly(document, assembly))
+    quick = behind_glass(document)
+    return extract_object(choose_assembly(quick, assembly))
+
+
+def behind_glass(document: Any) -> QuickDocument:
+    """A live document for one walk: quick to ask, and never out of date for it is not kept."""
+    return Glass(host.is_object).document(document)
 
 
 def extract_object(assembly_obj: Any) -> Extraction:
-    """The BOM of one live assembly object."""
+    """The BOM of one assembly object, live or :func:`behind_glass`."""
     return extract(assembly_obj, inspect=LinkInspector(), canonical=canonical_paths())
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The Database Activity dock (spec bom-sync §6); it draws what :mod:`silo.workbench.activity` says."""
+"""The content of the Database Activity dock (spec bom-sync §6): it draws :mod:`silo.workbench.activity`."""
 
 from __future__ import annotations
 
@@ -14,55 +14,8 @@ from silo.workbench.qt import QtCore, QtWidgets
 from silo.workbench.session import Shown
 from silo.workbench.words import translate
 
-NAME = "Database Activity"
-
 # More boxes than this are made only when somebody asks for them: widgets cost time, values do not.
 FIRST, MORE = 40, 60
-
-# Pixels.
-NARROW, WIDTH = 260, 320
-
-
-class ActivityDock(QtWidgets.QDockWidget):  # type: ignore[misc]  # PySide has no types
-    """The dock. FreeCAD restores place and visibility by its object name, so that must never change.
-
-    on_action
-        told of every button that is pressed.
-    """
-
-    def __init__(self, window: Any, on_action: OnAction) -> None:
-        super().__init__(translate("Silo", "Database Activity"), window)
-        self.setObjectName(NAME)
-        self._on_action = on_action
-        self._pane: Pane | None = None
-        self._shown: Shown | None = None
-        window.addDockWidget(QtCore.Qt.DockWidgetArea.RightDockWidgetArea, self)
-        self.hide()
-        self.visibilityChanged.connect(self._visible)
-
-    def show_and_raise(self) -> None:
-        """Show the dock, also where it is a tab behind another one."""
-        self.show()
-        self.raise_()
-
-    def update_shown(self, shown: Shown) -> None:
-        """Draw a new state; while nobody looks, only remember it."""
-        self._shown = shown
-        if self._pane is not None and self.isVisible():
-            self._pane.draw(shown)
-
-    def _visible(self, visible: bool) -> None:
-        if not visible:
-            return
-        if self._pane is None:
-            # Made when it is first seen: FreeCAD's start is not the place for it.
-            self._pane = Pane(self._on_action)
-            self.setWidget(self._pane)
-            if self.width() < NARROW:
-                # Never placed by the user so far: wide enough to read, narrow enough to work beside.
-                self.parent().resizeDocks([self], [WIDTH], QtCore.Qt.Orientation.Horizontal)
-        if self._shown is not None:
-            self._pane.draw(self._shown)
 
 
 class Pane(QtWidgets.QWidget):  # type: ignore[misc]

@@ -10,24 +10,15 @@ from typing import Any
 
 from silo.workbench import widgets
 from silo.workbench.activity import Tone
+from silo.workbench.preferences import ALLOW, HOLD, Preferences
 from silo.workbench.prefs_work import Findings, Wanted, in_use, keep_token, look, test
 from silo.workbench.qt import QtCore, QtWidgets
 from silo.workbench.session import Session
-from silo.workbench.settings import ALLOW, HOLD, Preferences, read_known
+from silo.workbench.settings import read_known
 from silo.workbench.tokens import Keyring
 from silo.workbench.words import translate
 
 KEYRING, PREFERENCE = "keyring", "preference"
-
-
-def page_class(preferences: Preferences, session: Callable[[], Session], changed: Callable[[], None]) -> type:
-    """The class that FreeCAD makes a page from, each time the preferences are opened."""
-
-    class SiloPreferences(PreferencePage):
-        def __init__(self, _parent: Any = None) -> None:
-            super().__init__(preferences, session(), changed)
-
-    return SiloPreferences
 
 
 class PreferencePage:

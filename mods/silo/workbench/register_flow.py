@@ -14,9 +14,9 @@ from silo.folders import data_folder
 from silo.registration import Journal, Registration
 from silo.workbench import host, live, widgets
 from silo.workbench.commit_flow import CommitFlow, take_snapshot
+from silo.workbench.preferences import Preferences
 from silo.workbench.registering import Candidate, Order, Seen, State, carry_out, next_number, offer
 from silo.workbench.session import Session
-from silo.workbench.settings import Preferences
 from silo.workbench.snapshot import Snapshot
 from silo.workbench.words import translate
 

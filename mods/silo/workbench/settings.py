@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The add-on's preferences: one table of names and defaults; an unknown name is an error.
-
-They live in FreeCAD's parameter group ``BaseApp/Preferences/Mod/KindredSilo``, under the names that the
-Kindred workbench uses where it has the same setting, so an existing set-up is found.
+"""Which server, which token, and who said so.
 
 The server is looked for in the environment, then in the preferences, then in the configuration file of the
 command line. A token belongs to the server it was given for and is sent to no other.
@@ -17,68 +14,7 @@ from enum import StrEnum
 from typing import Any, Protocol
 
 from silo.bom.errors import ConfigError
-
-GROUP = "User parameter:BaseApp/Preferences/Mod/KindredSilo"
-
-HOLD, ALLOW = "hold", "allow"
-
-DEFAULTS: Mapping[str, str | bool] = {
-    "ApiUrl": "",
-    "ApiToken": "",
-    "SslVerify": True,
-    "SslCertPath": "",
-    "Schema": "kindred-rd",
-    # The BOM sync after a commit; the file revision is uploaded in any case.
-    "SyncBom": True,
-    # HOLD: a BOM with a broken link waits until the link is mended. ALLOW: it is synced without it.
-    "MissingLinks": HOLD,
-    "AskComment": True,
-    "AskRegister": True,
-    "LiveActivity": True,
-    "ShowEverywhere": True,
-}
-
-
-class Parameters(Protocol):
-    """FreeCAD's ``ParamGet(…)`` object, as far as it is needed here."""
-
-    def GetString(self, name: str, default: str = "", /) -> str: ...
-
-    def SetString(self, name: str, value: str, /) -> None: ...
-
-    def GetBool(self, name: str, default: bool = False, /) -> bool: ...
-
-    def SetBool(self, name: str, value: bool, /) -> None: ...
-
-
-class Preferences:
-    """Typed access to the parameter group."""
-
-    def __init__(self, group: Parameters) -> None:
-        self._group = group
-
-    def text(self, name: str) -> str:
-        """A text setting."""
-        return self._group.GetString(name, str(_default(name, str)))
-
-    def flag(self, name: str) -> bool:
-        """A yes/no setting."""
-        return self._group.GetBool(name, bool(_default(name, bool)))
-
-    def set(self, name: str, value: str | bool) -> None:
-        """Change a setting."""
-        _default(name, type(value))
-        if isinstance(value, bool):
-            self._group.SetBool(name, value)
-        else:
-            self._group.SetString(name, value)
-
-
-def _default(name: str, kind: type) -> str | bool:
-    default = DEFAULTS.get(name)
-    if default is None or type(default) is not kind:
-        raise KeyError(f"{name}: no such preference of this kind; there are {', '.join(DEFAULTS)}")
-    return default
+from silo.workbench.preferences import Preferences
 
 
 class Origin(StrEnum):

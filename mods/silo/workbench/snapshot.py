@@ -8,17 +8,17 @@ A snapshot goes through JSON and back unchanged, so it can wait on disk.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 from silo.bom.document import document_property, own
-from silo.bom.errors import InputError, SiloError
-from silo.bom.findings import Finding, FindingCode, Place, Severity
+from silo.bom.errors import InputError
 from silo.bom.identity import META_KEY, identity_of
 from silo.bom.links import extract
-from silo.bom.model import BomEntry, Extraction
+from silo.bom.model import Extraction
 from silo.bom.roots import choose_assembly
+from silo.bom.snapshot import from_plain, to_plain
 from silo.workbench.words import plain, translate
 
 FORMAT = 1
@@ -126,7 +126,7 @@ def _several(doc: Any, label: str) -> str:
 
 
 def to_json(snapshot: Snapshot) -> dict[str, Any]:
-    """Plain data. Entries that several parents share are written once."""
+    """Plain data that :func:`from_json` makes an equal snapshot of."""
     data: dict[str, Any] = {
         "format": FORMAT,
         "path": snapshot.path,
@@ -135,7 +135,7 @@ def to_json(snapshot: Snapshot) -> dict[str, Any]:
         "problem": snapshot.problem,
     }
     if snapshot.extraction is not None:
-        data["bom"] = _extraction_json(snapshot.extraction)
+        data["bom"] = to_plain(snapshot.extraction)
     return data
 
 
@@ -149,76 +149,8 @@ def from_json(data: Mapping[str, Any]) -> Snapshot:
             path=data["path"],
             label=data["label"],
             identity=data["identity"],
-            extraction=_extraction(bom) if bom is not None else None,
+            extraction=from_plain(bom) if bom is not None else None,
             problem=data["problem"],
         )
-    except SiloError:
-        raise
-    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise InputError(f"this snapshot cannot be read ({type(error).__name__}: {error})") from error
-
-
-def _extraction_json(extraction: Extraction) -> dict[str, Any]:
-    nodes: list[dict[str, Any]] = []
-    numbers: dict[int, int] = {}
-
-    def number(entry: BomEntry) -> int:
-        if id(entry) not in numbers:
-            children = [number(child) for child in entry.children]
-            numbers[id(entry)] = len(nodes)
-            nodes.append(_node(entry, children))
-        return numbers[id(entry)]
-
-    return {
-        "assembly": number(extraction.assembly),
-        "entries": [number(entry) for entry in extraction.entries],
-        "nodes": nodes,
-        "findings": [
-            [f.code.value, f.severity.value, f.message, [[p.doc_path, p.obj] for p in f.where]]
-            for f in extraction.findings
-        ],
-    }
-
-
-_PLAIN = (
-    "doc_path",
-    "silo_uuid",
-    "quantity",
-    "level",
-    "consolidation_warning",
-    "object_name",
-    "label",
-    "is_assembly",
-    "individual_links",
-    "link_objects",
-    "document_label",
-)
-
-
-def _node(entry: BomEntry, children: list[int]) -> dict[str, Any]:
-    node = {name: getattr(entry, name) for name in _PLAIN}
-    return node | {"instances": list(entry.instances), "children": children}
-
-
-def _extraction(data: Mapping[str, Any]) -> Extraction:
-    entries: list[BomEntry] = []
-    for node in data["nodes"]:
-        # A node only names nodes before it, so a broken file cannot send us round in a ring.
-        children = tuple(entries[i] for i in _before(node["children"], len(entries)))
-        plain = {name: node[name] for name in _PLAIN}
-        entries.append(BomEntry(**plain, instances=tuple(node["instances"]), children=children))
-    return Extraction(
-        assembly=entries[data["assembly"]],
-        entries=tuple(entries[i] for i in data["entries"]),
-        findings=tuple(
-            Finding(FindingCode(code), Severity(severity), message, tuple(Place(*place) for place in where))
-            for code, severity, message, where in data["findings"]
-        ),
-    )
-
-
-def _before(numbers: list[int], count: int) -> Iterator[int]:
-    for number in numbers:
-        if not 0 <= number < count:
-            raise ValueError(f"node {count} names node {number}")
-        yield number

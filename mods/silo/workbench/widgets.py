@@ -6,11 +6,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from silo.workbench import host
 from silo.workbench.activity import Tone
 from silo.workbench.flow_layout import FlowLayout
 from silo.workbench.qt import QtCore, QtGui, QtWidgets
-
-_icons: Callable[[str], Any] = lambda _name: None  # noqa: E731  (replaced as a whole by `use_icons`)
 
 # (on a light ground, on a dark ground)
 _COLOURS = {
@@ -94,17 +93,11 @@ def row(*widgets: Any, gap: int = 10) -> Any:
 def picture(name: str, size: int = 16) -> Any:
     """One of the add-on's own icons as a label."""
     made = QtWidgets.QLabel()
-    icon = _icons(name)
+    icon = host.icon(name)
     if icon is not None:
         made.setPixmap(icon.pixmap(size, size))
     made.setFixedSize(size, size)
     return made
-
-
-def use_icons(icons: Callable[[str], Any]) -> None:
-    """Take pictures from here: name → QIcon, or None."""
-    global _icons
-    _icons = icons
 
 
 def clear(layout: Any) -> None:
