@@ -8,7 +8,8 @@ The rules of this module:
 * what lies in something suppressed or excluded is left out with it;
 * a Draft array counts its original, which is not counted again beside it;
 * a link to a link group of the same file is one more instance of all that the group bundles; any other link
-  into the same file is construction geometry.
+  into the same file is construction geometry;
+* what a damaged file does not tell is a finding that blocks; the rest is counted.
 
 Nothing here depends on where the assembly is used, so each is read once.
 """
@@ -21,6 +22,7 @@ from typing import Any
 
 from silo.bom.copies import stale_copies
 from silo.bom.document import derived, own, same_document
+from silo.bom.errors import DocumentError
 from silo.bom.kinds import COMPONENTS, INLINE, Kind, flattened, is_container, kind_of, no_component
 from silo.bom.notes import Notes
 from silo.bom.targets import (
@@ -110,8 +112,15 @@ class Reader:
         key = self.key(container)
         if key not in self._known:
             self.notes.reading = key[0]
-            self._known[key] = _Reading(self, container).of(container)
+            self._known[key] = self._read(container)
         return self._known[key]
+
+    def _read(self, container: Any) -> Contents:
+        try:
+            return _Reading(self, container).of(container)
+        except DocumentError as error:
+            self.notes.unreadable(container, error)
+            return Contents(holds_components=True)
 
     def resolve(self, link: Any) -> Target:
         """The end of a link."""
@@ -223,6 +232,19 @@ class _Reading:
             self._notes.too_deep(obj, _MAX_NESTING)
             return {}
         self._open.append(key)
+        try:
+            worth = self._worth_of(key, obj, kind)
+        except DocumentError as error:
+            # One damaged object must not hide the others; the finding blocks the BOM all the same.
+            self._holds_components = True
+            self._notes.unreadable(obj, error)
+            worth = {}
+        finally:
+            self._open.pop()
+        self._worths[key] = worth
+        return worth
+
+    def _worth_of(self, key: Key, obj: Any, kind: Kind) -> _Worth:
         worth: _Worth = {}
         if kind is Kind.DRAFT_ARRAY:
             worth = self._draft_array(key, obj)
@@ -231,8 +253,6 @@ class _Reading:
         elif kind in INLINE:
             for leaf in self._leaves(obj):
                 _add(worth, self._worth(*leaf))
-        self._open.pop()
-        self._worths[key] = worth
         return worth
 
     def _draft_array(self, key: Key, array: Any) -> _Worth:

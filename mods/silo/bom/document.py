@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
+from silo.bom.errors import DocumentError
 from silo.bom.findings import FindingCode
 
 
@@ -88,9 +89,12 @@ def object_name(obj: object) -> str:
 
 
 def label_of(obj: object) -> str:
-    """The object's ``Label``, for people only; its ``Name`` where it has none."""
+    """The object's ``Label``, for people only; its ``Name`` where it has none that can be read."""
     for name in ("Label", "Name"):
-        text = getattr(obj, name, None)
+        try:
+            text = getattr(obj, name, None)
+        except DocumentError:  # a message about a damaged object must not fail for its label
+            continue
         if isinstance(text, str) and text:
             return text
     return "an unnamed object"
@@ -109,8 +113,9 @@ def document_property(doc: object, name: str) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class LinkProblem:
-    """Why a link has no target. ``file`` and ``obj`` as the link records them ("" where unknown).
+    """Why a link has no target, or only a changed copy of one that is lost.
 
+    ``file`` and ``obj`` stand as the link records them ("" where unknown).
     A relative ``file`` is relative to the folder of the document that holds the link, as FreeCAD writes it;
     an empty one is that document itself.
 

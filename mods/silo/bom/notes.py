@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from silo.bom.document import LinkProblem, label_of, object_name
+from silo.bom.errors import DocumentError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.model import BomEntry
 
@@ -96,6 +97,17 @@ class Notes:
             self._add(code, about, Severity.WARNING, text, link, "not counted: {users}")
         else:
             self._add(code, about, Severity.ERROR, text, link, "used by {users}")
+
+    def unreadable(self, obj: Any, error: DocumentError) -> None:
+        """The file that ``obj`` lies in is damaged at this very place."""
+        self._add(
+            FindingCode.UNREADABLE_FILE,
+            str(error),
+            Severity.ERROR,
+            f"The file {error.path} cannot be read ({error.reason})",
+            obj,
+            "not counted: {users}",
+        )
 
     def cycle(self, link: Any, ring: Sequence[tuple[str, str]]) -> None:
         """``ring``: the assemblies that contain each other, the first not repeated."""

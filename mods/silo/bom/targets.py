@@ -172,8 +172,7 @@ def _next_hop(link: Any, trail: _Trail) -> tuple[_Hop, bool]:
             return _Hop(None, problem=_no_target(link, trail.inspect)), False
         return _follow_sub(linked[0], linked[1], trail), False
     if _lost_its_source(link, linked):
-        problem = LinkProblem(FindingCode.BROKEN_LINK, detail="the original of its changed copy is lost")
-        return _Hop(None, problem=problem), True
+        return _Hop(None, problem=_no_source(link, trail.inspect)), True
     return _Hop(linked), False
 
 
@@ -182,6 +181,14 @@ def _lost_its_source(link: object, target: object) -> bool:
     return mode in ("Owned", "Tracking") and same_document(
         getattr(link, "Document", None), getattr(target, "Document", None)
     )
+
+
+def _no_source(link: object, inspect: Inspect | None) -> LinkProblem:
+    known = _no_target(link, inspect)
+    if not known.file:
+        return LinkProblem(FindingCode.BROKEN_LINK, detail="the original of its changed copy is lost")
+    words = "it is the original of a changed copy"
+    return replace(known, detail=f"{known.detail}; {words}" if known.detail else words)
 
 
 def _file_of(obj: object) -> str:

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 # Objects of these types are read together with the rest of their file, for a walker looks at what they hold.
 _CONTAINERS = frozenset({"App::Part", "App::LinkGroup", "App::DocumentObjectGroup"})
+# What a target is and which item it is: without these a link to it would only be guessed at.
+_SAID_OF_ITSELF = ("SiloItemId", "SiloUUID", "Type")
 _SIZE = Struct("<I")
 _DOUBLES, _FLOATS = Struct("<3d"), Struct("<3f")
 
@@ -137,7 +139,11 @@ class FcstdDocument:
         """Make sure that what a walker asks of a link's target can be read. Raises DocumentError."""
         if not _CONTAINERS.isdisjoint(ancestors(target.TypeId)):
             self._xml.complete()
-        _ = target.properties, self.properties
+        numbers = target.properties.numbers
+        for name in _SAID_OF_ITSELF:
+            if name in numbers:
+                getattr(target, name, None)
+        _ = target.Label, self.Meta, self._value("SiloUUID")
 
     @property
     def properties(self) -> Properties:

@@ -8,6 +8,7 @@ lists are tuples, and a link without a target says why (``LinkProblem``).
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from silo.bom.document import LinkProblem as Problem
@@ -61,7 +62,7 @@ class FcstdObject:
         """As FreeCAD: the type of the object itself, never of a link's target; False for unknown names."""
         return type_name in ancestors(self.TypeId)
 
-    @property
+    @cached_property
     def Label(self) -> str:
         """What people call the object; its ``Name`` where the file has no label."""
         label = self.properties.value("Label")
@@ -69,9 +70,18 @@ class FcstdObject:
 
     @property
     def LinkProblem(self) -> Problem | None:
-        """Why ``LinkedObject`` is None; None where it is not, or where there is no such property."""
-        ref = self.properties.value("LinkedObject")
-        return self.Document.problem_of(ref) if isinstance(ref, Ref) else None
+        """Why ``LinkedObject`` is None; where it is not, why the original of a changed copy is.
+
+        None for a link that has what it records, and where there are no such properties.
+        """
+        return self._problem_of("LinkedObject") or self._problem_of("LinkCopyOnChangeSource")
+
+    def _problem_of(self, name: str) -> Problem | None:
+        ref = self.properties.value(name)
+        # Most links have no original; only their target may be missed where it was never set.
+        if not isinstance(ref, Ref) or (name != "LinkedObject" and not ref.name):
+            return None
+        return self.Document.problem_of(ref)
 
     def getPropertyByName(self, name: str) -> Any:
         """The value of a property. AttributeError where there is none, or none that is plain."""

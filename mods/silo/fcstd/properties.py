@@ -138,7 +138,7 @@ class Properties:
         try:
             spans = careful.index_properties(element, self._xml.limits.depth)
         except Malformed as error:
-            raise self._xml.error(str(error)) from error
+            raise self._xml.malformed(error) from error
         return Shape.of(spans, b""), [b"", *(element[first:last] for first, last in spans.values())]
 
     def _node(self, piece: bytes) -> Node:
@@ -153,4 +153,4 @@ class Properties:
         try:
             return careful.parse_value(piece, self._xml.limits.depth)
         except Malformed as error:
-            raise self._xml.error(str(error)) from error
+            raise self._xml.malformed(error) from error

@@ -78,6 +78,7 @@ class XmlText:
         self._position = 0
         self._complete = False
         self._failure: FcstdError | None = None
+        self._sound: Malformed | bool | None = None  # expat's word on the whole, once a piece was refused
         self.is_careful = False
 
     @property
@@ -122,6 +123,17 @@ class XmlText:
     def error(self, reason: str) -> FcstdError:
         """An error about this text."""
         return FcstdError(self.path, f"its Document.xml {reason}")
+
+    def malformed(self, problem: Malformed) -> FcstdError:
+        """An error about a piece of this text, with expat's word on the whole: it knows the line."""
+        if self._sound is None and not self.is_careful:
+            try:
+                whole = self._new_inflater().rest()
+                careful.index_document(careful.as_utf8(whole), self.limits.depth)
+                self._sound = True
+            except Malformed as error:
+                self._sound = error
+        return self.error(str(self._sound if isinstance(self._sound, Malformed) else problem))
 
     def decode(self, raw: bytes) -> str:
         """UTF-8, or an error."""
