@@ -145,7 +145,7 @@ def build(folder: Path, kind: str, parts: int, links: int) -> str:
     if FREECADCMD:
         freecad(BUILD, str(folder), kind, parts, links)
         return "FreeCAD"
-    sys.path.insert(0, str(ROOT / "tests" / "fcstd"))
+    sys.path.insert(0, str(ROOT / "tests" / "support"))
     from fcstd_writer import Doc, locals_, part
 
     name = "Box" if kind == "box" else "Body"
