@@ -1,16 +1,14 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The user's folders, by the XDG rules."""
+"""The user's folders, by each platform's rules."""
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
 
 from silo.folders import cache_folder, config_folder, data_folder
-
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the rules of Linux")
+from silo_server.settings import settings_from_environment
 
 FOLDERS = [
     (config_folder, "XDG_CONFIG_HOME", ".config"),
@@ -25,10 +23,33 @@ def test_folders(folder: object, variable: str, default: str) -> None:
     assert callable(folder)
     home = {"HOME": "/home/designer"}
     below = Path("/home/designer") / default / "silo-mod"
-    assert folder({**home, variable: "/data"}) == Path("/data/silo-mod")
-    assert folder(home) == below
-    assert folder({**home, variable: ""}) == below
-    assert folder({**home, variable: "relative"}) == below, "XDG: relative paths are to be ignored"
+    assert folder({**home, variable: "/data"}, "linux") == Path("/data/silo-mod")
+    assert folder(home, "linux") == below
+    assert folder({**home, variable: ""}, "linux") == below
+    assert folder({**home, variable: "relative"}, "linux") == below, "XDG: relative paths are to be ignored"
+
+
+def test_windows_has_its_own_variables() -> None:
+    """Only the configuration roams; a database or an outbox must not be copied between machines."""
+    env = {"APPDATA": "/roaming", "LOCALAPPDATA": "/local", "HOME": "/elsewhere"}
+    assert config_folder(env, "win32") == Path("/roaming/silo-mod")
+    assert data_folder(env, "win32") == cache_folder(env, "win32") == Path("/local/silo-mod")
+    assert data_folder({}, "win32") == Path.home() / "AppData" / "Local" / "silo-mod"
+
+
+def test_macos_has_its_library() -> None:
+    """Data and configuration together, the cache apart."""
+    env = {"HOME": "/Users/designer"}
+    library = Path("/Users/designer/Library")
+    assert config_folder(env, "darwin") == data_folder(env, "darwin")
+    assert data_folder(env, "darwin") == library / "Application Support" / "silo-mod"
+    assert cache_folder(env, "darwin") == library / "Caches" / "silo-mod"
+
+
+def test_the_server_keeps_its_database_where_the_client_looks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One rule for both, also where a variable moves the folder."""
+    monkeypatch.setenv("XDG_DATA_HOME", "/data")
+    assert settings_from_environment({}).sqlite_path == data_folder() / "silo.db"
 
 
 def test_nothing_is_created(tmp_path: Path) -> None:

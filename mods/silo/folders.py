@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """The user's folders for configuration, data and caches, by the platform's own rules.
 
-The add-on inside FreeCAD may only need three packages, so the few lines of ``platformdirs`` that matter are
-here: the XDG base directories, ``~/Library`` on macOS, ``%APPDATA%`` and ``%LOCALAPPDATA%`` on Windows.
+Client and server ask here, so that what one wrote the other finds. The add-on inside FreeCAD may only need
+three packages, so the few lines of ``platformdirs`` that matter are here: the XDG base directories,
+``~/Library`` on macOS, ``%APPDATA%`` and ``%LOCALAPPDATA%`` on Windows. Standard library only.
 """
 
 from __future__ import annotations
@@ -13,29 +14,37 @@ from collections.abc import Mapping
 from pathlib import Path
 
 _NAME = "silo-mod"
+_LOCAL, _ROAMING = ("LOCALAPPDATA", "AppData/Local"), ("APPDATA", "AppData/Roaming")
 
 
-def _folder(env: Mapping[str, str], xdg: str, unix: str, mac: str, windows: str) -> Path:
+def _folder(
+    env: Mapping[str, str], platform: str, xdg: str, unix: str, mac: str, windows: tuple[str, str]
+) -> Path:
     home = Path(env.get("HOME") or Path.home())
-    if sys.platform == "win32":
-        return Path(env.get(windows) or home) / _NAME
+    if platform == "win32":
+        variable, default = windows
+        return Path(env.get(variable) or Path.home() / default) / _NAME
     # XDG says that a relative path is to be ignored.
     chosen = env.get(xdg, "")
     if chosen and os.path.isabs(chosen):
         return Path(chosen) / _NAME
-    return home / (mac if sys.platform == "darwin" else unix) / _NAME
+    return home / (mac if platform == "darwin" else unix) / _NAME
 
 
-def config_folder(env: Mapping[str, str] = os.environ) -> Path:
+def config_folder(env: Mapping[str, str] = os.environ, platform: str = sys.platform) -> Path:
     """Where the configuration lives (not created here)."""
-    return _folder(env, "XDG_CONFIG_HOME", ".config", "Library/Application Support", "APPDATA")
+    return _folder(env, platform, "XDG_CONFIG_HOME", ".config", "Library/Application Support", _ROAMING)
 
 
-def data_folder(env: Mapping[str, str] = os.environ) -> Path:
-    """Where what must not be lost lives: the outbox, the journal of registrations, the embedded database."""
-    return _folder(env, "XDG_DATA_HOME", ".local/share", "Library/Application Support", "APPDATA")
+def data_folder(env: Mapping[str, str] = os.environ, platform: str = sys.platform) -> Path:
+    """Where what must not be lost lives: the outbox, the journal of registrations, the embedded database.
+
+    On Windows not in the roaming profile: a database that is copied between machines while it is open is soon
+    a broken one.
+    """
+    return _folder(env, platform, "XDG_DATA_HOME", ".local/share", "Library/Application Support", _LOCAL)
 
 
-def cache_folder(env: Mapping[str, str] = os.environ) -> Path:
+def cache_folder(env: Mapping[str, str] = os.environ, platform: str = sys.platform) -> Path:
     """Where what can be made again lives."""
-    return _folder(env, "XDG_CACHE_HOME", ".cache", "Library/Caches", "LOCALAPPDATA")
+    return _folder(env, platform, "XDG_CACHE_HOME", ".cache", "Library/Caches", _LOCAL)

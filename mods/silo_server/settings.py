@@ -4,31 +4,20 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 from silo.bom.errors import ConfigError
+from silo.folders import data_folder
 
 MIB = 1024 * 1024
 
 
-def default_data_dir() -> Path:
-    """The user's data folder for the embedded server (XDG, macOS and Windows customs)."""
-    if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local"))
-    elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Application Support"
-    else:
-        base = Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share")
-    return base / "silo-mod"
-
-
 def default_database_url() -> str:
     """SQLite in the user's data folder."""
-    return f"sqlite:///{default_data_dir() / 'silo.db'}"
+    return f"sqlite:///{data_folder() / 'silo.db'}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,7 +90,7 @@ class Settings:
         if self.files_dir is not None:
             return self.files_dir
         path = self.sqlite_path
-        return path.with_name(path.stem + "-files") if path else default_data_dir() / "files"
+        return path.with_name(path.stem + "-files") if path else data_folder() / "files"
 
 
 _ENVIRONMENT = {
