@@ -97,6 +97,37 @@ def test_a_client_s_uuid_makes_a_repeat_harmless(api: Api) -> None:
     assert first.json()["id"] == identity
 
 
+@pytest.mark.parametrize("nonsense", ["", "M01-0001", 5])
+def test_an_id_that_is_no_uuid_is_refused(api: Api, nonsense: object) -> None:
+    """400 that names the field; no item with another identity is made behind the client's back."""
+    name = uuid.uuid4().hex
+    error = api.bad(400, "POST", "/api/items", {"id": nonsense, "category": "M01", "name": name})
+    assert "id: " in error["message"]
+    assert api.get(f"/api/items/search?q={name}") == []
+
+
+def test_an_id_of_another_item_is_a_conflict(api: Api) -> None:
+    """409 that names the item which has it; in any written form of the UUID."""
+    number = api.item()
+    identity = api.get(f"/api/items/{number}")["id"]
+    error = api.bad(
+        409, "POST", "/api/items", {"id": identity.upper(), "part_number": "T-" + uuid.uuid4().hex}
+    )
+    assert number in error["message"]
+    again = api.call("POST", "/api/items", {"id": identity, "part_number": number.lower()})
+    assert (again.status, again.json()["id"]) == (200, identity)
+
+
+def test_an_id_of_an_archived_item_is_a_conflict(api: Api) -> None:
+    """It is not handed out as if it were in use; after it was brought back, the repeat finds it."""
+    number = api.item()
+    body = {"id": api.get(f"/api/items/{number}")["id"], "category": "M01", "name": "Bracket"}
+    api.good("DELETE", f"/api/items/{number}")
+    assert "archived" in api.bad(409, "POST", "/api/items", body)["message"]
+    api.good("POST", f"/api/items/{number}/unarchive")
+    assert api.call("POST", "/api/items", body).status == 200
+
+
 def test_by_uuid(api: Api) -> None:
     """The item by its UUID, in any written form; 404 when unknown or archived, 400 for no UUID."""
     number = api.item()

@@ -39,7 +39,10 @@ class Body(BaseModel):
 
 
 class NewItemBody(Body):
-    """``POST /api/items``. With ``id`` (a UUID chosen by the client) a repeat makes no second item."""
+    """``POST /api/items``. With ``id`` (a UUID chosen by the client) a repeat makes no second item.
+
+    An ``id`` that is no UUID is refused, as is one whose item has another part number or is archived.
+    """
 
     model_config = ConfigDict(extra="ignore", protected_namespaces=(), populate_by_name=True)
 

@@ -12,7 +12,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, func, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
-from silo.bom.errors import NotFoundError, RejectedError
+from silo.bom.errors import ConflictError, NotFoundError, RejectedError
 from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import items
@@ -136,18 +136,17 @@ def list_items(tx: Tx, query: ItemQuery) -> tuple[list[Item], int]:
 def create_item(tx: Tx, new: NewItem) -> tuple[Item, bool]:
     """Make an item. Returns it, and False where its UUID was known already (the repeat of a request).
 
-    Raises RejectedError for unusable values, DuplicateError for a taken part number.
+    Raises RejectedError for unusable values, DuplicateError for a taken part number, ConflictError for a
+    UUID whose item is not the one that is asked for.
     """
-    if new.uuid is not None:
-        known = tx.conn.execute(select(items).where(items.c.uuid == normal_uuid(new.uuid))).one_or_none()
-        if known is not None:
-            return to_item(known), False
+    if new.uuid is not None and (known := _made_before(tx, new.uuid, new.part_number)) is not None:
+        return known, False
     schema = find_schema(new.schema)
     category = schema.category(new.category) if new.category else None
     number = check_number(new.part_number) if new.part_number else take_number(tx, schema, category)
     name, description = new.name.strip(), new.description.strip()
     values = {
-        "uuid": normal_uuid(new.uuid) if new.uuid else str(uuids.uuid4()),
+        "uuid": normal_uuid(new.uuid, "id") if new.uuid else str(uuids.uuid4()),
         "schema_name": schema.name,
         "category": category.code if category else None,
         "item_type": _item_type(new.item_type, category),
@@ -230,11 +229,13 @@ def unarchive_item(tx: Tx, part_number: str) -> Item:
     return get_item(tx, part_number)
 
 
-def normal_uuid(uuid: str) -> str:
-    """The UUID in its one written form; RejectedError where it is none."""
+def normal_uuid(uuid: str, field: str = "uuid") -> str:
+    """The UUID in its one written form; RejectedError, naming the field, where it is none."""
     normal = uuid_or_none(uuid)
     if normal is None:
-        raise RejectedError(f"uuid: wanted a UUID such as 6f9619ff-8b86-4011-b42d-00cf4fc964ff, got {uuid!r}")
+        raise RejectedError(
+            f"{field}: wanted a UUID such as 6f9619ff-8b86-4011-b42d-00cf4fc964ff, got {uuid!r}"
+        )
     return normal
 
 
@@ -244,6 +245,24 @@ def uuid_or_none(uuid: str) -> str | None:
         return str(uuids.UUID(uuid))
     except ValueError:
         return None
+
+
+def _made_before(tx: Tx, uuid: str, number: str | None) -> Item | None:
+    """The item that an earlier request made with this UUID."""
+    row = tx.conn.execute(select(items).where(items.c.uuid == normal_uuid(uuid, "id"))).one_or_none()
+    if row is None:
+        return None
+    item = to_item(row)
+    if number is not None and number.casefold() != item.part_number.casefold():
+        raise ConflictError(
+            f"id: {item.uuid} is that of {item.part_number}, not of {number}; a new item needs a new id"
+        )
+    if item.archived_at:
+        raise ConflictError(
+            f"id: {item.uuid} is that of {item.part_number}, which is archived; bring it back, or give a new "
+            "item a new id"
+        )
+    return item
 
 
 def _insert(tx: Tx, number: str, values: Mapping[str, Any]) -> None:
