@@ -33,10 +33,10 @@ def test_case_23_duplicates_told_apart_by_quantity(
     """Two "Part 1", one placed twice, one three times: the quantities decide, and nothing is doubtful."""
     a, b = cube("Part 1", 0.01, key="a"), cube("Part 1", 0.02, key="b")
     asm = assemble(*((f"l/a{i}", a) for i in range(2)), *((f"l/b{i}", b) for i in range(3)))
-    report = compute(asm, HEAD + "1,3,,,0.5000 kg,Part 1\n2,2,,,0.2000 kg,Part 1\n")
-    assert masses(report) == {"1": 0.2, "8": 0.5}
+    report = compute(asm, HEAD + "1,3,,,5.000 g,Part 1\n2,2,,,2.000 g,Part 1\n")
+    assert masses(report) == {"1": 0.002, "8": 0.005}
     assert {part.decided_by for _, part in report.parts()} == {Decided.QUANTITY}
-    assert report.total.mass == pytest.approx(2 * 0.2 + 3 * 0.5)
+    assert report.total.mass == pytest.approx(2 * 0.002 + 3 * 0.005)
     assert codes(report) == ["bom_duplicate_name"]
 
 
@@ -79,9 +79,9 @@ def test_duplicates_told_apart_by_parent(assemble: Fixture, compute: Fixture, co
     asm = assemble(("arm/p", a), ("leg/p", b))
     report = compute(
         asm,
-        HEAD + "1,1,,,,leg\n1.1,1,,,0.8000 kg,Part 1\n2,1,,,,arm\n2.1,1,,,0.1000 kg,Part 1\n",
+        HEAD + "1,1,,,,leg\n1.1,1,,,8.00 g,Part 1\n2,1,,,,arm\n2.1,1,,,1.00 g,Part 1\n",
     )
-    assert masses(report) == {"1": 0.1, "8": 0.8}
+    assert masses(report) == {"1": 0.001, "8": 0.008}
     assert {part.decided_by for _, part in report.parts()} == {Decided.PARENT}
     assert codes(report) == ["bom_duplicate_name"]
 
@@ -129,9 +129,9 @@ def test_sub_assembly_mass_is_spread_where_its_parts_have_none(
     """A bought motor: one row with a mass, two parts in the geometry. By volume, and told."""
     rotor, stator = cube("rotor", 0.01), cube("stator", 0.02)
     asm = assemble(("arm/motor/rotor", rotor), ("arm/motor/stator", stator))
-    report = compute(asm, HEAD + "1,1,,,0.900 kg,motor\n")
-    assert part(report, "rotor").mass == pytest.approx(0.1)
-    assert part(report, "stator").mass == pytest.approx(0.8)
+    report = compute(asm, HEAD + "1,1,,,9.00 g,motor\n")
+    assert part(report, "rotor").mass == pytest.approx(0.001)
+    assert part(report, "stator").mass == pytest.approx(0.008)
     assert part(report, "rotor").source is Source.SUB_ASSEMBLY_MASS
     assert part(report, "rotor").rule is Rule.SUB_ASSEMBLY
     assert codes(report) == ["sub_assembly_mass_shared"] * 2
@@ -396,9 +396,9 @@ def test_a_wire_beside_its_solid_is_one_part(assemble: Fixture, compute: Fixture
     solid, wire = cube("plate", key="s"), shape_only("plate", key="w")
     report = compute(
         assemble(("l/1", solid, None, "l/plate"), ("l/2", wire, None, "l/plate")),
-        HEAD + "1,1,,,0.100 kg,plate\n",
+        HEAD + "1,1,,,1.00 g,plate\n",
     )
-    assert report.total.mass == pytest.approx(0.1)
+    assert report.total.mass == pytest.approx(0.001)
     assert codes(report) == []
 
 
@@ -462,8 +462,8 @@ def test_a_row_without_children_stands_for_what_is_listed_nowhere(
 ) -> None:
     """A bolt in the motor has a row of its own; the rest of the motor's mass is the rotor's."""
     asm = assemble(("arm/motor/rotor", cube("rotor", 0.02)), ("arm/motor/bolt", cube("bolt")))
-    report = compute(asm, HEAD + "1,1,,,0.900 kg,motor\n2,1,,,0.010 kg,bolt\n")
-    assert part(report, "rotor").mass == pytest.approx(0.89)
+    report = compute(asm, HEAD + "1,1,,,90.0 g,motor\n2,1,,,10.0 g,bolt\n")
+    assert part(report, "rotor").mass == pytest.approx(0.08)
     assert part(report, "bolt").mass == pytest.approx(0.01)
     assert codes(report, "rotor") == ["sub_assembly_mass_shared"]
 

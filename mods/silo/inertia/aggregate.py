@@ -14,10 +14,10 @@ from silo.bom.errors import InputError
 from silo.inertia.bom.rows import BomTable
 from silo.inertia.codes import MassCode
 from silo.inertia.core import MassProps, TensorProblem, combine_arrays, is_rigid
+from silo.inertia.doubts import Note
 from silo.inertia.frames import ASSEMBLY_FRAME, FrameChoice, LinkFrame
 from silo.inertia.links import Claims
 from silo.inertia.masses import Placed
-from silo.inertia.massrule import Note
 from silo.inertia.matching import Matching
 from silo.inertia.model import Assembly
 from silo.inertia.products import companions, leaf_products, sub_assemblies

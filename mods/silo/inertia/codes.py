@@ -25,6 +25,7 @@ class MassCode(StrEnum):
     ROUNDED = "mass_rounded"  # the BOM's digits leave more than 2 % open
     DIFFERS = "mass_differs"  # BOM mass against material times volume
     ROW_TOTAL = "row_total"  # the BOM mass looks like that of the whole row
+    IMPLAUSIBLE = "mass_implausible"  # denser than any metal, or lighter than any solid
     STEP_DENSITY = "step_density_differs"
     SUB_ASSEMBLY = "sub_assembly_mass_differs"
     SUB_ASSEMBLY_SHARED = "sub_assembly_mass_shared"  # a sub-assembly's mass spread over its parts by volume

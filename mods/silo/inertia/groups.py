@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from silo.inertia.bom.rows import BOMEntry
 from silo.inertia.codes import MassCode, Rule, Source
 from silo.inertia.core import Floats
-from silo.inertia.massrule import MISMATCH_LIMIT, Decision, MassRule, Note
+from silo.inertia.doubts import MISMATCH_LIMIT, GivenMass, Note, implausible
+from silo.inertia.massrule import Decision, MassRule
 from silo.inertia.matching import Match
 from silo.inertia.model import Instance
 
@@ -96,6 +97,8 @@ class Groups:
             f"the BOM has no data for it, but {what}; that was spread "
             + ("by volume" if solid else "evenly, as points, since there is no solid"),
         )
+        volume = float(self.volume[gaps].sum())
+        doubts = tuple(implausible(GivenMass(mass, row.quantum_kg), volume)) if solid else ()
         for index in gaps:
             self._decide(
                 index,
@@ -105,7 +108,7 @@ class Groups:
                 density=None,
                 density_source="",
                 quantum_kg=row.quantum_kg,
-                notes=(*_doubt(match), note),
+                notes=(*_doubt(match), note, *doubts),
             )
 
     def _compare(self, match: Match, below: list[int], first: int) -> None:

@@ -9,9 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from silo.inertia.codes import MassCode, Source
 from silo.inertia.core import Floats, place, rigid_mask
+from silo.inertia.doubts import TOTAL_BY_OTHERS, Note, looks_like_totals
 from silo.inertia.groups import Groups
-from silo.inertia.massrule import Decision, MassRule, Note
+from silo.inertia.massrule import Decision, MassRule
 from silo.inertia.matching import Matching
 from silo.inertia.model import Assembly, GeometryCode
 from silo.inertia.products import companions
@@ -52,6 +54,7 @@ def place_all(assembly: Assembly, rule: MassRule, matching: Matching) -> Placed:
     per_product = {
         key: rule.decide(prototype, matching.parts.get(key)) for key, prototype in assembly.prototypes.items()
     }
+    _note_totals(per_product)
     _note_scaling(assembly, per_product)
     decisions = [per_product[i.prototype] for i in instances]
     mass = np.array(
@@ -76,6 +79,17 @@ def _geometry(assembly: Assembly) -> tuple[Floats, Floats, Floats]:
     units = np.array([p.inertia_unit for p in prototypes], float).reshape(-1, 3, 3)[which]
     placements = np.array([i.transform for i in assembly.instances], float).reshape(-1, 4, 4)
     return place(volumes, coms, units, placements)
+
+
+def _note_totals(decisions: dict[str, Decision]) -> None:
+    """Where the masses that can be checked are row totals, those that cannot are doubtful as well."""
+    given = {key: decision for key, decision in decisions.items() if decision.source is Source.BOM_MASS}
+    totals = {key: any(note.code == MassCode.ROW_TOTAL for note in d.notes) for key, d in given.items()}
+    if not looks_like_totals((d.compared, d.pieces, totals[key]) for key, d in given.items()):
+        return
+    for key, decision in given.items():
+        if not decision.compared and decision.pieces >= 2:
+            decisions[key] = replace(decision, notes=(*decision.notes, TOTAL_BY_OTHERS))
 
 
 def _note_scaling(assembly: Assembly, decisions: dict[str, Decision]) -> None:

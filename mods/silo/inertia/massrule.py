@@ -9,28 +9,14 @@ default (or of zero) only where the user asks for it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from silo.inertia.codes import Decided, MassCode, Rule, Source
+from silo.inertia.doubts import GivenMass, Note, density_doubts, expectation, mass_doubts
 from silo.inertia.matching import Match
 from silo.inertia.materials import MaterialHit, MaterialTable
 from silo.inertia.model import Prototype
 from silo.inertia.names import Suggester
-
-ROUNDING_LIMIT = 0.02
-"""A quantum above this share of the mass is told."""
-
-MISMATCH_LIMIT = 0.05
-"""Mass against density times volume, and STEP density against the one used: above this share is told."""
-
-
-@dataclass(frozen=True, slots=True)
-class Note:
-    """Code (:class:`MassCode` or a geometry code) and one sentence."""
-
-    code: str
-    message: str
 
 
 @dataclass(frozen=True)
@@ -59,6 +45,8 @@ class Decision:
         of one piece, where it is given as such; else None and ``density`` [kg/m^3] times volume it is.
     material, material_name, density_source
         the BOM's text, the table's row it was understood as, and where its density comes from.
+    pieces, compared
+        how many pieces the BOM row is for, and whether its mass could be held against a density.
     """
 
     source: Source
@@ -73,6 +61,8 @@ class Decision:
     part_number: str = ""
     lines: tuple[int, ...] = ()
     notes: tuple[Note, ...] = ()
+    pieces: float = 1.0
+    compared: bool = False
 
     @property
     def informed(self) -> bool:
@@ -121,44 +111,17 @@ class MassRule:
         mass = row.mass_kg or 0.0
         material = self.materials.find(row.material) if row.material is not None else None
         known = material.material if isinstance(material, MaterialHit) else None
-        notes = [
-            *base.notes,
-            *_mass_notes(mass, row.quantum_kg, prototype),
-            *self._against_material(prototype, match, known.density if known else None),
-        ]
+        given = GivenMass(mass, row.quantum_kg, match.bundle.quantities)
+        expected = expectation(prototype, row.material, known.density if known else None)
         return _with(
             base,
             source=Source.BOM_MASS,
             mass_kg=mass,
             quantum_kg=row.quantum_kg,
             material_name=known.name if known else None,
-            notes=tuple(notes),
-        )
-
-    def _against_material(self, prototype: Prototype, match: Match, density: float | None) -> Iterator[Note]:
-        row = match.row
-        rho, words = (density, f"{row.material} ({density:g} kg/m³)") if density else (None, "")
-        if rho is None and prototype.step_density is not None:
-            rho, words = prototype.step_density, f"the file's {prototype.step_density:g} kg/m³"
-        if rho is None or prototype.volume_m3 <= 0 or not row.mass_kg:
-            return
-        expected = rho * prototype.volume_m3
-        allowed = max(row.quantum_kg, MISMATCH_LIMIT * row.mass_kg)
-        if abs(expected - row.mass_kg) <= allowed:
-            return
-        pieces = next((q for q in match.bundle.quantities if _is_multiple(row.mass_kg, expected, q)), None)
-        if pieces is not None:
-            yield Note(
-                MassCode.ROW_TOTAL,
-                f"the BOM's {row.mass_kg:.6g} kg is {pieces:g} times what {words} gives ({expected:.6g} kg), "
-                "and the quantity is the same: this looks like the mass of the whole row. "
-                "It was used as that of one piece",
-            )
-            return
-        yield Note(
-            MassCode.DIFFERS,
-            f"the BOM says {row.mass_kg:.6g} kg, but {words} times the volume gives {expected:.6g} kg "
-            f"({expected / row.mass_kg - 1:+.0%}); the BOM's mass was used",
+            pieces=given.pieces,
+            compared=expected is not None,
+            notes=(*base.notes, *mass_doubts(given, prototype, expected)),
         )
 
     def _material(self, base: Decision, prototype: Prototype, text: str) -> Decision:
@@ -166,7 +129,7 @@ class MassRule:
         if isinstance(answer, MaterialHit):
             found = answer.material
             density, name, source = found.density, found.name, found.source
-            notes = [*base.notes, *_step_notes(prototype, density, name)]
+            notes = [*base.notes, *density_doubts(prototype, density, name)]
         elif self.options.step_density and prototype.step_density is not None:
             density, name, source = prototype.step_density, None, "the geometry file"
             why = f"the density in the file ({density:g} kg/m³) was used"
@@ -239,38 +202,6 @@ class MassRule:
         )
 
 
-def _mass_notes(mass: float, quantum: float, prototype: Prototype) -> Iterator[Note]:
-    if mass == 0:
-        yield Note(
-            MassCode.ZERO_MASS,
-            f"the BOM says 0 kg (± {quantum:.3g} kg): it is lighter than the BOM shows, or it was zeroed",
-        )
-    elif quantum > ROUNDING_LIMIT * mass:
-        yield Note(
-            MassCode.ROUNDED,
-            f"the BOM's {mass:.6g} kg is rounded to ± {quantum:.3g} kg ({quantum / mass:.0%})",
-        )
-    if mass > 0 and not prototype.volume_m3:
-        yield Note(
-            MassCode.POINT_MASS,
-            "there is no solid to spread the BOM's mass over; it was put at one point, without own inertia",
-        )
-
-
-def _step_notes(prototype: Prototype, density: float, name: str) -> Iterator[Note]:
-    stated = prototype.step_density
-    if stated is not None and abs(stated - density) > MISMATCH_LIMIT * density:
-        yield Note(
-            MassCode.STEP_DENSITY,
-            f"the file states {stated:g} kg/m³{_named(prototype.step_material)}, "
-            f"{name} has {density:g} kg/m³; the BOM's material was used",
-        )
-
-
-def _named(material: str | None) -> str:
-    return f" ({material})" if material else ""
-
-
 def _unknown(text: str, reason: str, what: str) -> Note:
     return Note(MassCode.UNKNOWN_MATERIAL, f"Unknown material '{text}': {reason}; {what}")
 
@@ -278,10 +209,6 @@ def _unknown(text: str, reason: str, what: str) -> Note:
 def _no_volume(prototype: Prototype) -> Note:
     kind = "no solid" if not prototype.has_solid else "no volume"
     return Note(MassCode.NO_VOLUME, f"the part has {kind} to multiply a density with: counted as 0 kg")
-
-
-def _is_multiple(mass: float, expected: float, quantity: float) -> bool:
-    return quantity >= 2 and abs(mass / expected - quantity) <= MISMATCH_LIMIT * quantity
 
 
 def _with(decision: Decision, **changes: object) -> Decision:

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Mistakes in a BOM that look like data: each one must leave a warning on the part that it hits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from silo.inertia.bodies import box, shape_only
+
+Fixture = Callable[..., Any]
+HEAD = "Quantity,Material,Mass,Name\n"
+
+
+def cube(name: str, size: float = 0.01, **more: Any) -> Any:
+    """A cube of ``size`` [m]; 1 cm³ unless said."""
+    return box(name, size, size, size, **more)
+
+
+@pytest.mark.parametrize(
+    ("mass", "words"),
+    [
+        ("2.70 kg", "denser than any metal"),  # grams called kilograms
+        ("50.0 g", "denser than any metal"),
+        ("0.00300 g", "lighter than any solid"),  # grams divided once too often
+    ],
+)
+def test_a_mass_that_nothing_can_weigh(
+    assemble: Fixture, compute: Fixture, codes: Fixture, part: Fixture, mass: str, words: str
+) -> None:
+    """1 cm³ of aluminium weighs 2.7 g. Without a material in the BOM only the density gives it away."""
+    report = compute(assemble(("l/a", cube("a"))), HEAD + f"1,,{mass},a\n")
+    assert codes(report, "a") == ["mass_implausible"]
+    assert words in part(report, "a").warnings[0].message
+
+
+@pytest.mark.parametrize("mass", ["0.0225 kg", "0.00001 kg", "0.001 kg"])
+def test_a_mass_that_something_weighs_is_quiet(
+    assemble: Fixture, compute: Fixture, codes: Fixture, mass: str
+) -> None:
+    """Osmium and a light foam are there, and rounding is given its due (0.001 kg may be 0.0005 kg)."""
+    small = box("a", 0.01, 0.01, 0.01 if mass != "0.001 kg" else 0.0003)
+    report = compute(assemble(("l/a", small)), HEAD + f"1,,{mass},a\n")
+    assert "mass_implausible" not in codes(report)
+
+
+def test_a_sub_assembly_that_nothing_can_weigh(assemble: Fixture, compute: Fixture, codes: Fixture) -> None:
+    """165 "kg" of a servo of 165 g: spread over its parts, the density gives it away as well."""
+    asm = assemble(("arm/servo/case", cube("case", 0.05)), ("arm/servo/horn", cube("horn")))
+    report = compute(asm, HEAD + "1,,165 kg,servo\n")
+    assert set(codes(report)) == {"sub_assembly_mass_shared", "mass_implausible"}
+
+
+def test_a_mass_without_a_solid_has_no_density_to_doubt(
+    assemble: Fixture, compute: Fixture, codes: Fixture
+) -> None:
+    """A point mass is told as such, and as nothing else."""
+    report = compute(
+        assemble(("l/a", cube("a")), ("l/b", shape_only("b"))), HEAD + "1,steel,,a\n1,,5.0 kg,b\n"
+    )
+    assert codes(report, "b") == ["point_mass"]
+
+
+def test_a_column_of_row_totals_makes_all_doubtful(
+    assemble: Fixture, compute: Fixture, codes: Fixture
+) -> None:
+    """One row proves that "Mass" means the row's total; a row without a material is then doubtful too."""
+    asm = assemble(
+        *((f"l/bolt{i}", cube("bolt")) for i in range(4)), *((f"l/nut{i}", cube("nut")) for i in range(3)),
+        ("l/lid", cube("lid")),
+    )  # fmt: skip
+    rows = "4,steel,0.0314 kg,bolt\n3,,0.0090 kg,nut\n1,,0.0030 kg,lid\n"
+    report = compute(asm, HEAD + rows)
+    assert codes(report, "bolt") == ["row_total"]
+    assert codes(report, "nut") == ["row_total"]
+    assert codes(report, "lid") == []  # one piece: a total is its mass
+
+
+def test_a_row_that_is_no_total_clears_the_others(
+    assemble: Fixture, compute: Fixture, codes: Fixture
+) -> None:
+    """Another row of several pieces gives the mass of one: then the odd row is odd, not the column."""
+    asm = assemble(
+        *((f"l/bolt{i}", cube("bolt")) for i in range(4)), *((f"l/nut{i}", cube("nut")) for i in range(3)),
+        *((f"l/pin{i}", cube("pin")) for i in range(2)),
+    )  # fmt: skip
+    rows = "4,steel,0.0314 kg,bolt\n3,,0.0090 kg,nut\n2,steel,0.0079 kg,pin\n"
+    report = compute(asm, HEAD + rows)
+    assert codes(report, "bolt") == ["row_total"]
+    assert codes(report, "nut") == []
