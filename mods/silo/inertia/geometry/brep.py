@@ -13,9 +13,10 @@ from OCP.BRepTools import BRepTools
 from OCP.TopoDS import TopoDS_Shape
 
 from silo.bom.errors import DocumentError
+from silo.inertia.geometry.measured import no_solid
 from silo.inertia.geometry.options import Reading, ReadOptions, Report
-from silo.inertia.geometry.solids import Measured, measure
-from silo.inertia.model import Assembly, GeometryCode, GeometryProblem, Instance, Prototype
+from silo.inertia.geometry.solids import measure
+from silo.inertia.model import Assembly, Instance, Prototype
 
 
 def load_shape(path: Path, named: str) -> Any:
@@ -30,14 +31,6 @@ def load_shape(path: Path, named: str) -> Any:
     if done is False or shape.IsNull():
         raise DocumentError(named, "holds no shape that the geometry kernel can read")
     return shape
-
-
-def no_solid(measured: Measured) -> GeometryProblem:
-    """Why a product has no volume."""
-    if measured.has_faces or measured.has_wires:
-        what = "surfaces that enclose no solid" if measured.has_faces else "curves only"
-        return GeometryProblem(GeometryCode.NO_SOLID, f"it consists of {what}, so it has no volume")
-    return GeometryProblem(GeometryCode.NO_GEOMETRY, "the file holds no solid and no surface for it")
 
 
 def read_brep(path: Path, options: ReadOptions, report: Report) -> Reading:

@@ -37,16 +37,30 @@ NOTHING = Material()
 
 
 def material_of(obj: Any) -> Material:
-    """The material of one object; a material object linked to it goes before its ``ShapeMaterial``."""
-    linked = own(obj, "Material")
-    linked = linked[0] if isinstance(linked, tuple) and linked else linked
-    told = own(linked, "Material") if linked is not None and not isinstance(linked, dict) else None
-    if isinstance(told, dict) and told:
-        return _from_map(told)
+    """The material of one stored object; one that is linked to it goes before its ``ShapeMaterial``."""
+    linked = linked_material(obj)
+    if linked is not None:
+        return linked
     uuid = material_uuid(obj)
     if uuid is None or uuid == NO_MATERIAL:
         return NOTHING
     return _from_card(uuid)
+
+
+def linked_material(obj: Any) -> Material | None:
+    """The material object that is linked to an object, stored or live; None where there is none."""
+    linked = own(obj, "Material")
+    linked = linked[0] if isinstance(linked, tuple) and linked else linked
+    told = own(linked, "Material") if linked is not None and not isinstance(linked, dict) else None
+    return _from_map(told) if isinstance(told, dict) and told else None
+
+
+def told_material(name: str, density: float | None) -> Material:
+    """A material by name and density [kg/m^3], of which only a sane one counts."""
+    sane = _sane(density)
+    if sane is None:
+        return Material(name, problem=f"its material '{name}' has no density that can be used")
+    return Material(name, sane)
 
 
 def _from_map(told: dict[str, str]) -> Material:

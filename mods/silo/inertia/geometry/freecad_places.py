@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Placements, scales and side entries of objects in an FCStd file, which a BOM does not need and a mass does.
+"""Placements and side entries of objects in an FCStd file, which a BOM does not need and a mass does.
 
-Sources: FreeCAD ``src/App/PropertyGeo.cpp`` (PropertyPlacement, PropertyPlacementList), ``src/App/Link.cpp``
-(``getTransform``), ``src/Mod/Part/App/PropertyTopoShape.cpp``. Lengths are mm here, as FreeCAD has them.
+Sources: FreeCAD ``src/App/PropertyGeo.cpp`` (PropertyPlacement, PropertyPlacementList),
+``src/Mod/Part/App/PropertyTopoShape.cpp``. Lengths are mm here, as FreeCAD has them.
 """
 
 from __future__ import annotations
@@ -11,21 +11,28 @@ import html
 import re
 import struct
 import zipfile
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from silo.bom.document import own
 from silo.bom.errors import DocumentError
 from silo.inertia.geometry.graph import Floats
 
 MAX_ENTRY_BYTES = 1_000_000_000
-MAX_ELEMENTS = 1_000_000
 
 _PLACEMENT = re.compile(rb"<PropertyPlacement\s([^>]*)>")
 _ATTRIBUTE = re.compile(rb"""([A-Za-z0-9]+)\s*=\s*["']([^"']*)["']""")
 _FILE = re.compile(rb"""<(?:Part|PlacementList|VectorList)\s[^>]*?file\s*=\s*["']([^"']+)["']""")
 _UUID = re.compile(rb"""<PropertyMaterial\s[^>]*?uuid\s*=\s*["']([0-9A-Fa-f-]+)["']""")
+
+
+@dataclass(frozen=True, slots=True)
+class StoredShape:
+    """Where a shape is kept: a file, and an entry in it."""
+
+    path: str
+    entry: str
 
 
 def placement(obj: Any, name: str = "Placement") -> Floats:
@@ -58,49 +65,6 @@ def placed(numbers: Floats) -> Floats:
     ]
     matrix[:3, 3] = numbers[:3]
     return matrix
-
-
-def link_placement(link: Any) -> Floats:
-    """A link's own placement; FreeCAD keeps ``Placement`` and ``LinkPlacement`` equal where both exist."""
-    names = getattr(link, "PropertiesList", ())
-    return placement(link, "Placement" if "Placement" in names else "LinkPlacement")
-
-
-def scale(link: Any) -> Floats:
-    """(4, 4) diagonal of a link's scale. A zero would flatten the part; FreeCAD takes it as 1."""
-    vector = own(link, "ScaleVector")
-    parts = list(vector) if vector is not None else []
-    factor = own(link, "Scale")
-    if not parts and isinstance(factor, int | float):
-        parts = [float(factor)] * 3
-    return _diagonal(parts)
-
-
-def _diagonal(parts: list[float]) -> Floats:
-    matrix = np.eye(4)
-    for axis, part in enumerate(parts[:3]):
-        if np.isfinite(part) and abs(part) > 1e-9:
-            matrix[axis, axis] = part
-    return matrix
-
-
-def element_places(link: Any, files: Entries) -> list[Floats]:
-    """(4, 4) [mm] of each element of a link array, in order; one identity for a plain link."""
-    count = own(link, "ElementCount", 0)
-    if not isinstance(count, int) or count <= 0:
-        return [np.eye(4)]
-    if count > MAX_ELEMENTS:
-        raise DocumentError(link.Document.FileName, f"the link {link.Name} claims {count} elements")
-    elements = own(link, "ElementList") or ()
-    if len(elements) == count:
-        return [link_placement(element) @ scale(element) for element in elements]
-    places = list_places(link, files)
-    scales = [_diagonal(list(vector)) for vector in own(link, "ScaleList") or ()]
-    one = np.eye(4)
-    return [
-        (places[n] if n < len(places) else one) @ (scales[n] if n < len(scales) else one)
-        for n in range(count)
-    ]
 
 
 def list_places(obj: Any, files: Entries) -> list[Floats]:

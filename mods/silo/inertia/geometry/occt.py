@@ -14,7 +14,7 @@ from silo.bom.errors import ConfigError
 
 try:
     import OCP
-except ImportError as error:  # pragma: no cover - the development environment always has it
+except ModuleNotFoundError as error:  # pragma: no cover - the development environment always has it
     raise ConfigError(
         "STEP files and FreeCAD shapes need the geometry kernel, which is not installed: "
         'pip install "silo-mod[inertia]"'

@@ -24,13 +24,21 @@ from OCP.gp import gp_Trsf, gp_Vec
 from OCP.GProp import GProp_GProps
 from OCP.TopLoc import TopLoc_Location
 
-from silo.inertia.core import combine_arrays, place
+from silo.inertia.core import place
 from silo.inertia.geometry import occt
+from silo.inertia.geometry.measured import (
+    INVALID,
+    NO_VOLUME,
+    Measured,
+    Notes,
+    integration_notes,
+    mesh_notes,
+    without_cavities,
+)
 from silo.inertia.geometry.mesh import (
     PICTURE_TRIANGLES,
     Floats,
     Mesh,
-    is_inside,
     joined,
     mesh_solid,
     mesh_volume,
@@ -48,49 +56,17 @@ from silo.inertia.geometry.tessellate import (
 )
 from silo.inertia.model import GeometryCode, GeometryProblem, SolidProps
 
-MESH_TOLERANCE = 0.02
-"""|V_mesh - V_brep| / V above this is bad geometry: all valid parts of 280 real ones stay below 0.7 %."""
-
 TENSOR_SHARE = 1e-4
 """The kernel's tolerance is about the volume; a tensor lags behind by ten to four powers of ten (a torus at
 1e-8: volume 2e-16, tensor 1.1e-7; at 1e-12: 1.6e-11). Solids of planes, cylinders, cones, spheres and tori
 cost nothing at the finer one, and are exact then; free-form ones would take twice as long for digits that
 their own tolerances do not have."""
 
-CONVERGED = 1e-6
-"""The integration's own error estimate above this says that it did not reach its tolerance."""
-
 SMALL = 0.1
 """Size of a solid in sizes of its product, below which its picture may be coarse."""
 
 NEAR = 50.0
 """Distance from the origin, in sizes of the solid, up to where integrating from there costs no digits."""
-
-FAR_AWAY = 1e4
-"""Distance from the origin, in sizes of the solid, from where coordinates themselves lose digits."""
-
-
-@dataclass(frozen=True, eq=False)
-class Measured:
-    """What was found in one prototype; ``has_faces``, ``has_wires``: what there is without a solid."""
-
-    solids: tuple[SolidProps, ...]
-    problems: tuple[GeometryProblem, ...]
-    mesh: Mesh | None
-    has_faces: bool
-    has_wires: bool = False
-
-    @property
-    def total(self) -> tuple[float, Floats, Floats]:
-        """Volume [m^3], centre (3,) [m], tensor per unit density (3, 3) [m^5] about it, of all solids."""
-        if not self.solids:
-            return 0.0, np.zeros(3), np.zeros((3, 3))
-        body = combine_arrays(
-            [s.volume_m3 for s in self.solids],
-            np.array([s.com_m for s in self.solids]),
-            np.array([s.inertia_unit for s in self.solids]),
-        )
-        return body.mass, body.com, body.inertia
 
 
 def measure(shapes: list[Any], *, eps: float, mesh_check: bool) -> Measured:
@@ -109,7 +85,7 @@ def measure(shapes: list[Any], *, eps: float, mesh_check: bool) -> Measured:
             where = f"solid {number} of {len(found)}: " if len(found) > 1 else ""
             problems += [GeometryProblem(code, where + message) for code, message in known[key].notes]
         pairs += _placed(known[key], trsf_matrix(solid.Location().Transformation()))
-    solids = _without_cavities(pairs, problems)
+    solids = without_cavities(pairs, problems)
     meshes = [mesh for _, mesh in pairs if mesh is not None]
     bare = [] if found else [shape for shape in shapes if occt.faces_of(shape)]
     if mesh_check and bare:
@@ -117,44 +93,6 @@ def measure(shapes: list[Any], *, eps: float, mesh_check: bool) -> Measured:
     whole = simplified(joined(meshes), PICTURE_TRIANGLES) if meshes else None
     wires = any(occt.has_edges(shape) for shape in shapes)
     return Measured(solids, tuple(problems), whole, bool(found or bare), wires)
-
-
-def _without_cavities(
-    pairs: list[tuple[SolidProps, Mesh | None]], problems: list[GeometryProblem]
-) -> tuple[SolidProps, ...]:
-    """Reversed solids that lie inside the material of another one are cavities: taken off, and said."""
-    solids = [props for props, _ in pairs]
-    if len({s.reversed for s in solids}) < 2:
-        return tuple(solids)
-    hosts = [i for i, s in enumerate(solids) if not s.reversed]
-    gone = set()
-    for i, (props, mesh) in enumerate(pairs):
-        host = next((h for h in hosts if props.reversed and _encloses(pairs[h][1], mesh)), None)
-        if host is not None:
-            solids[host] = _minus(solids[host], props)
-            gone.add(i)
-    taken, turned = len(gone), sum(s.reversed for s in solids) - len(gone)
-    problems.append(
-        GeometryProblem(
-            GeometryCode.NEGATIVE_VOLUME,
-            "some solids of this product are inside out and some are not: "
-            f"{taken} taken as cavities of the solid around them, {turned} as bodies",
-        )
-    )
-    return tuple(s for i, s in enumerate(solids) if i not in gone)
-
-
-def _encloses(outer: Mesh | None, inner: Mesh | None) -> bool:
-    return outer is not None and inner is not None and len(inner) > 0 and is_inside(inner, outer)
-
-
-def _minus(body: SolidProps, cavity: SolidProps) -> SolidProps:
-    rest = combine_arrays(
-        [body.volume_m3, -cavity.volume_m3],
-        np.array([body.com_m, cavity.com_m]),
-        np.array([body.inertia_unit, -cavity.inertia_unit]),
-    )
-    return SolidProps(rest.mass, rest.com, rest.inertia, body.reversed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,9 +107,6 @@ class _Picture:
         """Each solid may have four times its share, for most need less."""
         share = 4 * PICTURE_TRIANGLES // max(solids, 1)
         return cls(max((box(shape)[1] for shape in shapes), default=0.0), max(share, 500))
-
-
-Notes = list[tuple[GeometryCode, str]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +125,7 @@ def _measured(solid: Any, body: Any, eps: float, picture: _Picture | None) -> _B
         return _Bare(body, *_triangulated_solid(solid, notes), notes)
     props = _integrated(solid, eps, notes)
     if not BRepCheck_Analyzer(solid).IsValid():
-        notes.append((GeometryCode.INVALID_SHAPE, "the geometry kernel's own check finds this shape invalid"))
+        notes.append(INVALID)
     mesh = _checked_mesh(solid, props, picture, notes) if picture is not None else None
     return _Bare(body, props, mesh, notes)
 
@@ -224,22 +159,10 @@ def _integrated(solid: Any, eps: float, notes: Notes) -> SolidProps | None:
     error = float(BRepGProp.VolumeProperties_s(solid, system, eps, False, False))
     volume = float(system.Mass())
     if not np.isfinite(volume) or volume == 0.0:
-        notes.append(
-            (GeometryCode.INVALID_SHAPE, "the solid has no volume that can be computed; it is left out")
-        )
+        notes.append(NO_VOLUME)
         return None
-    if error > CONVERGED:
-        message = f"the volume integration stopped at a relative error of {error:.1g}, wanted {eps:.1g}"
-        notes.append((GeometryCode.NOT_CONVERGENT, message))
-    if distance > FAR_AWAY * size > 0:
-        message = (
-            f"the geometry lies {distance * MM:.3g} m from its own origin, {distance / size:.0f} times its "
-            "size; its coordinates have lost digits"
-        )
-        notes.append((GeometryCode.BAKED, message))
-    if volume < 0:
-        message = f"the solid is inside out (volume {volume * MM**3:.6g} m3); its sign was turned"
-        notes.append((GeometryCode.NEGATIVE_VOLUME, message))
+    size_m, distance_m = size * MM, distance * MM
+    notes += integration_notes(volume * MM**3, error, eps, distance_m=distance_m, size_m=size_m)
     return _props(system, centre)
 
 
@@ -276,13 +199,5 @@ def _triangulated_solid(solid: Any, notes: Notes) -> tuple[SolidProps | None, Me
 def _checked_mesh(solid: Any, props: SolidProps | None, picture: _Picture, notes: Notes) -> Mesh:
     small = box(solid)[1] < SMALL * picture.size
     check = cross_check(solid, props.volume_m3 if props is not None else None, small=small)
-    if check.deviation is not None and check.deviation > MESH_TOLERANCE:
-        message = (
-            f"its surface mesh encloses a volume that differs by {check.deviation:.1%}: the geometry is bad, "
-            "and so may be its mass"
-        )
-        notes.append((GeometryCode.MESH_MISMATCH, message))
-    elif check.deviation is None and check.missing:
-        message = f"{check.missing} of its faces cannot be meshed, so its volume could not be cross-checked"
-        notes.append((GeometryCode.MESH_MISMATCH, message))
+    notes += mesh_notes(check.deviation, check.missing)
     return simplified(check.picture, picture.triangles)

@@ -6,7 +6,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from silo.bom.errors import DocumentError, InputError
-from silo.inertia.geometry.brep import no_solid
 from silo.inertia.geometry.checks import (
     against_stated,
     lost_stretches,
@@ -16,6 +15,7 @@ from silo.inertia.geometry.checks import (
     stated_totals,
 )
 from silo.inertia.geometry.graph import unfold
+from silo.inertia.geometry.measured import no_solid
 from silo.inertia.geometry.options import Reading, ReadOptions, Report
 from silo.inertia.geometry.siblings import Siblings
 from silo.inertia.geometry.solids import measure

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What measuring a product's solids gives, and what is said of them; the same for every engine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from silo.inertia.core import combine_arrays
+from silo.inertia.geometry.mesh import Floats, Mesh, is_inside
+from silo.inertia.model import GeometryCode, GeometryProblem, SolidProps
+
+MESH_TOLERANCE = 0.02
+"""|V_mesh - V_brep| / V above this is bad geometry: all valid parts of 280 real ones stay below 0.7 %."""
+
+CONVERGED = 1e-6
+"""The integration's own error estimate above this says that it did not reach its tolerance."""
+
+FAR_AWAY = 1e4
+"""Distance from the origin, in sizes of the solid, from where coordinates themselves lose digits."""
+
+
+Note = tuple[GeometryCode, str]
+Notes = list[Note]
+
+NO_VOLUME: Note = (
+    GeometryCode.INVALID_SHAPE,
+    "the solid has no volume that can be computed; it is left out",
+)
+INVALID: Note = (GeometryCode.INVALID_SHAPE, "the geometry kernel's own check finds this shape invalid")
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What was found in one prototype; ``has_faces``, ``has_wires``: what there is without a solid."""
+
+    solids: tuple[SolidProps, ...]
+    problems: tuple[GeometryProblem, ...]
+    mesh: Mesh | None
+    has_faces: bool
+    has_wires: bool = False
+
+    @property
+    def total(self) -> tuple[float, Floats, Floats]:
+        """Volume [m^3], centre (3,) [m], tensor per unit density (3, 3) [m^5] about it, of all solids."""
+        if not self.solids:
+            return 0.0, np.zeros(3), np.zeros((3, 3))
+        body = combine_arrays(
+            [s.volume_m3 for s in self.solids],
+            np.array([s.com_m for s in self.solids]),
+            np.array([s.inertia_unit for s in self.solids]),
+        )
+        return body.mass, body.com, body.inertia
+
+
+def integration_notes(
+    volume_m3: float, error: float, eps: float, *, distance_m: float, size_m: float
+) -> Notes:
+    """What is to be said of one solid's integration.
+
+    error, eps
+        estimated and wanted, relative to the volume (which is signed here).
+    distance_m
+        of the solid from the origin of its coordinates.
+    """
+    notes: Notes = []
+    if error > CONVERGED:
+        message = f"the volume integration stopped at a relative error of {error:.1g}, wanted {eps:.1g}"
+        notes.append((GeometryCode.NOT_CONVERGENT, message))
+    if distance_m > FAR_AWAY * size_m > 0:
+        message = (
+            f"the geometry lies {distance_m:.3g} m from its own origin, {distance_m / size_m:.0f} times its "
+            "size; its coordinates have lost digits"
+        )
+        notes.append((GeometryCode.BAKED, message))
+    if volume_m3 < 0:
+        message = f"the solid is inside out (volume {volume_m3:.6g} m3); its sign was turned"
+        notes.append((GeometryCode.NEGATIVE_VOLUME, message))
+    return notes
+
+
+def mesh_notes(deviation: float | None, missing: int) -> Notes:
+    """What the mesh says of a solid: its relative deviation in volume (None: not closed), missing faces."""
+    if deviation is not None and deviation > MESH_TOLERANCE:
+        message = (
+            f"its surface mesh encloses a volume that differs by {deviation:.1%}: the geometry is bad, "
+            "and so may be its mass"
+        )
+        return [(GeometryCode.MESH_MISMATCH, message)]
+    if deviation is None and missing:
+        message = f"{missing} of its faces cannot be meshed, so its volume could not be cross-checked"
+        return [(GeometryCode.MESH_MISMATCH, message)]
+    return []
+
+
+def no_solid(measured: Measured) -> GeometryProblem:
+    """Why a product has no volume."""
+    if measured.has_faces or measured.has_wires:
+        what = "surfaces that enclose no solid" if measured.has_faces else "curves only"
+        return GeometryProblem(GeometryCode.NO_SOLID, f"it consists of {what}, so it has no volume")
+    return GeometryProblem(GeometryCode.NO_GEOMETRY, "the file holds no solid and no surface for it")
+
+
+def without_cavities(
+    pairs: list[tuple[SolidProps, Mesh | None]], problems: list[GeometryProblem]
+) -> tuple[SolidProps, ...]:
+    """Reversed solids that lie inside the material of another one are cavities: taken off, and said."""
+    solids = [props for props, _ in pairs]
+    if len({s.reversed for s in solids}) < 2:
+        return tuple(solids)
+    hosts = [i for i, s in enumerate(solids) if not s.reversed]
+    gone = set()
+    for i, (props, mesh) in enumerate(pairs):
+        host = next((h for h in hosts if props.reversed and _encloses(pairs[h][1], mesh)), None)
+        if host is not None:
+            solids[host] = _minus(solids[host], props)
+            gone.add(i)
+    taken, turned = len(gone), sum(s.reversed for s in solids) - len(gone)
+    problems.append(
+        GeometryProblem(
+            GeometryCode.NEGATIVE_VOLUME,
+            "some solids of this product are inside out and some are not: "
+            f"{taken} taken as cavities of the solid around them, {turned} as bodies",
+        )
+    )
+    return tuple(s for i, s in enumerate(solids) if i not in gone)
+
+
+def _encloses(outer: Mesh | None, inner: Mesh | None) -> bool:
+    return outer is not None and inner is not None and len(inner) > 0 and is_inside(inner, outer)
+
+
+def _minus(body: SolidProps, cavity: SolidProps) -> SolidProps:
+    rest = combine_arrays(
+        [body.volume_m3, -cavity.volume_m3],
+        np.array([body.com_m, cavity.com_m]),
+        np.array([body.inertia_unit, -cavity.inertia_unit]),
+    )
+    return SolidProps(rest.mass, rest.com, rest.inertia, body.reversed)
