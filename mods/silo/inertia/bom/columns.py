@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 from silo.bom.errors import InputError
@@ -82,14 +82,17 @@ _ROLE_OF: dict[str, tuple[Role, int]] = {
 
 @dataclass(frozen=True, slots=True)
 class Columns:
-    """Where each role is (column index), and the unit that the mass column's header states.
+    """Where each role is (column index), and the units that the headers of the mass columns state.
 
+    others
+        columns that mean a mass or a material as well, and lost to the one that is used.
     exact
         masses are written in full (Silo's own export does so): a short one was not rounded.
     """
 
     at: Mapping[Role, int]
-    mass_unit: str | None = None
+    units: Mapping[Role, str] = field(default_factory=dict)
+    others: tuple[tuple[Role, int], ...] = ()
     exact: bool = False
 
     def cell(self, row: Sequence[str], role: Role) -> str:
@@ -107,6 +110,8 @@ class Columns:
         return bool({Role.NAME, Role.PART_NUMBER, Role.DESCRIPTION} & self.at.keys())
 
 
+_MASSES = (Role.MASS, Role.TOTAL_MASS)
+_ONE_ONLY = (*_MASSES, Role.MATERIAL)
 _SILOS_OWN = {"part number", "total quantity", "unreferenced since"}
 
 
@@ -124,16 +129,19 @@ def find_columns(header: Sequence[str], given: Mapping[str, str] | None = None) 
             at[role] = place
     taken = set(at.values())
     best: dict[Role, int] = {}
+    seen: list[tuple[Role, int]] = []
     for index, cell in enumerate(header):
         found = _role_of(cell)
         if found is None or index in taken or found[0] in wanted:
             continue
         role, rank = found
+        seen.append((role, index))
         if rank < best.get(role, len(_ROLE_OF)):
             at[role], best[role] = index, rank
-    mass_at = at.get(Role.MASS, at.get(Role.TOTAL_MASS))
+    units = {role: unit for role in _MASSES if role in at and (unit := _unit_of(header[at[role]]))}
+    others = tuple((role, i) for role, i in seen if role in _ONE_ONLY and at[role] != i)
     exact = {normal(cell) for cell in header} >= _SILOS_OWN
-    return Columns(at, None if mass_at is None else _unit_of(header[mass_at]), exact)
+    return Columns(at, units, others, exact)
 
 
 def _given_roles(given: Mapping[str, str]) -> dict[Role, str]:

@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from silo.bom.errors import InputError
 from silo.inertia.bom.columns import Role
-from silo.inertia.bom.masses import MassCell, column_mark, is_empty, parse_mass, unit_factor
+from silo.inertia.bom.masscolumn import MassReader
+from silo.inertia.bom.masses import is_empty, unit_factor
 from silo.inertia.bom.numbers import Mark, parse_number
 from silo.inertia.bom.rows import BomCode, BOMEntry, BomTable, BomWarning
 from silo.inertia.bom.sheet import Row, Sheet, read_sheet
@@ -71,10 +71,16 @@ class BOMParser:
         )
         warnings = [BomWarning(BomCode.FILE, note) for note in sheet.notes]
         warnings += _missing_columns(sheet)
-        masses = _Masses(sheet, self._decimal, self._mass_unit, warnings)
+        warnings += _second_columns(sheet)
+
+        def tell(code: BomCode, message: str, row: Row, name: str) -> None:
+            warnings.append(BomWarning(code, message, row.line, name))
+
+        masses = MassReader(sheet, self._decimal, self._mass_unit, tell)
+        item_role = _item_role(sheet)
         rows: list[BOMEntry] = []
         for row in sheet.rows:
-            entry = _entry(sheet, row, masses, warnings)
+            entry = _entry(sheet, row, masses, item_role, warnings)
             if entry is not None:
                 rows.append(entry)
         table_rows = with_structure(masses.to_display_precision(rows))
@@ -82,7 +88,9 @@ class BOMParser:
         return BomTable(table_rows, tuple(warnings), source)
 
 
-def _entry(sheet: Sheet, row: Row, masses: _Masses, warnings: list[BomWarning]) -> BOMEntry | None:
+def _entry(
+    sheet: Sheet, row: Row, masses: MassReader, item_role: Role, warnings: list[BomWarning]
+) -> BOMEntry | None:
     cell = sheet.columns.cell
     number, text = cell(row.cells, Role.PART_NUMBER), cell(row.cells, Role.DESCRIPTION)
     name = cell(row.cells, Role.NAME) or ("" if Role.NAME in sheet.columns.at else text) or number
@@ -104,101 +112,10 @@ def _entry(sheet: Sheet, row: Row, masses: _Masses, warnings: list[BomWarning]) 
         quantity=quantity,
         quantum_kg=mass.quantum_kg,
         overridden=mass.overridden,
-        item=cell(row.cells, Role.ITEM),
+        item=cell(row.cells, item_role),
         level=_level(cell(row.cells, Role.LEVEL)),
         line=row.line,
     )
-
-
-class _Masses:
-    """Reads the mass column; knows its unit, its decimal mark and, afterwards, its display precision."""
-
-    def __init__(self, sheet: Sheet, mark: Mark | None, unit: str | None, warnings: list[BomWarning]) -> None:
-        self._sheet = sheet
-        self._warnings = warnings
-        self._role = Role.MASS if Role.MASS in sheet.columns.at else Role.TOTAL_MASS
-        self._unit = sheet.columns.mass_unit or unit
-        cells = [sheet.columns.cell(row.cells, self._role) for row in sheet.rows]
-        self._mark = mark or column_mark(cells)
-        # Without any proof: a file that separates cells by semicolons does so because its commas are decimal.
-        self._likely = Mark.COMMA if sheet.delimiter == ";" else Mark.POINT
-        self._units: dict[int, str] = {}
-        self._told_unit = False
-
-    def read(self, row: Row, name: str, quantity: float | None) -> MassCell:
-        """The mass of one piece; every doubt goes to the warnings, with the line."""
-        text = self._sheet.columns.cell(row.cells, self._role)
-        cell = parse_mass(text, mark=self._mark, unit=self._unit)
-        if cell.ambiguous:
-            cell = self._decide(text, row.line, name)
-        if cell.problem is not None:
-            self._warn(
-                BomCode.UNREADABLE_MASS, f"the mass “{text}” {cell.problem}; it is not used", row, name
-            )
-        if cell.kg is not None and not cell.unit and not self._told_unit:
-            self._told_unit = True
-            self._warn(
-                BomCode.MASS_WITHOUT_UNIT,
-                f"the mass “{text}” has no unit, nor has its header; read as kg",
-                row,
-                name,
-            )
-        self._units[row.line] = cell.unit
-        return self._per_piece(cell, row, name, quantity)
-
-    def _decide(self, text: str, line: int, name: str) -> MassCell:
-        other = Mark.POINT if self._likely is Mark.COMMA else Mark.COMMA
-        likely = parse_mass(text, mark=self._likely, unit=self._unit)
-        unlikely = parse_mass(text, mark=other, unit=self._unit)
-        # A point before three digits in a comma-separated file is how most exports look; no warning for that.
-        if "," in text or self._likely is Mark.COMMA:
-            self._warnings.append(
-                BomWarning(
-                    BomCode.AMBIGUOUS_MASS,
-                    f"the mass “{text}” was read as {likely.kg:.9g} kg but could be {unlikely.kg:.9g} kg, "
-                    "and no other mass shows which mark is the decimal one; say so with --decimal",
-                    line,
-                    name,
-                )
-            )
-        return likely
-
-    def _per_piece(self, cell: MassCell, row: Row, name: str, quantity: float | None) -> MassCell:
-        if self._role is Role.MASS or cell.kg is None:
-            return cell
-        if not quantity:
-            self._warn(
-                BomCode.UNREADABLE_MASS,
-                "there is a total mass only, and no quantity to divide it by; it is not used",
-                row,
-                name,
-            )
-            return MassCell()
-        return replace(cell, kg=cell.kg / quantity, quantum_kg=cell.quantum_kg / quantity)
-
-    def _warn(self, code: BomCode, message: str, row: Row, name: str) -> None:
-        self._warnings.append(BomWarning(code, message, row.line, name))
-
-    def to_display_precision(self, rows: Sequence[BOMEntry]) -> list[BOMEntry]:
-        """The quantum of the column's finest cell of the same unit, for all: exports trim trailing zeros.
-
-        "0.3 kg" beside "0.009 kg" was shown with three decimals as well, so that it is ± 0.0005 kg.
-        """
-        if self._sheet.columns.exact:
-            return [replace(row, quantum_kg=0.0) for row in rows]
-        if self._role is Role.TOTAL_MASS:
-            return list(rows)
-        finest: dict[str, float] = {}
-        for row in rows:
-            if row.mass_kg is not None and row.quantum_kg > 0:
-                unit = self._units[row.line]
-                finest[unit] = min(finest.get(unit, row.quantum_kg), row.quantum_kg)
-        return [
-            replace(row, quantum_kg=finest.get(self._units[row.line], 0.0))
-            if row.mass_kg is not None
-            else row
-            for row in rows
-        ]
 
 
 def _quantity(text: str, line: int, name: str, warnings: list[BomWarning]) -> float | None:
@@ -216,6 +133,15 @@ def _quantity(text: str, line: int, name: str, warnings: list[BomWarning]) -> fl
         )
         return None
     return number.value
+
+
+def _item_role(sheet: Sheet) -> Role:
+    """The column of item numbers; some tools call it the level: 1, 1.1, 1.1.2."""
+
+    def dotted(role: Role) -> bool:
+        return any(re.fullmatch(r"\d+(?:\.\d+)+", sheet.columns.cell(r.cells, role)) for r in sheet.rows)
+
+    return Role.LEVEL if dotted(Role.LEVEL) and not dotted(Role.ITEM) else Role.ITEM
 
 
 def _level(text: str) -> int:
@@ -263,6 +189,24 @@ def _missing_columns(sheet: Sheet) -> list[BomWarning]:
         )
         for what in missing
     ]
+
+
+def _second_columns(sheet: Sheet) -> Iterator[BomWarning]:
+    """Columns that mean the same as one that is used, and say something else somewhere."""
+    for role, index in sheet.columns.others:
+        for row in sheet.rows:
+            here = row.cells[index].strip() if index < len(row.cells) else ""
+            used = sheet.columns.cell(row.cells, role)
+            if not is_empty(here) and here != used:
+                other, ours = sheet.header[index].strip(), sheet.header[sheet.columns.at[role]].strip()
+                yield BomWarning(
+                    BomCode.FILE,
+                    f"the columns “{ours}” and “{other}” both mean the {role.replace('_', ' ')}; “{ours}” "
+                    f"was used, though line {row.line} has “{used}” there and “{here}” in the other. "
+                    f"--column {role}={other} takes the other one",
+                    sheet.header_line,
+                )
+                break
 
 
 def _duplicates(rows: Sequence[BOMEntry]) -> list[BomWarning]:

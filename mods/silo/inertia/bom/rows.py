@@ -19,6 +19,7 @@ class BomCode(StrEnum):
     AMBIGUOUS_MASS = "bom_mass_ambiguous"
     MASS_WITHOUT_UNIT = "bom_mass_without_unit"
     UNREADABLE_QUANTITY = "bom_quantity_unreadable"
+    TOTAL_DIFFERS = "bom_total_differs"
     MISSING_COLUMN = "bom_missing_column"
 
 

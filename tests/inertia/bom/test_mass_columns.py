@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""BOMs with more than one column of masses: nothing written in the file is dropped without a word."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from silo.inertia.bom import BomCode, BomTable
+
+Bom = Callable[..., BomTable]
+
+
+def codes(table: BomTable) -> list[BomCode]:
+    return [warning.code for warning in table.warnings]
+
+
+def test_a_total_is_divided_where_the_row_has_no_mass_of_one_piece(bom: Bom) -> None:
+    """Row 2 has both, row 3 the total only: a quarter of it is the mass of one."""
+    table = bom(
+        "Name,Quantity,Material,Mass,Total mass (g)\n"
+        "plate,1,,0.500 kg,500\nbolt,4,,,31.4\nclip,2,,No value,\n"
+    )
+    assert table["plate"].mass_kg == pytest.approx(0.5)
+    assert table["bolt"].mass_kg == pytest.approx(0.0314 / 4)
+    assert table["bolt"].quantum_kg == pytest.approx(0.00005 / 4)
+    assert table["clip"].mass_kg is None
+    assert codes(table) == []
+
+
+def test_a_total_without_a_quantity_is_told(bom: Bom) -> None:
+    """Nothing to divide by: the mass is not used, and the line is named."""
+    table = bom("Name,Material,Mass,Total mass\nplate,,0.5 kg,0.5 kg\nbolt,,,0.4 kg\n")
+    assert table["bolt"].mass_kg is None
+    assert [(w.code, w.line) for w in table.warnings] == [(BomCode.UNREADABLE_MASS, 3)]
+
+
+def test_a_total_that_is_not_quantity_times_mass_is_told(bom: Bom) -> None:
+    """0.500 kg each, four of them, and 0.5 kg in total: one of the two columns is not what it says."""
+    table = bom(
+        "Name,Quantity,Material,Mass,Total mass\nplate,4,,0.500 kg,0.500 kg\nlid,2,,0.200 kg,0.400 kg\n"
+    )
+    assert table["plate"].mass_kg == pytest.approx(0.5)
+    (warning,) = table.warnings
+    assert (warning.code, warning.line) == (BomCode.TOTAL_DIFFERS, 2)
+    assert "2 kg" in warning.message
+
+
+def test_rounding_of_a_total_is_no_contradiction(bom: Bom) -> None:
+    """3 × 0.0333 kg, shown as 0.033 kg and 0.100 kg."""
+    table = bom("Name,Quantity,Material,Mass,Total mass\npin,3,,0.033 kg,0.100 kg\n")
+    assert codes(table) == []
+
+
+def test_a_second_column_that_means_the_same_is_told_where_it_says_otherwise(bom: Bom) -> None:
+    """ "Mass" is taken, and "Weight" is not dropped without a word where it holds something else."""
+    same = bom("Name,Material,Mass,Weight\nplate,,0.5 kg,0.5 kg\n")
+    assert codes(same) == []
+    other = bom("Name,Material,Mass,Weight\nplate,,0.5 kg,0.5 kg\nlid,steel,,0.25 kg\n")
+    (warning,) = other.warnings
+    assert warning.code is BomCode.FILE
+    assert "“Mass”" in warning.message
+    assert "“Weight”" in warning.message
+    assert "line 3" in warning.message
+    named = bom("Name,Material,Mass,Weight\nlid,steel,,0.25 kg\n", columns={"mass": "Weight"})
+    assert named["lid"].mass_kg == 0.25
+
+
+@pytest.mark.parametrize("header", ["Material,Werkstoff", "Matériau,Material"])
+def test_a_second_material_column_is_told(bom: Bom, header: str) -> None:
+    """The same for materials: another text in the other column is no silent loss."""
+    table = bom(f"Name,Mass,{header}\nlid,,brass,steel\n")
+    assert BomCode.FILE in codes(table)
+
+
+@pytest.mark.parametrize(("mark", "told"), [("\t", True), ("|", True), (";", True), (",", False)])
+def test_a_lone_point_before_three_digits(bom: Bom, mark: str, told: bool) -> None:
+    """ "1.234 kg" is told where the delimiter does not tell the country: 1.2 kg here is 1.2 t there."""
+    table = bom(mark.join(["Name", "Material", "Mass"]) + "\n" + mark.join(["lid", "", "1.234 kg"]) + "\n")
+    assert (BomCode.AMBIGUOUS_MASS in codes(table)) is told
+
+
+def test_dotted_levels_are_item_numbers(bom: Bom) -> None:
+    """A column "Level" with 1, 1.1, 1.2 says what hangs below what, as item numbers do."""
+    table = bom("Level,Name,Material,Mass\n1,arm,,1.0 kg\n1.1,bolt,,0.4 kg\n1.2,lid,,0.6 kg\n")
+    assert table["arm"].has_children
+    assert [row.parent for row in table.rows] == [None, 0, 0]
+    assert [row.level for row in table.rows] == [1, 2, 2]
