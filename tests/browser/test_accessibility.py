@@ -104,8 +104,10 @@ def test_no_page_has_a_finding(
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_answers_have_no_finding(axe: str, numbers: dict[str, str], visit: Visit, scheme: str) -> None:
-    """Pages that only a form or an event brings: a checked import, a new token, a notice, news, a problem."""
+def test_answers_have_no_finding(
+    axe: str, api: Api, numbers: dict[str, str], visit: Visit, scheme: str
+) -> None:
+    """Pages that only a form or an event brings: an import, a token, a notice, a problem, read-only."""
     page = visit("admin", color_scheme=scheme)
     findings: list[str] = []
 
@@ -131,7 +133,12 @@ def test_answers_have_no_finding(axe: str, numbers: dict[str, str], visit: Visit
     page.get_by_role("button", name="Add line").click()
     page.get_by_role("alert").wait_for()
     look("problem")
-    page.goto(f"/items/{numbers['child']}/bom")
+    api.good("PUT", "/api/admin/mode", {"mode": "read-only"})
+    try:
+        page.goto(f"/items/{numbers['parent']}/bom")
+        look("read-only")
+    finally:
+        api.good("PUT", "/api/admin/mode", {"mode": "normal"})
     assert findings == []
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 import pytest
@@ -89,16 +90,57 @@ def test_the_last_admin_stays(visit: Visit) -> None:
 
 
 def test_read_only_and_back(machine: dict[str, str], visit: Visit) -> None:
-    """The server takes no changes: a decision is answered in plain words; then it takes them again."""
+    """An open page hears of it, and a form that is sent all the same is answered in plain words."""
     admin, editor = visit("admin"), visit("editor")
+    editor.goto(f"/items/{machine['machine']}/bom?edit={machine['plate']}")
     admin.goto("/users")
     admin.get_by_role("button", name="Take none for now").click()
-    expect(admin.locator("#mode + form")).to_contain_text("takes no changes at the moment")
-    editor.goto(f"/items/{machine['machine']}/bom?edit={machine['plate']}")
-    editor.get_by_role("button", name="Remove from BOM").click()
-    expect(editor.get_by_role("alert")).to_contain_text("read-only at the moment")
-    admin.get_by_role("button", name="Take changes again").click()
+    try:
+        expect(admin.locator("#mode + form")).to_contain_text("takes no changes at the moment")
+        expect(editor.locator("#live")).to_contain_text("takes no changes now")
+        editor.get_by_role("button", name="Remove from BOM").click()
+        expect(editor.get_by_role("alert")).to_contain_text("read-only at the moment")
+    finally:
+        admin.get_by_role("button", name="Take changes again").click()
     expect(admin.locator(".notice")).to_contain_text("takes changes")
+
+
+def test_while_it_is_read_only_every_page_says_so(machine: dict[str, str], api: Api, visit: Visit) -> None:
+    """A banner with the reason; what would change a BOM is shown switched off, the account is not."""
+    editor, stranger = visit("editor"), visit(None)
+    base = f"/items/{machine['machine']}"
+    api.merge(machine["machine"], {})
+    api.good("PUT", "/api/admin/mode", {"mode": "read-only"})
+    try:
+        for path in (
+            "/items",
+            base,
+            f"{base}/history",
+            f"{base}/import",
+            "/activity",
+            "/account",
+            "/nowhere",
+        ):
+            editor.goto(path)
+            expect(editor.locator("#closed")).to_contain_text("Read-only at the moment")
+        stranger.goto("/login")
+        expect(stranger.locator("#closed")).to_be_visible()
+        editor.goto(f"{base}/bom")
+        for name in ("Keep as intentional", "Remove", "Add line"):
+            button = editor.get_by_role("button", name=name).first
+            expect(button).to_be_disabled()
+            group = button.locator("xpath=ancestor::fieldset")
+            expect(group).to_have_accessible_description(re.compile("takes no changes"))
+        edit = editor.get_by_role("link", name="Edit")
+        expect(edit).to_have_attribute("aria-disabled", "true")
+        assert edit.get_attribute("href") is None
+        editor.goto("/account")
+        expect(editor.get_by_role("button", name="Make token")).to_be_enabled()
+    finally:
+        api.good("PUT", "/api/admin/mode", {"mode": "normal"})
+    editor.goto(f"{base}/bom")
+    expect(editor.locator("#closed")).to_have_count(0)
+    expect(editor.get_by_role("button", name="Keep as intentional")).to_be_enabled()
 
 
 # --- getting in and out -------------------------------------------------------------------------------------

@@ -12,6 +12,7 @@ from fastapi.routing import APIRoute
 from web_visitor import FORM, HTML, ROLES, Visitor, enter, visitors_of
 
 from silo_server.run import RunningServer, running_server
+from silo_server.settings import Settings
 from silo_server.testing import Api
 from silo_server.web.pages import ROUTERS
 
@@ -78,6 +79,15 @@ def api(server: RunningServer) -> Iterator[Api]:
 def visitors(api: Api) -> dict[str, Visitor]:
     """A session per role."""
     return visitors_of(api)
+
+
+@pytest.fixture(scope="module")
+def closed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Visitor]:
+    """An admin at a server that was started read-only."""
+    url = f"sqlite:///{tmp_path_factory.mktemp('closed') / 'silo.db'}"
+    settings = Settings(database_url=url, read_only=True)
+    with running_server(url, token=TOKEN, settings=settings) as running, Api(running.base_url, TOKEN) as api:
+        yield enter(api, ADMIN)
 
 
 # --- who may ------------------------------------------------------------------------------------------------
@@ -160,3 +170,30 @@ def test_a_used_link_leads_on_where_the_session_lives(api: Api) -> None:
     cookie = browser.call("GET", path).headers["set-cookie"].split(";")[0]
     again = browser.call("GET", path, headers={"Cookie": cookie})
     assert (again.status, again.headers["location"]) == (303, "/activity")
+
+
+# --- a server that takes no changes -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "path", ["/items", "/activity", "/users", "/audit", "/account", "/nowhere", "/login"]
+)
+def test_a_read_only_server_says_so_on_every_page(closed: Visitor, path: str) -> None:
+    """Also on pages of errors, and to those who are not logged in."""
+    page = closed.api.call("GET", path, headers=HTML) if path == "/login" else closed.get(path)
+    assert page.body.decode().count('id="closed"') == 1
+
+
+def test_a_server_that_takes_changes_says_nothing(visitors: dict[str, Visitor]) -> None:
+    """No banner, nothing switched off."""
+    page = visitors[ADMIN].get("/users").body.decode()
+    assert 'id="closed"' not in page
+    assert "disabled" not in page
+
+
+def test_a_mode_that_was_given_at_the_start_has_no_button(closed: Visitor) -> None:
+    """A button that cannot work is none; the page says what does."""
+    page = closed.get("/users").body.decode()
+    assert "SILO_READ_ONLY" in page
+    assert 'action="/mode"' in page
+    assert 'name="mode"' not in page

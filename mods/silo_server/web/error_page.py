@@ -57,16 +57,20 @@ def _for_browsers(handler: Handler) -> Handler:
 async def error_page(request: Request, plain: Response) -> Response:
     """The page for an error that was answered as JSON."""
     told: dict[str, Any] = json.loads(bytes(plain.body))
-    response = page(
-        request,
-        "error.html",
-        await anyio.to_thread.run_sync(_actor, request),
-        status=plain.status_code,
-        title=TITLES.get(plain.status_code, "The server made a mistake"),
-        message=_sentence(plain.status_code, told["message"], request),
-        problems=told.get("problems", [])[:50],
-        path=told.get("path", []),
-    )
+
+    def draw() -> Response:
+        return page(
+            request,
+            "error.html",
+            _actor(request),
+            status=plain.status_code,
+            title=TITLES.get(plain.status_code, "The server made a mistake"),
+            message=_sentence(plain.status_code, told["message"], request),
+            problems=told.get("problems", [])[:50],
+            path=told.get("path", []),
+        )
+
+    response = await anyio.to_thread.run_sync(draw)
     for name in ("retry-after",):
         if name in plain.headers:
             response.headers[name] = plain.headers[name]

@@ -9,12 +9,18 @@ from urllib.parse import quote, unquote
 from fastapi import Request
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
+from sqlalchemy.exc import SQLAlchemyError
 from starlette.responses import HTMLResponse, Response
 
 from silo_server.clock import wire
+from silo_server.db.engine import mode_of
+from silo_server.routes.context import server_of
 from silo_server.values import Actor, Role
 
 NOTICE_COOKIE = "silo_notice"
+
+# For controls that change an item or a BOM: they are shown, switched off, with the reason.
+SWITCHED_OFF = Markup(' disabled aria-describedby="closed" title="Not now: the server takes no changes"')
 
 
 def quantity(value: float | None, unit: str | None = None) -> str:
@@ -67,15 +73,30 @@ def _environment() -> Environment:
 _TEMPLATES = _environment()
 
 
+def _closed(request: Request) -> bool:
+    """True while the server takes no changes. Without its database nobody knows; the page says that then."""
+    try:
+        with server_of(request).db.read() as tx:
+            return mode_of(tx) != "normal"
+    except SQLAlchemyError:
+        return False
+
+
 def page(
     request: Request, template: str, actor: Actor | None, *, status: int = 200, **values: Any
 ) -> Response:
-    """A page. ``actor`` None: nobody is logged in. A notice that waits in its cookie is shown once."""
+    """A page. ``actor`` None: nobody is logged in. A notice that waits in its cookie is shown once.
+
+    Looks into the database for the server's mode, so not to be called on the event loop.
+    """
+    closed = _closed(request)
     notice = unquote(request.cookies.get(NOTICE_COOKIE, ""))[:500]
     html = _TEMPLATES.get_template(template).render(
         actor=actor,
         may_edit=actor is not None and actor.role.covers(Role.EDITOR),
         is_admin=actor is not None and actor.role.covers(Role.ADMIN),
+        closed=closed,
+        off=SWITCHED_OFF if closed else "",
         csrf=(actor.csrf_token or "") if actor is not None else "",
         here=request.url.path,
         notice=notice,

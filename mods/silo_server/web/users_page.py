@@ -126,6 +126,7 @@ def _show(
         tokens=tokens,
         now=now,
         mode=mode,
+        fixed=server.settings.read_only,
         roles=list(Role),
         problem=problem[:1].upper() + problem[1:],
         link=link,

@@ -10,12 +10,20 @@ let count = 0;
 // The lines stay where they are: a table that jumps under the pointer makes people press the wrong button.
 function announce(name, data) {
   const told = name === "reset" ? {} : JSON.parse(data);
+  if (name === "server.state") {
+    show(told.mode === "normal" ? "The server takes changes again." : "The server takes no changes now.");
+    return;
+  }
   count += 1;
   const what = name === "bom_merge" ? "A new merge arrived" : "The BOM changed";
   const detail = told.summary ? `: ${told.summary}` : "";
   const who = told.user ? ` (${told.user})` : "";
+  show(`${what}${detail}${who}.${count > 1 ? ` ${count} changes since you opened this page.` : ""}`);
+}
+
+function show(sentence) {
   const words = document.createElement("span");
-  words.textContent = `${what}${detail}${who}.${count > 1 ? ` ${count} changes since you opened this page.` : ""}`;
+  words.textContent = sentence;
   const link = document.createElement("a");
   link.href = location.pathname;
   link.className = "button small";
@@ -24,7 +32,7 @@ function announce(name, data) {
   place.classList.add("news");
 }
 
-listen(place.dataset.events, place.dataset.last, ["bom_merge", "bom.updated"], announce);
+listen(place.dataset.events, place.dataset.last, ["bom_merge", "bom.updated", "server.state"], announce);
 
 const all = document.getElementById("all");
 if (all) {
