@@ -1,6 +1,8 @@
 # `make demo` and `make test` do all their own set-up; nothing else is needed but python3 (>= 3.11) with venv.
 PYTHON ?= python3
 VENV ?= .venv
+# How many processes share the tests: a number, 0 for none, or all processors of the machine.
+WORKERS ?= logical
 BIN := $(VENV)/bin
 DEV := $(VENV)/.installed-dev
 SERVER := $(VENV)/.installed-server
@@ -32,10 +34,10 @@ demo: $(SERVER)
 	$(BIN)/silo-mod demo $(DEMO)
 
 test: setup
-	$(BIN)/python -m pytest -m "not freecad and not browser"
+	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal -m "not freecad and not browser"
 
 test-machine: setup
-	$(BIN)/python -m pytest -m "freecad or browser"
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadgroup -m "freecad or browser"
 
 check: setup
 	$(BIN)/ruff check .

@@ -26,6 +26,10 @@ TOKEN = "silo_" + "0123456789abcdef" * 2
 TIMEOUT_S = 180
 SCRIPTS = Path(__file__).parent
 
+# "xvfb-run -a" looks for a free screen and takes it later; two that look at once would find the same one.
+WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+FIRST_SCREEN = 99
+
 # No start page (it needs a browser engine) and no notification area (FreeCAD 1.0 deadlocks in it without a
 # screen); facts §6.5.
 _SEED = """<?xml version="1.0" encoding="UTF-8" standalone="no" ?>
@@ -120,7 +124,7 @@ class Window:
         log = self.folder / "freecad.log"
         command = [
             self.freecad.sibling("xvfb-run"),
-            *("-a", "-s", "-screen 0 1600x1000x24"),
+            *("-n", str(FIRST_SCREEN + 100 * WORKER), "-a", "-s", "-screen 0 1600x1000x24"),
             self.freecad.command.replace("freecadcmd", "freecad"),
             str(SCRIPTS / script),
         ]
