@@ -157,6 +157,33 @@ def test_map_files_that_cannot_be_read(tmp_path: Path) -> None:
         read_link_map(tmp_path / "none.yaml")
 
 
+def test_a_link_given_twice_is_refused(tmp_path: Path) -> None:
+    """YAML would take the last one; the parts of the first would be in no link."""
+    path = tmp_path / "twice.yaml"
+    path.write_text("links:\n  arm: [a]\n  base: [b]\n  arm: [c]\n", "utf-8")
+    with pytest.raises(ConfigError, match=r"given twice: “arm” \(line 4\)"):
+        read_link_map(path)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "links: &a\n  x: *a\n",
+        "links:\n  ? [a, b]\n  : [c]\n",
+        "- 1\n",
+        "links: [a]\n",
+        "a: 1\n---\nb: 2\n",
+        "",
+    ],
+)
+def test_odd_yaml_is_a_plain_error(tmp_path: Path, text: str) -> None:
+    """A ring, a key that is a list, a list, several documents, nothing: one sentence with the file."""
+    path = tmp_path / "odd.yaml"
+    path.write_text(text, "utf-8")
+    with pytest.raises(ConfigError, match=r"odd\.yaml"):
+        read_link_map(path)
+
+
 def test_frame_of_a_sub_assembly(assemble: Fixture, compute: Fixture) -> None:
     """``frame: arm`` gives the link's numbers in the placed sub-assembly's own axes."""
     frame = origin_frame((0, 0, 2), (np.pi / 2, 0, 0))

@@ -73,6 +73,8 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"--default-density: wanted kg/m³ above 0, got {args.default_density:g}")
     if args.urdf_out and not args.urdf:
         raise InputError("--urdf-out needs --urdf, the file to start from")
+    if args.snippet and args.json:
+        raise InputError("--snippet and --json both go to standard output; use --report OUT.json")
     from silo.inertia.calculator import calculate
 
     # The small files first: a mistake in them should not cost the reading of the geometry.
@@ -81,12 +83,12 @@ def run(args: argparse.Namespace) -> int:
     task = _task(args)
     assembly = shared.read(args.assembly, args)
     report = calculate(assembly, table, task)
-    if args.urdf:
-        _write_urdf(args, report)
+    # What was found is shown first: where a link is refused, that is what explains it.
+    shared.show(args, report, assembly, quiet=bool(args.snippet))
     if args.snippet:
         _print_snippet(args.snippet, report)
-    else:
-        shared.show(args, report, assembly)
+    if args.urdf:
+        _write_urdf(args, report)
     pushed = shared.push_report(args, report) if args.push else 0
     return max(pushed, shared.verdict(args, report))
 
@@ -96,14 +98,16 @@ def _task(args: argparse.Namespace) -> Task:
     from silo.inertia.frames import FrameChoice
     from silo.inertia.links import read_link_map
     from silo.inertia.massrule import Options
-    from silo.inertia.output.urdf import read_urdf, urdf_frames
+    from silo.inertia.output.urdf import link_names, read_urdf, urdf_frames
 
     frame = FrameChoice(args.frame or ("urdf" if args.urdf else "assembly"))
     frames = None
-    if frame is FrameChoice.URDF:
-        if not args.urdf:
-            raise InputError("--frame urdf needs --urdf FILE, whose joints say where the link frames are")
-        frames = urdf_frames(read_urdf(args.urdf), args.urdf)
+    if frame is FrameChoice.URDF and not args.urdf:
+        raise InputError("--frame urdf needs --urdf FILE, whose joints say where the link frames are")
+    if args.urdf:
+        data = read_urdf(args.urdf)
+        link_names(data, args.urdf)  # a file that cannot be filled is told before anything else is read
+        frames = urdf_frames(data, args.urdf) if frame is FrameChoice.URDF else None
     return Task(
         shared.material_table(args),
         Options(args.default_density, args.density_from_step),
@@ -129,6 +133,9 @@ def _write_urdf(args: argparse.Namespace, report: InertiaReport) -> None:
     print(f"{target}: wrote the inertia of {shared.names_of(filled.written)}.", file=sys.stderr)
     if filled.absent:
         print(f"{target}: has no link {shared.names_of(filled.absent)}.", file=sys.stderr)
+    left = [name for name in filled.untouched if name not in report.links]
+    if left:
+        print(f"{target}: left as they were, no link of ours: {shared.names_of(left)}.", file=sys.stderr)
     massless = [name for name in report.links if name not in links]
     if massless:
         print(f"{target}: not written, without mass: {shared.names_of(massless)}.", file=sys.stderr)

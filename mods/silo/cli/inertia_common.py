@@ -154,7 +154,8 @@ def check_targets(args: argparse.Namespace) -> None:
     bad = [name for name in args.preview if Path(name).suffix.lower() not in (".glb", ".png")]
     if bad:
         raise InputError(f"--preview writes .glb and .png; got {', '.join(bad)}")
-    for name in (*args.report, *args.preview):
+    urdf = getattr(args, "urdf_out", None)
+    for name in (*args.report, *args.preview, *([urdf] if urdf else [])):
         if not Path(name).absolute().parent.is_dir():
             raise InputError(f"{name}: there is no folder {Path(name).parent}")
 
@@ -204,9 +205,11 @@ def _progress(name: str) -> Iterator[Any]:
         yield told
 
 
-def show(args: argparse.Namespace, report: InertiaReport, assembly: Assembly) -> None:
-    """Print the report and write every file that was asked for."""
+def show(args: argparse.Namespace, report: InertiaReport, assembly: Assembly, *, quiet: bool = False) -> None:
+    """Write every file that was asked for, and print the report unless ``quiet``."""
     _write_files(args, report, assembly)
+    if quiet:
+        return
     if args.json:
         from silo.inertia.output.data import report_json
 
@@ -225,6 +228,8 @@ def console() -> Any:
 
 
 def _write_files(args: argparse.Namespace, report: InertiaReport, assembly: Assembly) -> None:
+    from silo.inertia.output.files import write_whole
+
     pictures = [Path(name) for name in args.preview]
     drawn = next((path for path in pictures if path.suffix.lower() == ".png"), None)
     pages = [Path(name) for name in args.report if name.lower().endswith(".md")]
@@ -237,7 +242,7 @@ def _write_files(args: argparse.Namespace, report: InertiaReport, assembly: Asse
 
         write_preview(report, assembly, path)
     for name in args.report:
-        _write(Path(name), _report_text(Path(name), report, drawn))
+        write_whole(name, _report_text(Path(name), report, drawn).encode("utf-8"))
 
 
 def _report_text(path: Path, report: InertiaReport, picture: Path | None) -> str:
@@ -255,14 +260,6 @@ def _report_text(path: Path, report: InertiaReport, picture: Path | None) -> str
     return report_markdown(report, link)
 
 
-def _write(path: Path, text: str) -> None:
-    try:
-        with path.open("w", encoding="utf-8", newline="") as file:
-            file.write(text)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
-
-
 def verdict(args: argparse.Namespace, report: InertiaReport) -> int:
     """The exit code: with --strict, 1 where a warning is not allowed."""
     if not args.strict:
@@ -270,7 +267,8 @@ def verdict(args: argparse.Namespace, report: InertiaReport) -> int:
     left = [w for w in report.warnings if str(w.code) not in args.allow]
     if left:
         codes = sorted({str(w.code) for w in left})
-        print(f"silo-mod: --strict: {len(left)} warnings ({', '.join(codes)})", file=sys.stderr)
+        count = counted(len(left), "warning")
+        print(f"silo-mod: --strict: {count} ({', '.join(codes)})", file=sys.stderr)
     return 1 if left else 0
 
 
@@ -286,7 +284,8 @@ def push_report(
         return 0
     with common.client_of(args) as client:
         done = push(client, plan)
-    _say(f"Silo: {len(done.written)} items written, {len(done.unchanged)} had these numbers already.")
+    written = counted(len(done.written), "item")
+    _say(f"Silo: {written} written, {len(done.unchanged)} had these numbers already.")
     if done.unknown:
         _say(f"Unknown to the server: {', '.join(done.unknown)}")
     _tell_skipped(plan)
@@ -296,7 +295,7 @@ def push_report(
 def _tell_plan(plan: PushPlan) -> None:
     from silo.inertia.push import describe
 
-    _say(f"Would write {len(plan.items)} items ({plan.comment}):")
+    _say(f"Would write {counted(len(plan.items), 'item')} ({plan.comment}):")
     for item in plan.items:
         _say(f"  {describe(item)}")
     _tell_skipped(plan)
@@ -312,6 +311,11 @@ def _say(text: str) -> None:
     from silo.cli.show import plain
 
     print(plain(text), file=sys.stderr)
+
+
+def counted(number: int, what: str) -> str:
+    """ "1 item", "2 items"."""
+    return f"{number} {what}{'' if number == 1 else 's'}"
 
 
 def names_of(values: Sequence[str], limit: int = 8) -> str:

@@ -18,6 +18,7 @@ instance has it.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -81,15 +82,48 @@ class Claims:
 
 def read_link_map(path: Path | str) -> LinkMap:
     """A YAML map. ConfigError with every problem of the file at once."""
+    try:
+        text = Path(path).read_text("utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: the link map cannot be read ({error})") from error
+    return link_map(_yaml(text, str(path)), str(path))
+
+
+def _yaml(text: str, source: str) -> Any:
+    """Plain values. YAML lets the last of two equal keys win, which would lose a link's parts in silence."""
     import yaml
 
     try:
-        data = yaml.safe_load(Path(path).read_text("utf-8-sig"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: the link map cannot be read ({error})") from error
-    except yaml.YAMLError as error:
-        raise ConfigError(f"{path}: this is no YAML ({' '.join(str(error).split())})") from error
-    return link_map(data, str(path))
+        tree = yaml.compose(text, Loader=yaml.SafeLoader)
+        twice = _keys_given_twice(tree)
+        data = yaml.safe_load(text)
+    except (yaml.YAMLError, RecursionError) as error:
+        raise ConfigError(f"{source}: this is no YAML ({' '.join(str(error).split())})") from error
+    if twice:
+        raise ConfigError(
+            f"{source}: given twice: {', '.join(twice)}; write all parts of a link in one place"
+        )
+    return data
+
+
+def _keys_given_twice(tree: Any) -> list[str]:
+    import yaml
+
+    found: list[str] = []
+    waiting, seen = [tree], set()
+    while waiting:
+        node = waiting.pop()
+        if not isinstance(node, yaml.CollectionNode) or id(node) in seen:
+            continue
+        seen.add(id(node))
+        if isinstance(node, yaml.MappingNode):
+            keys = [key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode)]
+            lines = {k.value: k.start_mark.line + 1 for k, _ in node.value if isinstance(k, yaml.ScalarNode)}
+            found += [f"“{key}” (line {lines[key]})" for key, n in Counter(keys).items() if n > 1]
+            waiting += [value for _, value in node.value]
+        else:
+            waiting += node.value
+    return found
 
 
 def link_map(data: Any, source: str = "the link map") -> LinkMap:

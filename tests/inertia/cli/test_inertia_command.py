@@ -195,6 +195,9 @@ def test_bom_and_material_options_reach_the_calculation(run: Run, arm: Path) -> 
         (["--preview", "out.jpg"], ".glb and .png"),
         (["--frame", "urdf"], "needs --urdf"),
         (["--urdf-out", "x.urdf"], "needs --urdf"),
+        (["--urdf", "arm.urdf", "--urdf-out", "nowhere/x.urdf"], "no folder"),
+        (["--urdf", "bom.csv", "--frame", "own"], "no XML"),
+        (["--snippet", "sdf", "--json"], "--report OUT.json"),
         (["--default-density", "0"], "above 0"),
         (["--column", "mass"], "ROLE=HEADER"),
         (["--materials", "none.csv"], "none.csv"),
@@ -230,6 +233,36 @@ def test_a_urdf_of_another_robot_is_refused(run: Run, arm: Path) -> None:
     assert "torso" in ran.err
     assert "base_link" in ran.err
     assert other.read_text("utf-8") == '<robot name="r"><link name="torso"/></robot>'
+
+
+def test_links_of_the_urdf_that_get_nothing_are_named(run: Run, arm: Path) -> None:
+    """A link that our assembly does not have keeps its old numbers: somebody should know."""
+    text = (arm / "arm.urdf").read_text("utf-8")
+    hand = '<link name="hand"><inertial><mass value="7"/></inertial></link></robot>'
+    (arm / "arm.urdf").write_text(text.replace("</robot>", hand), "utf-8")
+    ran = run("inertia", arm / "arm.step", "--bom", arm / "bom.csv", "--urdf", arm / "arm.urdf")
+    assert ran.code == 0
+    assert "left as they were, no link of ours: hand" in ran.err
+    assert hand in (arm / "arm.urdf").read_text("utf-8")
+
+
+def test_json_alone_goes_to_standard_output(run: Run, arm: Path) -> None:
+    """Whatever else is asked for, standard output is one JSON text."""
+    ran = run(
+        "inertia", arm / "arm.step", "--bom", arm / "bom.csv", "--json", "--strict",
+        "--urdf", arm / "arm.urdf", "--report", arm / "r.md", "--preview", arm / "p.glb", "--push", "--dry-run",
+    )  # fmt: skip
+    assert ran.code == 1
+    assert ran.json()["format"] == "silo-inertia/1"
+    for words in ("--strict: ", "wrote the inertia", "Would write "):
+        assert words in ran.err
+
+
+def test_a_snippet_comes_with_the_reports(run: Run, arm: Path) -> None:
+    """Files that were asked for are written, whatever goes to standard output."""
+    ran = run("inertia", arm / "arm.step", "--snippet", "mjcf", "--report", arm / "r.json")
+    assert ran.out.startswith("<body")
+    assert json.loads((arm / "r.json").read_text("utf-8"))["format"] == "silo-inertia/1"
 
 
 def test_ctrl_c_is_a_plain_sentence(arm: Path) -> None:

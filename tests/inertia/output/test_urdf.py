@@ -139,3 +139,35 @@ def test_a_missing_file(tmp_path: Path) -> None:
     """With its path."""
     with pytest.raises(InputError, match=r"none\.urdf"):
         write_urdf(tmp_path / "none.urdf", {})
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b"<robot><link name='a'/><link name='a'/></robot>", "2 links named a"),
+        (b"<robot><link name='a'><inertial/><visual/><inertial/></link></robot>", "link a has 2 <inertial>"),
+    ],
+)
+def test_what_is_there_twice_is_refused(data: bytes, words: str) -> None:
+    """Only one of the two would be filled, and nobody knows which one a simulator reads."""
+    with pytest.raises(InputError, match=words):
+        fill_urdf(data, {"a": PROPS}, "x.urdf")
+
+
+def test_a_link_to_a_file_stays_one(tmp_path: Path) -> None:
+    """A symbolic link is followed, not replaced by a file of its own."""
+    (tmp_path / "robot.urdf").write_bytes(ROBOT)
+    (tmp_path / "latest.urdf").symlink_to("robot.urdf")
+    write_urdf(tmp_path / "latest.urdf", {"old": PROPS})
+    assert (tmp_path / "latest.urdf").is_symlink()
+    assert (tmp_path / "robot.urdf").read_bytes() == fill_urdf(ROBOT, {"old": PROPS}).data
+
+
+def test_nothing_is_written_where_no_link_is_known(tmp_path: Path) -> None:
+    """Neither the file nor a copy of it elsewhere."""
+    (tmp_path / "robot.urdf").write_bytes(ROBOT)
+    before = (tmp_path / "robot.urdf").stat().st_mtime_ns
+    filled = write_urdf(tmp_path / "robot.urdf", {"ghost": PROPS}, tmp_path / "out.urdf")
+    assert (filled.written, filled.absent) == ((), ("ghost",))
+    assert [p.name for p in tmp_path.iterdir()] == ["robot.urdf"]
+    assert (tmp_path / "robot.urdf").stat().st_mtime_ns == before

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,6 +12,7 @@ from silo.inertia.geometry.glb import write_glb
 from silo.inertia.geometry.picture import write_picture
 from silo.inertia.geometry.scene import LinkView, views_of
 from silo.inertia.model import Assembly
+from silo.inertia.output.files import write_whole
 
 if TYPE_CHECKING:
     from silo.inertia.report import InertiaReport
@@ -26,15 +25,7 @@ def write_preview(report: InertiaReport, assembly: Assembly, path: Path) -> None
 
     Raises InputError for another suffix and where the file cannot be written.
     """
-    data = preview_bytes(assembly, views_of(report, assembly), path.suffix)
-    try:
-        handle, name = tempfile.mkstemp(dir=path.absolute().parent, suffix=".tmp")
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(data)
-        os.chmod(name, 0o644)
-        os.replace(name, path)
-    except OSError as error:
-        raise InputError(f"{path}: the preview cannot be written: {error.strerror or error}") from error
+    write_whole(path, preview_bytes(assembly, views_of(report, assembly), path.suffix))
 
 
 def preview_bytes(assembly: Assembly, views: Sequence[LinkView], suffix: str) -> bytes:

@@ -7,10 +7,9 @@ whole file. So the places are found with expat, which tells byte positions, and 
 
 from __future__ import annotations
 
-import os
 import re
-import tempfile
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -21,6 +20,7 @@ import numpy as np
 from silo.bom.errors import InputError
 from silo.inertia.core import Floats, MassProps
 from silo.inertia.frames import origin_frame
+from silo.inertia.output.files import write_whole
 from silo.inertia.output.snippets import urdf_inertial
 
 MAX_BYTES = 64 * 1024 * 1024
@@ -28,7 +28,7 @@ MAX_BYTES = 64 * 1024 * 1024
 
 @dataclass(eq=False)
 class _Span:
-    """A ``<link>``: where its start tag is and ends, its end tag, its ``<inertial>``, its first child."""
+    """A ``<link>``: where its start tag is and ends, its end tag, first child, its ``<inertial>``s."""
 
     name: str
     start: int
@@ -36,6 +36,7 @@ class _Span:
     closed: bool
     end: int = -1
     inertial: tuple[int, int] | None = None
+    inertials: int = 0
     first_child: int | None = None
 
 
@@ -55,7 +56,7 @@ def fill_urdf(data: bytes, links: Mapping[str, MassProps], source: str = "URDF")
     Raises InputError where ``data`` is no URDF that can be read (also for DOCTYPE: not needed in a URDF, and
     a way to attack its reader).
     """
-    spans = _Reader(data, source).links
+    spans = _links_of(data, source)
     by_name = {span.name: span for span in spans}
     newline = b"\r\n" if b"\r\n" in data else b"\n"
     edits: list[tuple[int, int, bytes]] = []
@@ -74,22 +75,19 @@ def fill_urdf(data: bytes, links: Mapping[str, MassProps], source: str = "URDF")
 
 
 def write_urdf(path: Path | str, links: Mapping[str, MassProps], target: Path | str | None = None) -> Filled:
-    """Fill a URDF file in place (atomically), or into ``target``."""
-    path = Path(path)
+    """Fill a URDF file in place, or into ``target``; whole or not at all.
+
+    Where it has none of ``links``, nothing is written, and ``Filled.written`` is empty.
+    """
     filled = fill_urdf(read_urdf(path), links, str(path))
-    target = Path(target) if target is not None else path
-    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(filled.data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.chmod(temporary, path.stat().st_mode & 0o7777)
-        os.replace(temporary, target)
-    except BaseException:
-        os.unlink(temporary)
-        raise
+    if filled.written:
+        write_whole(target if target is not None else path, filled.data, like=path)
     return filled
+
+
+def link_names(data: bytes, source: str = "URDF") -> tuple[str, ...]:
+    """The links of a URDF, in its order. InputError as :func:`fill_urdf`."""
+    return tuple(span.name for span in _links_of(data, source))
 
 
 def read_urdf(path: Path | str) -> bytes:
@@ -100,6 +98,19 @@ def read_urdf(path: Path | str) -> bytes:
         return Path(path).read_bytes()
     except OSError as error:
         raise InputError(f"{path}: the URDF cannot be read ({error.strerror or error})") from error
+
+
+def _links_of(data: bytes, source: str) -> Sequence[_Span]:
+    """The links, each once. Two of one name, or two inertials in one link: nobody knows which one counts."""
+    spans = _Reader(data, source).links
+    count = Counter(span.name for span in spans)
+    problems = [f"has {number} links named {name}" for name, number in count.items() if number > 1]
+    problems += [
+        f"the link {span.name} has {span.inertials} <inertial>" for span in spans if span.inertials > 1
+    ]
+    if problems:
+        raise InputError(f"{source}: {'; '.join(problems)}; a link and its inertial are there once")
+    return spans
 
 
 def _edit(data: bytes, span: _Span, props: MassProps, newline: bytes) -> tuple[int, int, bytes]:
@@ -194,6 +205,7 @@ class _Reader:
         above = self._stack[-1] if self._stack else ""
         if self._open is not None and tag == "inertial" and above == "link":
             self._open.inertial = (self._inertial_at, self._tag_end(here)[0])
+            self._open.inertials += 1
         elif self._open is not None and tag == "link":
             self._open.end = here
             self.links.append(self._open)

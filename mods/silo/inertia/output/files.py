@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Files are written whole or not at all: cancelled halfway, the old one stays and nothing lies beside it."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+from silo.bom.errors import InputError
+
+
+def write_whole(path: Path | str, data: bytes, *, like: Path | str | None = None) -> None:
+    """Replace ``path`` by ``data`` in one step. A symbolic link stays one: what it leads to is replaced.
+
+    ``like``: take the mode of that file; else that of the old file, else what a new file gets here.
+    InputError where the folder or the file cannot be written.
+    """
+    target = Path(os.path.realpath(path))
+    try:
+        if target.exists() and not target.is_file():
+            # A pipe or a device cannot be replaced, and need not be: nobody reads it twice.
+            target.write_bytes(data)
+            return
+        _replace(target, data, _mode(target if like is None else Path(like)))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
+
+
+def _replace(target: Path, data: bytes, mode: int) -> None:
+    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        os.chmod(temporary, mode)
+        os.replace(temporary, target)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def _mode(path: Path) -> int:
+    try:
+        return path.stat().st_mode & 0o7777
+    except FileNotFoundError:
+        mask = os.umask(0)
+        os.umask(mask)
+        return 0o666 & ~mask
