@@ -117,3 +117,66 @@ def test_default_densities_and_shares_stay_here(assemble: Fixture, compute: Fixt
     motor = assemble(("l/motor/a", part))
     shared = compute(motor, "Name,Material,Mass\nmotor,,2.000 kg\n")
     assert "share" in plan_push(shared).skipped[0].reason
+
+
+MOTOR = "Part number,Quantity,Material,Mass,Name\n"
+
+
+def test_a_sub_assembly_gets_its_own_mass(assemble: Fixture, compute: Fixture, at: Fixture) -> None:
+    """A bought motor is one item; its parts' shares stay here, its mass, volume and centre go to it."""
+    case, lid = box("case", 0.1, 0.1, 0.1), box("lid", 0.1, 0.1, 0.1)
+    motors = [
+        item
+        for i in range(2)
+        for item in (
+            (f"l/motor{i}/case", case, at(i, 0, 0), "l/motor/case"),
+            (f"l/motor{i}/lid", lid, at(i, 0, 1), "l/motor/lid"),
+        )
+    ]
+    frames = {("l", f"motor{i}"): at(i, 0, 0) for i in range(2)}
+    report = compute(assemble(*motors, frames=frames), MOTOR + "P01-0001,2,,2.000 kg,motor\n")
+    (one,) = report.sub_assemblies
+    assert (one.mass, one.agrees, one.paths) == (2.0, True, ("l/motor0", "l/motor1"))
+    plan = plan_push(report)
+    (item,) = plan.items
+    assert item.part_number == "P01-0001"
+    assert item.properties == {"mass_kg": 2.0, "volume_m3": 0.002, "com_m": [0, 0, 0.5]}
+    assert {s.name for s in plan.skipped} == {"case", "lid"}
+    assert all("written to that one's item" in s.reason for s in plan.skipped)
+
+
+@pytest.mark.parametrize(
+    ("row", "reason"),
+    [
+        (",1,,2.000 kg,motor", "no part number"),
+        ("P,1,,0 kg,motor", "its mass is zero"),
+        ("P,1,,900 kg,motor", "in doubt"),
+        ("P,1,,2.000 kg,motor\nQ,1,steel,,case", "sum up to another mass"),
+        ("P,1,,8.000 kg,motor\nP,1,steel,,case", "another part has the part number P"),
+    ],
+)
+def test_a_sub_assembly_that_nobody_vouches_for_is_named(
+    assemble: Fixture, compute: Fixture, row: str, reason: str
+) -> None:
+    """With the reason, in words."""
+    asm = assemble(("l/motor/case", box("case", 0.1, 0.1, 0.1), None, "l/motor/case"))
+    plan = plan_push(compute(asm, MOTOR + row + "\n"))
+    assert "motor" not in {item.name for item in plan.items}
+    (said,) = [s.reason for s in plan.skipped if s.name == "motor"]
+    assert reason in said
+
+
+@pytest.mark.parametrize(
+    ("rows", "code"),
+    [
+        ("P,1,,50.00 kg,a\n", "mass_implausible"),
+        ("P,4,steel,31.40 kg,a\n", "row_total"),
+        ('P,1,,"1,234 kg",a\n', "bom_mass_ambiguous"),
+    ],
+)
+def test_a_doubtful_mass_is_not_written(assemble: Fixture, compute: Fixture, rows: str, code: str) -> None:
+    """Another part's, the row's, or in another unit: the warning keeps it from becoming a fact in Silo."""
+    asm = assemble(*((f"l/{i}", box("a", 0.1, 0.1, 0.1)) for i in range(4 if code == "row_total" else 1)))
+    plan = plan_push(compute(asm, MOTOR + rows))
+    assert plan.items == ()
+    assert code in plan.skipped[0].reason

@@ -13,15 +13,16 @@ import numpy as np
 from silo.bom.errors import InputError
 from silo.inertia.bom.rows import BomTable
 from silo.inertia.codes import MassCode
-from silo.inertia.core import MassProps, TensorProblem, combine_arrays, is_rigid
+from silo.inertia.core import Floats, MassProps, TensorProblem, combine_arrays, is_rigid
 from silo.inertia.doubts import Note
 from silo.inertia.frames import ASSEMBLY_FRAME, FrameChoice, LinkFrame
+from silo.inertia.groups import Occurrence
 from silo.inertia.links import Claims
 from silo.inertia.masses import Placed
 from silo.inertia.matching import Matching
 from silo.inertia.model import Assembly
 from silo.inertia.products import companions, leaf_products, sub_assemblies
-from silo.inertia.report import InertiaReport, LinkResult, PartResult, PartWarning
+from silo.inertia.report import InertiaReport, LinkResult, PartResult, PartWarning, SubAssemblyResult
 
 _TENSOR_WORDS = {
     TensorProblem.NOT_FINITE: "has a value that is not finite",
@@ -54,7 +55,45 @@ def fill_links(
         _part_warnings(report, parts)
     report.unclaimed = tuple(_parts(assembly, placed, claims.unclaimed, ""))
     _part_warnings(report, report.unclaimed)
+    report.sub_assemblies = tuple(_sub_assemblies(assembly, placed))
     report.total = sum_up(placed, range(len(assembly.instances)))
+
+
+def _sub_assemblies(assembly: Assembly, placed: Placed) -> Iterator[SubAssemblyResult]:
+    """One per BOM row, in the order of the rows."""
+    by_row: dict[int, list[Occurrence]] = {}
+    for occurrence in placed.groups:
+        by_row.setdefault(id(occurrence.match.row), []).append(occurrence)
+    for occurrences in sorted(by_row.values(), key=lambda of_row: of_row[0].match.row.line):
+        row = occurrences[0].match.row
+        shapes = [_shape(assembly, placed, occurrence) for occurrence in occurrences]
+        volume, com = shapes[0]
+        same = all(np.allclose(volume, v, rtol=1e-9, atol=0) for v, _ in shapes)
+        same_com = com is not None and all(
+            c is not None and np.allclose(com, c, atol=1e-9) for _, c in shapes
+        )
+        yield SubAssemblyResult(
+            name=row.name,
+            part_number=row.part_number,
+            paths=tuple("/".join(occurrence.path) for occurrence in occurrences),
+            mass=row.mass_kg or 0.0,
+            quantum=row.quantum_kg,
+            agrees=all(occurrence.agrees for occurrence in occurrences),
+            line=row.line,
+            doubtful=row.unsure or any(bool(o.match.doubt) or o.implausible for o in occurrences),
+            volume=volume if same and volume > 0 else None,
+            com=tuple(com.tolist()) if same and same_com and com is not None else None,
+        )
+
+
+def _shape(assembly: Assembly, placed: Placed, occurrence: Occurrence) -> tuple[float, Floats | None]:
+    """Volume [m^3] and centre of mass (3,) [m] of a placed sub-assembly; the centre in its own axes."""
+    volume = float(placed.volume[list(occurrence.below)].sum())
+    frame = assembly.frames.get(occurrence.path)
+    props = sum_up(placed, occurrence.below)
+    if frame is None or not is_rigid(frame) or np.linalg.det(frame[:3, :3]) < 0 or props.mass <= 0:
+        return volume, None
+    return volume, props.transform(LinkFrame(frame, "").inverse()).com
 
 
 def chosen_frame(name: str, claims: Claims, choice: FrameChoice) -> LinkFrame:

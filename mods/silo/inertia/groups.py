@@ -19,9 +19,28 @@ from silo.inertia.bom.rows import BOMEntry
 from silo.inertia.codes import MassCode, Rule, Source
 from silo.inertia.core import Floats
 from silo.inertia.doubts import MISMATCH_LIMIT, GivenMass, Note, implausible
-from silo.inertia.massrule import Decision, MassRule
+from silo.inertia.massrule import Decision, MassRule, two_ways
 from silo.inertia.matching import Match
 from silo.inertia.model import Instance
+
+
+@dataclass(frozen=True)
+class Occurrence:
+    """A placed sub-assembly whose row gives a mass.
+
+    path, below
+        its instance path, and the indices of all parts in it.
+    agrees
+        the parts' masses sum up to it, or were taken from it.
+    implausible
+        nothing that parts are made of gives this mass in their volume.
+    """
+
+    match: Match
+    path: tuple[str, ...]
+    below: tuple[int, ...]
+    agrees: bool
+    implausible: bool
 
 
 @dataclass(frozen=True)
@@ -47,9 +66,9 @@ class Groups:
     rule: MassRule
     _made: dict[tuple[Match, Decision, bool], Decision] = field(default_factory=dict)
 
-    def apply(self, matches: Mapping[str, Match]) -> None:
+    def apply(self, matches: Mapping[str, Match]) -> Iterator[Occurrence]:
         """Use or compare every matched row, once per placed sub-assembly. ``matches``: by product name."""
-        for match, below in self._occurrences(matches):
+        for match, path, below in self._occurrences(matches):
             row = match.row
             known = [i for i in below if _has_data(self.decisions[i])]
             gaps = [i for i in below if not _has_data(self.decisions[i])]
@@ -59,12 +78,18 @@ class Groups:
                 continue
             left = row.mass_kg - float(self.mass[known].sum())
             stands_for_all = not row.has_children and left > row.quantum_kg
+            agrees = True
             if gaps and (not known or stands_for_all):
                 self._share(match, gaps, left, partly=bool(known))
             elif known:
-                self._compare(match, below, known[0])
+                agrees = self._compare(match, below, known[0])
+            volume = float(self.volume[below].sum())
+            odd = any(implausible(GivenMass(row.mass_kg, row.quantum_kg), volume))
+            yield Occurrence(match, path, tuple(below), agrees, odd)
 
-    def _occurrences(self, matches: Mapping[str, Match]) -> Iterator[tuple[Match, list[int]]]:
+    def _occurrences(
+        self, matches: Mapping[str, Match]
+    ) -> Iterator[tuple[Match, tuple[str, ...], list[int]]]:
         """Each placed sub-assembly that has a row, deepest first, with its instances."""
         if not matches:
             return
@@ -79,7 +104,7 @@ class Groups:
                     below[instance.path[:depth]].append(index)
                     product[instance.path[:depth]] = name
         for path in sorted(below, key=len, reverse=True):
-            yield matches[product[path]], below[path]
+            yield matches[product[path]], path, below[path]
 
     def _share(self, match: Match, gaps: list[int], mass: float, *, partly: bool) -> None:
         """Spread a mass over parts without data by volume, or evenly where none has one."""
@@ -111,12 +136,12 @@ class Groups:
                 notes=(*_doubt(match), note, *doubts),
             )
 
-    def _compare(self, match: Match, below: list[int], first: int) -> None:
+    def _compare(self, match: Match, below: list[int], first: int) -> bool:
         row = match.row
         total = float(self.mass[below].sum())
         stated = row.mass_kg or 0.0
         if abs(total - stated) <= max(row.quantum_kg, MISMATCH_LIMIT * stated):
-            return
+            return True
         note = Note(
             MassCode.SUB_ASSEMBLY,
             f"the parts of “{row.name}” sum up to {total:.6g} kg, its own row says {stated:.6g} kg; "
@@ -126,6 +151,7 @@ class Groups:
         if note not in old.notes:
             new = replace(old, notes=(*old.notes, note))
             self.decisions[:] = [new if decision is old else decision for decision in self.decisions]
+        return False
 
     def _cover(self, match: Match, gaps: list[int]) -> None:
         """A row without children and mass stands for the parts that the BOM does not have themselves."""
@@ -177,4 +203,4 @@ def _has_data(decision: Decision) -> bool:
 
 
 def _doubt(match: Match) -> tuple[Note, ...]:
-    return (Note(MassCode.AMBIGUOUS, match.doubt),) if match.doubt else ()
+    return (*((Note(MassCode.AMBIGUOUS, match.doubt),) if match.doubt else ()), *two_ways(match.row))

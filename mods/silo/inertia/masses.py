@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from silo.inertia.codes import MassCode, Source
 from silo.inertia.core import Floats, place, rigid_mask
 from silo.inertia.doubts import TOTAL_BY_OTHERS, Note, looks_like_totals
-from silo.inertia.groups import Groups
+from silo.inertia.groups import Groups, Occurrence
 from silo.inertia.massrule import Decision, MassRule
 from silo.inertia.matching import Matching
 from silo.inertia.model import Assembly, GeometryCode
@@ -28,6 +28,8 @@ class Placed:
         one per instance; instances of one product share theirs.
     counted
         (N,) bool; False for wires and surfaces that merely stand beside a solid of the same product.
+    groups
+        placed sub-assemblies whose BOM row gives a mass.
     """
 
     volume: Floats
@@ -36,6 +38,7 @@ class Placed:
     mass: Floats
     decisions: Sequence[Decision]
     counted: NDArray[np.bool_]
+    groups: Sequence[Occurrence] = ()
 
     def inertia(self, index: NDArray[np.intp]) -> Floats:
         """(n, 3, 3) [kg m^2] of some instances, about their own centres of mass."""
@@ -65,8 +68,8 @@ def place_all(assembly: Assembly, rule: MassRule, matching: Matching) -> Placed:
         float,
     ).reshape(len(instances))
     mass[~counted] = 0.0
-    Groups(instances, volume, mass, decisions, counted, rule).apply(matching.groups)
-    return Placed(volume, com, unit, mass, decisions, counted)
+    groups = tuple(Groups(instances, volume, mass, decisions, counted, rule).apply(matching.groups))
+    return Placed(volume, com, unit, mass, decisions, counted, groups)
 
 
 def _geometry(assembly: Assembly) -> tuple[Floats, Floats, Floats]:

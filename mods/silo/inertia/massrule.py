@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from silo.inertia.bom.rows import BomCode, BOMEntry
 from silo.inertia.codes import Decided, MassCode, Rule, Source
 from silo.inertia.doubts import GivenMass, Note, density_doubts, expectation, mass_doubts
 from silo.inertia.matching import Match
@@ -121,7 +122,7 @@ class MassRule:
             material_name=known.name if known else None,
             pieces=given.pieces,
             compared=expected is not None,
-            notes=(*base.notes, *mass_doubts(given, prototype, expected)),
+            notes=(*base.notes, *two_ways(row), *mass_doubts(given, prototype, expected)),
         )
 
     def _material(self, base: Decision, prototype: Prototype, text: str) -> Decision:
@@ -200,6 +201,14 @@ class MassRule:
             density_source="the geometry file",
             notes=notes if prototype.volume_m3 else (*notes, _no_volume(prototype)),
         )
+
+
+def two_ways(row: BOMEntry) -> tuple[Note, ...]:
+    """A mass whose decimal mark had to be guessed."""
+    if not row.unsure:
+        return ()
+    words = f"its mass in BOM line {row.line} can be read two ways; {row.mass_kg:.6g} kg was used"
+    return (Note(BomCode.AMBIGUOUS_MASS, words),)
 
 
 def _unknown(text: str, reason: str, what: str) -> Note:

@@ -2,20 +2,33 @@
 """Masses back to Silo: plan first, then do. One new revision per item whose numbers changed.
 
 Only numbers that somebody vouched for go out: a BOM mass, a material's density, the file's own density when
-it was asked for. A default density or a zero is a gap in the data, and is listed as such.
+it was asked for. A default density or a zero is a gap in the data, and a mass that other data make doubtful
+is no fact yet; both are listed as such. A sub-assembly's BOM mass goes to its own item.
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Set
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from silo.bom.errors import NotFoundError
-from silo.inertia.codes import Source
+from silo.inertia.bom.rows import BomCode
+from silo.inertia.codes import MassCode, Source
+from silo.inertia.model import GeometryCode
 from silo.inertia.output.values import number
-from silo.inertia.report import InertiaReport, PartResult
+from silo.inertia.report import InertiaReport, PartResult, SubAssemblyResult
+
+DOUBTS = (
+    MassCode.AMBIGUOUS,
+    MassCode.ROW_TOTAL,
+    MassCode.IMPLAUSIBLE,
+    BomCode.AMBIGUOUS_MASS,
+    GeometryCode.INVALID_SHAPE,
+    GeometryCode.MESH_MISMATCH,
+)
+"""Warnings under which a number is not written: it may well be another part's, or in another unit."""
 
 VOUCHED = (Source.BOM_MASS, Source.MATERIAL, Source.STEP_DENSITY)
 
@@ -103,6 +116,8 @@ def plan_push(
             skipped[Skipped(parts[0].name, reason)] = None
             continue
         items.append(PushItem(part_number, parts[0].name, _json(_properties(parts[0]))))
+    for one in report.sub_assemblies:
+        _plan_sub_assembly(one, {item.part_number for item in items}, items, skipped)
     if top is not None:
         _plan_top(report, top, gaps, items, skipped)
     return PushPlan(tuple(items), tuple(skipped), _comment(report))
@@ -130,12 +145,35 @@ def push(items: Items, plan: PushPlan, told: Callable[[str], None] = lambda part
 
 def _gap(part: PartResult) -> str | None:
     if part.source is Source.SUB_ASSEMBLY_MASS:
-        return "its mass is a share of its sub-assembly's, not its own"
+        return "its mass is a share of its sub-assembly's, which is written to that one's item"
     if part.source not in VOUCHED:
         return "neither BOM nor material gives its mass"
     if part.mass <= 0:
         return "its mass is zero"
+    doubts = [warning for warning in part.warnings if warning.code in DOUBTS]
+    if doubts:
+        return f"its mass is in doubt ({', '.join(dict.fromkeys(str(w.code) for w in doubts))})"
     return None
+
+
+def _plan_sub_assembly(
+    one: SubAssemblyResult, taken: Set[str], items: list[PushItem], skipped: dict[Skipped, None]
+) -> None:
+    reason = ""
+    if not one.part_number:
+        reason = "it has no part number"
+    elif one.mass <= 0:
+        reason = "its mass is zero"
+    elif not one.agrees:
+        reason = "its parts sum up to another mass than its own row says"
+    elif one.doubtful:
+        reason = "its mass is in doubt (see the warnings)"
+    elif one.part_number in taken:
+        reason = f"another part has the part number {one.part_number}"
+    if reason:
+        skipped[Skipped(one.name, reason)] = None
+        return
+    items.append(PushItem(one.part_number, one.name, _json(_properties(one))))
 
 
 def _plan_top(
@@ -149,11 +187,11 @@ def _plan_top(
     items.append(PushItem(top, report.assembly, {"mass_kg": _rounded(total.mass), "com_m": com}))
 
 
-def _properties(part: PartResult) -> dict[str, Any]:
+def _properties(part: PartResult | SubAssemblyResult) -> dict[str, Any]:
     found: dict[str, Any] = {"mass_kg": _rounded(part.mass)}
-    if part.volume > 0:
+    if part.volume:
         found["volume_m3"] = _rounded(part.volume)
-    if part.volume > 0 and part.com is not None:
+    if part.volume and part.com is not None:
         found["com_m"] = tuple(_rounded(value) for value in part.com)
     return found
 

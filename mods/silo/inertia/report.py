@@ -81,6 +81,33 @@ class PartResult:
         return self.mass * self.quantity
 
 
+@dataclass(frozen=True)
+class SubAssemblyResult:
+    """A sub-assembly with a mass of its own in the BOM. It is part of no sum: its parts have their masses.
+
+    mass, quantum
+        by the BOM, of one [kg] ± this.
+    volume, com
+        of one: all its parts [m^3], and their centre of mass in its own axes [m]; None where its occurrences
+        differ or the file does not say where they are.
+    agrees
+        its parts sum up to this mass, or got theirs from it.
+    doubtful
+        the mass can be read two ways, or nothing in its volume weighs that much, or the row may be another's.
+    """
+
+    name: str
+    part_number: str
+    paths: tuple[str, ...]
+    mass: float
+    quantum: float
+    agrees: bool
+    line: int
+    doubtful: bool = False
+    volume: float | None = None
+    com: tuple[float, float, float] | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class LinkResult:
     """One link: its mass properties in its frame, its parts, and what is wrong with its tensor."""
@@ -102,6 +129,8 @@ class InertiaReport:
         link → everything about it.
     unclaimed
         parts that no link has; not in any link's mass.
+    sub_assemblies
+        those that the BOM gives a mass.
     total
         the whole assembly in its own frame, unclaimed parts included; None before a calculation.
     assembly, source, bom
@@ -112,6 +141,7 @@ class InertiaReport:
     warnings: list[PartWarning] = field(default_factory=list)
     links: dict[str, LinkResult] = field(default_factory=dict)
     unclaimed: tuple[PartResult, ...] = ()
+    sub_assemblies: tuple[SubAssemblyResult, ...] = ()
     total: MassProps | None = None
     assembly: str = ""
     source: str = ""

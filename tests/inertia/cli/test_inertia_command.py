@@ -250,7 +250,8 @@ def test_json_alone_goes_to_standard_output(run: Run, arm: Path) -> None:
     """Whatever else is asked for, standard output is one JSON text."""
     ran = run(
         "inertia", arm / "arm.step", "--bom", arm / "bom.csv", "--json", "--strict",
-        "--urdf", arm / "arm.urdf", "--report", arm / "r.md", "--preview", arm / "p.glb", "--push", "--dry-run",
+        "--urdf", arm / "arm.urdf", "--report", arm / "r.md", "--preview", arm / "p.glb",
+        "--push", "--dry-run",
     )  # fmt: skip
     assert ran.code == 1
     assert ran.json()["format"] == "silo-inertia/1"

@@ -71,6 +71,29 @@ def roll_up(client: SiloClient, top: str, children: dict[str, int]) -> Any:
     return client._get("its mass", "items", top, "bom", "mass").mapping()
 
 
+def test_a_bought_unit_is_rolled_up_by_its_own_mass(run: Run, arm: Path, client: SiloClient) -> None:
+    """The servo has a mass in the BOM, its case and horns have none: the server takes the servo's."""
+    category = next(iter(client.categories()))
+    servo = client.create_item(
+        "kindred-rd", category, "Servo", name="Servo", item_type="assembly"
+    ).part_number
+    case = item_for(client, "Servo case", category)
+    top = client.create_item("kindred-rd", category, "Arm", name="Arm", item_type="assembly").part_number
+    bom = arm / "silo.csv"
+    bom.write_text(f"Part number,Name,Quantity,Material,Mass\n{servo},Servo,3,,0.165 kg\n", "utf-8")
+    ran = run("inertia", arm / "arm.step", "--bom", bom, "--push", "--json")
+    assert ran.code == 0
+    assert "1 item written" in ran.err
+    assert "Not written: Servo case: its mass is a share" in ran.err
+    properties = client.get_item(servo).properties
+    assert properties["mass_kg"] == 0.165
+    assert properties["volume_m3"] == pytest.approx(8.276e-5, rel=1e-3)
+    roll_up(client, servo, {case: 1})
+    rolled = roll_up(client, top, {servo: 3})
+    assert rolled["total_mass_kg"] == pytest.approx(3 * 0.165)
+    assert rolled["missing"] == []
+
+
 def test_dry_run_asks_no_server(run: Run, arm: Path) -> None:
     """The plan, without a server anywhere."""
     ran = run("inertia", arm / "arm.step", "--bom", arm / "bom.csv", "--push", "--dry-run", "--json")

@@ -107,6 +107,7 @@ class MassReader:
                 row,
                 name,
             )
+            return replace(likely, ambiguous=True)
         return likely
 
     def _per_piece(self, total: MassCell, row: Row, name: str, quantity: float | None) -> MassCell:

@@ -112,6 +112,7 @@ def _entry(
         quantity=quantity,
         quantum_kg=mass.quantum_kg,
         overridden=mass.overridden,
+        unsure=mass.ambiguous,
         item=cell(row.cells, item_role),
         level=_level(cell(row.cells, Role.LEVEL)),
         line=row.line,

@@ -50,8 +50,8 @@ class BOMEntry:
         pieces per one parent; None where the file does not say or cannot be read.
     quantum_kg
         half of the last digit the file shows: the mass is ``mass_kg`` ± this.
-    overridden
-        the mass is marked as set by hand.
+    overridden, unsure
+        the mass is marked as set by hand; it could be read two ways.
     item, level, parent, has_children
         structure: the item number ("1.1.2"), nesting depth (1 = top), index of the parent row in the table's
         ``rows`` (None at the top), and whether rows hang below this one (a sub-assembly).
@@ -67,6 +67,7 @@ class BOMEntry:
     quantity: float | None = None
     quantum_kg: float = 0.0
     overridden: bool = False
+    unsure: bool = False
     item: str = ""
     level: int = 1
     parent: int | None = None

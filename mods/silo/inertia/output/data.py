@@ -9,7 +9,7 @@ import json
 from typing import Any
 
 from silo.inertia.core import MassProps
-from silo.inertia.report import InertiaReport, LinkResult, PartResult
+from silo.inertia.report import InertiaReport, LinkResult, PartResult, SubAssemblyResult
 
 FORMAT = "silo-inertia/1"
 
@@ -23,6 +23,7 @@ def report_data(report: InertiaReport) -> dict[str, Any]:
         "default_density": report.default_density,
         "links": [_link(link) for link in report.links.values()],
         "unclaimed": [_part(part) for part in report.unclaimed],
+        "sub_assemblies": [_sub_assembly(one) for one in report.sub_assemblies],
         "total": None if report.total is None else _props(report.total),
         "warnings": [
             {"link": w.link_name, "part": w.part_name, "code": str(w.code), "message": w.message}
@@ -72,6 +73,20 @@ def _part(part: PartResult) -> dict[str, Any]:
         "material_name": part.material_name,
         "bom_lines": list(part.lines),
         "warnings": [{"code": str(w.code), "message": w.message} for w in part.warnings],
+    }
+
+
+def _sub_assembly(one: SubAssemblyResult) -> dict[str, Any]:
+    return {
+        "name": one.name,
+        "part_number": one.part_number,
+        "paths": list(one.paths),
+        "mass": one.mass,
+        "quantum": one.quantum,
+        "agrees": one.agrees,
+        "volume": one.volume,
+        "com": None if one.com is None else list(one.com),
+        "bom_line": one.line,
     }
 
 
