@@ -99,7 +99,7 @@ def story() -> None:
     from silo.workbench import commit_flow
 
     pulse, saves, walks = Pulse(), [], []
-    commit_flow.LiveDocuments.save = staticmethod(pulse.timed(commit_flow.host.save, saves))
+    commit_flow.LiveDocuments.save = staticmethod(pulse.timed(commit_flow.saving.save, saves))
     one.commits._taker = commit_flow.Taker(
         commit_flow.LiveDocuments(),
         pulse.timed(commit_flow.take_snapshot, walks),

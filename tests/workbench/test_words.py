@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.workbench import words
-from silo.workbench.words import counted, plain, quantity
+from silo.workbench.words import counted, plain, quantity, tip, visible
 
 
 @pytest.mark.parametrize(
@@ -47,6 +47,26 @@ def test_whatever_comes_out_is_short_and_harmless(text: str, most: int) -> None:
     shown = plain(text, most)
     assert len(shown) <= most
     assert not any(unicodedata.category(c) in ("Cc", "Cf", "Zl", "Zp", "Cs", "Co") for c in shown)
+
+
+def test_several_lines_stay_lines() -> None:
+    """A message box or the report view keeps its lines; what could steer a terminal is gone."""
+    assert visible("one\n  two \x1b[31m\u202e\r") == "one\n  two  [31m  "
+    assert visible("x" * 50, 10) == "x" * 10 + "…"
+
+
+@given(st.text(max_size=300))
+def test_whatever_the_report_view_gets_is_harmless(text: str) -> None:
+    """Only line ends are left of the control characters."""
+    assert not any(
+        unicodedata.category(c) in ("Cc", "Cf", "Zl", "Zp", "Cs", "Co") for c in visible(text) if c != "\n"
+    )
+
+
+def test_a_tool_tip_shows_markup_as_text() -> None:
+    """Qt would draw it otherwise, and load pictures that it names."""
+    assert tip('a <img src="x"> & b') == '<qt>a &lt;img src="x"&gt; &amp; b</qt>'
+    assert tip("") == ""
 
 
 def test_one_and_many() -> None:

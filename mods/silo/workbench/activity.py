@@ -14,7 +14,7 @@ from enum import StrEnum
 from silo.workbench.words import counted, plain, translate
 
 MOST_ENTRIES = 300
-MOST_LINES = 12
+MOST_LINES = 16
 
 
 class Tone(StrEnum):

@@ -22,8 +22,8 @@ def buttons(actions: Iterable[Action], on_action: OnAction) -> Any:
     """A row of link buttons."""
     made = []
     for action in actions:
-        tip = plain(action.target) if action.do is Do.VIEW else ""
-        made.append(widgets.link_button(action.text, partial(on_action, action), tip))
+        address = action.target if action.do is Do.VIEW else ""
+        made.append(widgets.link_button(action.text, partial(on_action, action), address))
     return widgets.row(*made)
 
 

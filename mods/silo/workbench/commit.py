@@ -20,7 +20,7 @@ from silo.workbench.words import translate
 
 
 class Documents(Protocol):
-    """What a commit needs of FreeCAD; :mod:`silo.workbench.host` has it."""
+    """What a commit needs of FreeCAD; :mod:`silo.workbench.saving` has it."""
 
     def is_partial(self, doc: Any, /) -> bool: ...
 

@@ -10,7 +10,7 @@ from silo.workbench import widgets
 from silo.workbench.activity import Tone
 from silo.workbench.commit import Plan, Row, State
 from silo.workbench.qt import QtCore, QtGui, QtWidgets
-from silo.workbench.words import counted, plain, translate
+from silo.workbench.words import counted, plain, tip, translate
 
 
 class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
@@ -24,7 +24,7 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         self.resize(520, 380)
         layout = QtWidgets.QVBoxLayout(self)
         layout.setSpacing(8)
-        layout.addWidget(QtWidgets.QLabel(translate("Silo", "What changed?")))
+        layout.addWidget(widgets.label(translate("Silo", "What changed?")))
         self.comment = QtWidgets.QPlainTextEdit()
         self.comment.setObjectName("comment")
         self.comment.setPlaceholderText(translate("Silo", "A comment for this revision (may stay empty)"))
@@ -60,8 +60,8 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         tree.setSelectionMode(QtWidgets.QAbstractItemView.SelectionMode.NoSelection)
         for number, row in enumerate(self._plan.rows):
             item = QtWidgets.QTreeWidgetItem([plain(os.path.basename(row.path) or row.label, 80), row.note])
-            item.setToolTip(0, plain(row.path, 300))
-            item.setToolTip(1, row.note)
+            item.setToolTip(0, tip(row.path))
+            item.setToolTip(1, tip(row.note))
             item.setData(0, QtCore.Qt.ItemDataRole.UserRole, number)
             self._mark(item, row, tree)
             tree.addTopLevelItem(item)
@@ -113,7 +113,7 @@ def refusal(plan: Plan) -> str:
     top = plan.top
     if top.can_commit:
         return ""
-    name = os.path.basename(top.path) or top.label
+    name = plain(os.path.basename(top.path) or top.label, 80)
     if top.state is State.UNNAMED:
         return translate("Silo", "{name} has no file yet. Save it under a name first.").replace(
             "{name}", name

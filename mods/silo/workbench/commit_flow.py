@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from silo.bom.errors import SiloError
-from silo.workbench import host, live, qt, snapshot, widgets
+from silo.workbench import host, live, qt, saving, snapshot, widgets
 from silo.workbench.activity import Action, Do, Entry, Line, Tone
 from silo.workbench.commit import Plan, Row, State, Taken, Taker, plan
 from silo.workbench.commit_dialog import CommitDialog, refusal
@@ -31,10 +31,10 @@ class LiveDocuments:
     """FreeCAD's documents, as :class:`silo.workbench.commit.Documents` wants them."""
 
     is_partial = staticmethod(host.is_partial)
-    is_modified = staticmethod(host.is_modified)
-    is_writable = staticmethod(host.is_writable)
+    is_modified = staticmethod(saving.is_modified)
+    is_writable = staticmethod(saving.is_writable)
     lost_assemblies = staticmethod(live.lost_assemblies)
-    save = staticmethod(host.save)
+    save = staticmethod(saving.save)
 
 
 def take_snapshot(doc: Any) -> Snapshot:

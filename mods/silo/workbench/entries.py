@@ -17,7 +17,7 @@ from silo.bom.model import BomEntry
 from silo.bom.naming import display_name
 from silo.bom.report import shorten
 from silo.bom_sync import Resolved, Status
-from silo.workbench.activity import Action, Do, Entry, Line, Tone
+from silo.workbench.activity import Action, Do, Entry, Line, Tone, shortened
 from silo.workbench.sending import Sent
 from silo.workbench.words import counted, plain, quantity, translate
 
@@ -128,11 +128,15 @@ def _resolved_lines(sent: Sent) -> tuple[Line, ...]:
         return ()
     base = os.path.dirname(resolved.assembly.doc_path)
     return (
-        *_finding_lines(resolved, base),
-        *_conflict_lines(sent, resolved),
+        *shortened(tuple(_finding_lines(resolved, base)), MOST_FINDINGS),
+        *shortened(tuple(_conflict_lines(sent, resolved)), MOST_CONFLICTS),
         *unregistered_lines(resolved),
     )
 
+
+# However many of a kind there are, the box has room for the other kinds and their buttons.
+MOST_FINDINGS, MOST_CONFLICTS = 6, 4
+MOST_IN_CONSOLE = 20
 
 # Told elsewhere in the box, or in the report view only.
 _NOT_HERE = (FindingCode.UNREGISTERED, FindingCode.CONSOLIDATION)
@@ -196,7 +200,12 @@ def unregistered_lines(resolved: Resolved) -> tuple[Line, ...]:
 def console_lines(sent: Sent) -> tuple[str, ...]:
     """What goes to the report view: the consolidation warnings in the spec's words (§6)."""
     findings = sent.resolved.findings if sent.resolved is not None else ()
-    return tuple(plain(f.message, 300) for f in findings if f.code is FindingCode.CONSOLIDATION)
+    told = [plain(f.message, 300) for f in findings if f.code is FindingCode.CONSOLIDATION]
+    left = len(told) - MOST_IN_CONSOLE
+    if left < 2:
+        return tuple(told)
+    more = translate("Silo", "[Silo BOM] … and {n} more of these; the preview lists them all.")
+    return (*told[:MOST_IN_CONSOLE], more.replace("{n}", str(left)))
 
 
 # --- events of the server --------------------------------------------------------------------------------

@@ -11,12 +11,11 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from functools import cache
 from typing import Any
 
 import FreeCAD
 
-from silo.workbench.saved_marks import SavedMarks
+from silo.workbench.words import visible
 
 # --- FreeCAD itself --------------------------------------------------------------------------------------
 
@@ -50,23 +49,23 @@ def translate(context: str, text: str) -> str:
 
 
 def message(text: str) -> None:
-    """A line in the report view."""
-    FreeCAD.Console.PrintMessage(text + "\n")
+    """A line in the report view. Like all of these, harmless to a terminal, whoever wrote the text."""
+    FreeCAD.Console.PrintMessage(visible(text) + "\n")
 
 
 def warning(text: str) -> None:
     """A warning in the report view."""
-    FreeCAD.Console.PrintWarning(text + "\n")
+    FreeCAD.Console.PrintWarning(visible(text) + "\n")
 
 
 def error(text: str) -> None:
     """An error in the report view."""
-    FreeCAD.Console.PrintError(text + "\n")
+    FreeCAD.Console.PrintError(visible(text) + "\n")
 
 
 def log(text: str) -> None:
     """A line for those who look for the cause of a problem; hidden unless FreeCAD is told to show it."""
-    FreeCAD.Console.PrintLog(text + "\n")
+    FreeCAD.Console.PrintLog(visible(text) + "\n")
 
 
 def parameters(group: str) -> Any:
@@ -112,23 +111,14 @@ def is_partial(doc: Any) -> bool:
     return bool(getattr(doc, "Partial", False))
 
 
-def is_modified(doc: Any) -> bool:
-    """True where the document has edits that are not on disk."""
-    if not has_gui():
-        return bool(doc.isTouched()) if hasattr(doc, "isTouched") else False
-    return _is_marked(doc) and not (version() < (0, 21) and _marks().is_clean(doc))
+def open_document(path: str) -> Any:
+    """Have FreeCAD open a file; the document becomes the active one. For people's files: :mod:`saving`."""
+    return FreeCAD.openDocument(path)
 
 
-def _is_marked(doc: Any) -> bool:
-    view = _gui_document(doc)
-    return bool(view is not None and view.Modified)
-
-
-def _gui_document(doc: Any) -> Any:
-    try:
-        return gui().getDocument(doc.Name)
-    except NameError:  # FreeCAD's own choice of exception for "no such document"
-        return None
+def activate(doc: Any) -> None:
+    """Make a document the active one."""
+    FreeCAD.setActiveDocument(doc.Name)
 
 
 @contextmanager
@@ -143,132 +133,12 @@ def same_active_document() -> Iterator[None]:
             FreeCAD.setActiveDocument(name)
 
 
-def open_fully(path: str) -> Any:
-    """The document of a file with all its objects, opened or completed where needed.
-
-    FreeCAD completes a partly loaded document by closing and reading it again, so unsaved edits in it would
-    be lost: then, and where the file cannot be read, :class:`DocumentError`.
-    """
-    from silo.bom.errors import DocumentError
-
-    known = find_document(path)
-    if known is not None and not is_partial(known):
-        return known
-    if known is not None and is_modified(known):
-        raise DocumentError(
-            path, "FreeCAD has loaded it only in part and it has unsaved edits, which opening it would lose"
-        )
-    with same_active_document():
-        try:
-            return FreeCAD.openDocument(known.FileName if known is not None else path)
-        except (OSError, RuntimeError) as problem:
-            raise DocumentError(path, f"FreeCAD cannot open it: {problem}") from problem
-
-
 def close_all() -> None:
     """Close every document without saving; for batches, never with a person at work."""
     for name in list(FreeCAD.listDocuments()):
         # Closing one document may close others that only it had loaded.
         if name in FreeCAD.listDocuments():
             FreeCAD.closeDocument(name)
-
-
-def save(doc: Any) -> None:
-    """Save a document to its file; :class:`DocumentError` unless the file really was written."""
-    from silo.bom.errors import DocumentError
-
-    path = doc.FileName
-    if not path:
-        raise DocumentError(doc.Label, "it has never been saved; save it under a name first")
-    if is_partial(doc):
-        raise DocumentError(path, "FreeCAD has loaded it only in part and cannot save it")
-    if not is_writable(path):
-        raise DocumentError(path, "the file is read-only")
-    before = _stamp(path)
-    try:
-        _save(doc)
-    except (OSError, RuntimeError) as problem:
-        raise DocumentError(path, f"FreeCAD could not save it: {problem}") from problem
-    if _stamp(path) == before:
-        raise DocumentError(path, "FreeCAD did not write the file; its report view says why")
-
-
-def _save(doc: Any) -> None:
-    view = _gui_document(doc) if has_gui() else None
-    if view is None:
-        doc.save()
-    elif version() >= (0, 21):
-        doc.save()
-        view.Modified = False
-    elif view.ActiveView is None or _asks_before_saving(doc):
-        doc.save()
-        _marks().saved(doc)
-    else:
-        with same_active_document():
-            FreeCAD.setActiveDocument(doc.Name)
-            gui().runCommand("Std_Save")
-
-
-@cache
-def _marks() -> SavedMarks:
-    marks = SavedMarks()
-    add_document_observer(marks)
-    return marks
-
-
-def _asks_before_saving(doc: Any) -> bool:
-    """True where FreeCAD's own save command would ask about further modified files."""
-    return any(other != doc and _is_marked(other) for other in doc.getDependentDocuments())
-
-
-def _stamp(path: str) -> tuple[int, int, int]:
-    try:
-        status = os.stat(path)
-    except OSError:
-        return (0, 0, 0)
-    return (status.st_mtime_ns, status.st_size, status.st_ino)
-
-
-def is_writable(path: str) -> bool:
-    """True where the file may be replaced; a file marked read-only may not, whoever asks."""
-    folder = os.path.dirname(path) or "."
-    if not os.path.exists(path):
-        return os.access(folder, os.W_OK)
-    marked = not os.stat(path).st_mode & 0o222
-    return os.access(path, os.W_OK) and os.access(folder, os.W_OK) and not marked
-
-
-def write_identity(doc: Any, name: str, identity: str, *, whole_document: bool) -> None:
-    """Write a Silo identity in every place that survives in all versions; the caller saves.
-
-    name
-        ``Name`` of the component's object; "" for the document itself.
-    whole_document
-        the document is this one component, so it carries the identity as well. Otherwise the identity is the
-        object's only (:mod:`silo.bom.identity` says where it is looked for).
-    """
-    from silo.bom.errors import DocumentError
-    from silo.bom.identity import meta_key
-
-    obj = doc.getObject(name) if name else None
-    if name and obj is None:
-        raise DocumentError(doc.FileName, f"it has no object {name} any more")
-    if obj is not None:
-        _set_text(obj, "SiloItemId", identity)
-        if "SiloUUID" in obj.PropertiesList:
-            obj.SiloUUID = identity
-    # Meta gives a copy: only assigning a whole dictionary changes it.
-    doc.Meta = {**doc.Meta, meta_key("" if whole_document else name): identity}
-    if whole_document and hasattr(doc, "addProperty"):
-        _set_text(doc, "SiloUUID", identity)
-
-
-def _set_text(owner: Any, name: str, value: str) -> None:
-    if name not in owner.PropertiesList:
-        owner.addProperty("App::PropertyString", name, "Silo", "Identity of the item in Silo")
-    setattr(owner, name, value)
-    if hasattr(owner, "setEditorMode"):
-        owner.setEditorMode(name, ["ReadOnly"])
 
 
 def add_document_observer(observer: Any) -> None:
@@ -287,6 +157,14 @@ def remove_document_observer(observer: Any) -> None:
 def main_window() -> Any:
     """FreeCAD's main window."""
     return gui().getMainWindow()
+
+
+def view_of(doc: Any) -> Any:
+    """The GUI's half of a document (``Modified``, ``ActiveView``), or None."""
+    try:
+        return gui().getDocument(doc.Name)
+    except NameError:  # FreeCAD's own choice of exception for "no such document"
+        return None
 
 
 def has_command(name: str) -> bool:

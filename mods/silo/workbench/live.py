@@ -24,7 +24,7 @@ from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.links import extract
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.roots import choose_assembly
-from silo.workbench import host
+from silo.workbench import host, saving
 from silo.workbench.quick import Glass, QuickDocument
 
 # <XLink file="parts/b.FCStd" stamp="…" name="Box" …>, written by FreeCAD itself into memory just now.
@@ -41,7 +41,7 @@ ASSEMBLY_SINCE = (0, 22)
 
 def read(path: str, assembly: str | None = None) -> Extraction:
     """The BOM of a file, opened in this FreeCAD (or found open). DocumentError, InputError as told there."""
-    return extract_live(host.open_fully(path), assembly)
+    return extract_live(saving.open_fully(path), assembly)
 
 
 def read_checked(path: str, assembly: str | None = None) -> Extraction:

@@ -12,7 +12,7 @@ from silo.bom.identity import walk_entries
 from silo.bom.model import BomEntry, Extraction
 from silo.folders import data_folder
 from silo.registration import Journal, Registration
-from silo.workbench import host, live, widgets
+from silo.workbench import host, live, saving, widgets
 from silo.workbench.commit_flow import CommitFlow, take_snapshot
 from silo.workbench.preferences import Preferences
 from silo.workbench.registering import Candidate, Order, Seen, State, carry_out, next_number, offer
@@ -185,7 +185,7 @@ def _look_at(path: str, known: Mapping[str, Any]) -> Seen:
         return Seen(State.UNNAMED)
     if not os.path.isfile(path):
         return Seen(State.MISSING)
-    if not host.is_writable(path):
+    if not saving.is_writable(path):
         return Seen(State.READ_ONLY)
     doc = known.get(path)
     if doc is None:
@@ -193,7 +193,7 @@ def _look_at(path: str, known: Mapping[str, Any]) -> Seen:
     if live.lost_assemblies(doc):
         return Seen(State.LOST)
     saved_at = str(getattr(doc, "LastModifiedDate", "") or "")
-    if not host.is_modified(doc):
+    if not saving.is_modified(doc):
         return Seen(State.READY, saved_at)
     return Seen(State.PARTIAL if host.is_partial(doc) else State.EDITED, saved_at)
 
@@ -201,8 +201,8 @@ def _look_at(path: str, known: Mapping[str, Any]) -> Seen:
 def write(candidate: Candidate, identity: str) -> None:
     """Write an identity into a component's document and save it. GUI thread."""
     entry = candidate.entry
-    doc = host.open_fully(entry.doc_path)
+    doc = saving.open_fully(entry.doc_path)
     if live.lost_assemblies(doc):
         raise DocumentError(entry.doc_path, "made by a newer FreeCAD; saving it here would destroy it")
-    host.write_identity(doc, entry.object_name, identity, whole_document=not candidate.shares_file)
-    host.save(doc)
+    saving.write_identity(doc, entry.object_name, identity, whole_document=not candidate.shares_file)
+    saving.save(doc)

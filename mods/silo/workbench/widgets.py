@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from silo.workbench import host
+from silo.workbench import host, words
 from silo.workbench.activity import Tone
 from silo.workbench.flow_layout import FlowLayout
 from silo.workbench.qt import QtCore, QtGui, QtWidgets
@@ -76,8 +76,7 @@ def link_button(text: str, call: Callable[[], None], tip: str = "") -> Any:
         "QPushButton:hover, QPushButton:focus { text-decoration: underline; }"
     )
     made.setSizePolicy(QtWidgets.QSizePolicy.Policy.Fixed, QtWidgets.QSizePolicy.Policy.Fixed)
-    if tip:
-        made.setToolTip(tip)
+    made.setToolTip(words.tip(tip))
     made.clicked.connect(lambda _checked=False: call())
     return made
 
@@ -100,6 +99,18 @@ def picture(name: str, size: int = 16) -> Any:
     return made
 
 
+def broken(text: str, metrics: Any, width: int) -> str:
+    """A text with line ends where ``width`` pixels are full; a word that is wider stands alone."""
+    lines = [""]
+    for word in text.split():
+        longer = f"{lines[-1]} {word}".strip()
+        if lines[-1] and metrics.horizontalAdvance(longer) > width:
+            lines.append(word)
+        else:
+            lines[-1] = longer
+    return "\n".join(lines)
+
+
 def clear(layout: Any) -> None:
     """Remove all widgets of a layout."""
     while layout.count():
@@ -117,5 +128,5 @@ def warn(parent: Any, title: str, text: str) -> None:
     box.setIcon(QtWidgets.QMessageBox.Icon.Warning)
     box.setWindowTitle(title)
     box.setTextFormat(QtCore.Qt.TextFormat.PlainText)
-    box.setText(text)
+    box.setText(words.visible(text, 2000))
     (getattr(box, "exec", None) or box.exec_)()

@@ -35,9 +35,25 @@ def plain(text: str, most: int = 200) -> str:
     """Text of others as one line of visible characters, cut where it is too long to help anybody."""
     # Only a little more than can be shown is looked at: a label may be megabytes long.
     head = text[: most * 4]
-    shown = "".join(" " if unicodedata.category(c) in _HIDDEN else c for c in head)
-    shown = " ".join(shown.split())
+    shown = " ".join("".join(" " if unicodedata.category(c) in _HIDDEN else c for c in head).split())
     return shown if len(shown) <= most and len(text) <= most * 4 else shown[: most - 1].rstrip() + "…"
+
+
+def visible(text: str, most: int = 20_000) -> str:
+    """Text of several lines for the report view and message boxes: the same, but lines and blanks stay."""
+    shown = (c if c == "\n" or unicodedata.category(c) not in _HIDDEN else " " for c in text[:most])
+    return "".join(shown) + ("…" if len(text) > most else "")
+
+
+def tip(text: str) -> str:
+    """A tool tip. Qt takes text that looks like markup for markup, so ours is some, with nothing in it.
+
+    That also breaks long lines, which a plain tool tip does not.
+    """
+    # FreeCAD's start must not pay for its table of names.
+    import html
+
+    return f"<qt>{html.escape(plain(text, 400), quote=False)}</qt>" if text else ""
 
 
 def counted(count: int, one: str, many: str) -> str:

@@ -19,7 +19,7 @@ import FreeCAD as App  # noqa: E402
 
 from silo.bom.errors import SiloError  # noqa: E402
 from silo.bom.model import Extraction  # noqa: E402
-from silo.workbench import host, live  # noqa: E402
+from silo.workbench import host, live, saving  # noqa: E402
 
 CASES = Path(os.environ["SILO_CASES"]) / "asm4"
 
@@ -37,14 +37,14 @@ def add_bolt(doc: Any, bolt: Any, name: str) -> None:
 
 
 def unsaved_edits() -> dict[str, Any]:
-    doc = host.open_fully(str(CASES / "plain_link" / "top.FCStd"))
+    doc = saving.open_fully(str(CASES / "plain_link" / "top.FCStd"))
     add_bolt(doc, doc.getObject("Link").LinkedObject, "Second")
     return told(live.extract_live(doc))
 
 
 def found_open_by_another_path() -> dict[str, Any]:
     folder = CASES / "array_of_one"
-    doc = host.open_fully(str(folder / "top.FCStd"))
+    doc = saving.open_fully(str(folder / "top.FCStd"))
     add_bolt(doc, doc.getObject("Row").LinkedObject, "Second")
     other = folder.parent / "by_another_path"
     other.symlink_to(folder, target_is_directory=True)
@@ -54,17 +54,17 @@ def found_open_by_another_path() -> dict[str, Any]:
 
 def broken_document_is_not_reloaded() -> dict[str, Any]:
     path = str(CASES / "missing_file" / "top.FCStd")
-    doc = host.open_fully(path)
+    doc = saving.open_fully(path)
     add_bolt(doc, doc.getObject("Link").LinkedObject, "Second")
     return told(live.read(path))
 
 
 def part_document_is_completed() -> dict[str, Any]:
-    top = host.open_fully(str(CASES / "partial_part_document" / "top.FCStd"))
+    top = saving.open_fully(str(CASES / "partial_part_document" / "top.FCStd"))
     path = str(CASES / "partial_part_document" / "kit.FCStd")
     before = host.find_document(path)
     partial, objects = host.is_partial(before), len(before.Objects)
-    after = host.open_fully(path)
+    after = saving.open_fully(path)
     return {
         "partial": [partial, host.is_partial(after)],
         "more objects": len(after.Objects) > objects,
@@ -74,7 +74,7 @@ def part_document_is_completed() -> dict[str, Any]:
 
 
 def closed_part() -> dict[str, Any]:
-    doc = host.open_fully(str(CASES / "plain_link" / "top.FCStd"))
+    doc = saving.open_fully(str(CASES / "plain_link" / "top.FCStd"))
     App.closeDocument(doc.getObject("Link").LinkedObject.Document.Name)
     found = live.extract_live(doc)
     return {**told(found), "message": found.findings[0].message}
