@@ -60,6 +60,9 @@ def test_the_specs_materials(materials: MaterialTable, name: str) -> None:
         ("Plexiglass", 1180),
         ("POM-C, black", 1410),
         ("Messing", 8500),
+        ("Nickel silver", 8730),
+        ("German silver", 8730),
+        ("Steel wire", 7850),
         ("不锈钢", 8000),
         ("ＡＢＳ", 1050),
         ("Ti-6Al-4V", 4430),
@@ -86,8 +89,12 @@ def test_texts_that_name_a_material(materials: MaterialTable, text: str, density
         "PETG-CF",
         "LW-PLA",
         "Brass/Steel",
-        "Nickel silver",
+        "Silver nickel",
         "Silver paint",
+        "Sintered bronze",
+        "PLA, 20% infill",
+        "Steel wire rope",
+        "Copper cable",
         "Titanium dioxide",
         "Unobtainium",
         "Default",
@@ -152,6 +159,10 @@ def test_user_table_wins(tmp_path: Path) -> None:
         ("a.csv", "material,rho\nsteel,7850\n", "wanted columns “name” and “density”"),
         ("a.csv", "name,density\nsteel,heavy\nlead,-3\n", "line 2.*line 3"),
         ("a.csv", "name,density (stone)\nsteel,1\n", "unknown density unit"),
+        ("a.csv", "name,density\nsteel,7.85\n", "line 2: “steel” has the density 7.85 without a unit"),
+        ("a.toml", "[materials]\nalu = 2.7\n", "materials.alu: .*“2.7 g/cm3” or “2.7 kg/m3”"),
+        ("a.csv", "name,density\nsteel,7850\nSteel,7700\n", "“Steel” has two densities, 7850 and 7700"),
+        ("a.csv", "name,density,aliases\nx,900,blend\ny,950,Blend\n", "“Blend” has two densities"),
         ("a.toml", "materials = 3\n", r"\[materials\]"),
         ("a.toml", "[materials\n", "no TOML"),
         ("a.xls", "", r"\.csv or \.toml"),
@@ -163,6 +174,18 @@ def test_bad_user_tables_are_plain_errors(tmp_path: Path, name: str, text: str, 
     path.write_text(text, "utf-8")
     with pytest.raises(ConfigError, match=words):
         load_materials([path], freecad=False)
+
+
+def test_light_materials_and_other_separators(tmp_path: Path) -> None:
+    """A foam with its unit, in a cell or in the header; a table as German spreadsheets write it."""
+    foam = tmp_path / "foam.csv"
+    foam.write_text("name;density (kg/m3)\nEPS;15\nhouse blend;1250,5\n", "utf-8")
+    one = tmp_path / "one.csv"
+    one.write_text("name,density\nEPS,15 kg/m3\n", "utf-8")
+    for path in (foam, one):
+        hit = load_materials([path], freecad=False).find("EPS")
+        assert isinstance(hit, MaterialHit)
+        assert hit.material.density == 15
 
 
 def test_a_missing_user_table_is_a_plain_error(tmp_path: Path) -> None:

@@ -15,6 +15,10 @@ from typing import Any
 from silo.bom.errors import ConfigError
 from silo.inertia.materials.density import parse_density, unit_factor
 from silo.inertia.materials.table import Material
+from silo.inertia.materials.words import Words, words
+
+UNIT_NEEDED_BELOW = 25.0
+"""[kg/m^3] a user's number below this needs its unit: who writes 7.85 alone means g/cm³."""
 
 
 @cache
@@ -47,7 +51,8 @@ def user_rows(path: Path | str) -> tuple[Material, ...]:
 
 
 def _csv_rows(text: str, source: str) -> tuple[Material, ...]:
-    reader = csv.DictReader(io.StringIO(text))
+    first = text.partition("\n")[0]
+    reader = csv.DictReader(io.StringIO(text), delimiter=";" if ";" in first and "," not in first else ",")
     heads = {re.sub(r"[\s(\[].*", "", head).casefold(): head for head in reader.fieldnames or () if head}
     if not {"name", "density"} <= heads.keys():
         raise ConfigError(f"{source}: wanted columns “name” and “density”, got {reader.fieldnames}")
@@ -65,7 +70,7 @@ def _csv_rows(text: str, source: str) -> tuple[Material, ...]:
             [alias.strip() for alias in cells.get("aliases", "").split(";") if alias.strip()],
             cells.get("source", "") or source,
             cells.get("family", ""),
-            factor,
+            factor if unit else None,
         )
         if isinstance(row, str):
             problems.append(f"line {reader.line_num}: {row}")
@@ -92,7 +97,7 @@ def _toml_rows(text: str, source: str) -> tuple[Material, ...]:
             [str(alias) for alias in aliases] if isinstance(aliases, list) else [],
             str(given.get("source", source)),
             str(given.get("family", "")),
-            1.0,
+            None,
         )
         if isinstance(row, str):
             problems.append(f"materials.{name}: {row}")
@@ -102,16 +107,28 @@ def _toml_rows(text: str, source: str) -> tuple[Material, ...]:
 
 
 def _material(
-    name: str, density: str, aliases: list[str], source: str, family: str, factor: float
+    name: str, density: str, aliases: list[str], source: str, family: str, factor: float | None
 ) -> Material | str:
+    """``factor``: kg/m^3 per unit of the header, None where there is none. What is wrong, in words, else."""
     value = parse_density(density)
     if not name or value is None:
         return f"wanted a name and a density above 0, got “{name}” and “{density}”"
     bare = re.fullmatch(r"[\d.,eE+\-]+", density) is not None
-    return Material(name, value * factor if bare else value, tuple(aliases), source, family)
+    if bare and factor is None and value < UNIT_NEEDED_BELOW:
+        return (
+            f"“{name}” has the density {density} without a unit; as kg/m³ it would be lighter than a foam. "
+            f"Write “{density} g/cm3” or “{density} kg/m3”"
+        )
+    return Material(name, value * (factor or 1.0) if bare else value, tuple(aliases), source, family)
 
 
 def _checked(rows: list[Material], problems: list[str], source: str) -> tuple[Material, ...]:
+    seen: dict[Words, Material] = {}
+    for row in rows:
+        for alias in (row.name, *row.aliases):
+            other = seen.setdefault(words(alias), row)
+            if other is not row and other.density != row.density:
+                problems.append(f"“{alias}” has two densities, {other.density:g} and {row.density:g} kg/m³")
     if problems:
         raise ConfigError(f"{source}: " + "; ".join(problems))
     return tuple(rows)

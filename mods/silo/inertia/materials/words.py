@@ -20,6 +20,7 @@ _TURNS = {
     "lightweight", "powder", "pulver", "wool", "wolle", "mesh", "filled", "gefüllt", "reinforced",
     "verstärkt", "renforcé", "cf", "gf", "oxide", "dioxide", "nitride", "chloride", "sulfate", "sulphate",
     "paint", "lacquer", "lack", "spray", "paste", "ink", "coating", "plating", "beschichtung", "free", "non",
+    "sintered", "gesintert", "infill", "füllung", "rope", "seil", "cable", "kabel", "braid", "braided",
     "like", "imitation", "replacement", "substitute", "infused", "effect",
 }  # fmt: skip
 _TURNS_WITH_NUMBER = re.compile(r"(?:cf|gf|gk)\d{1,2}")
