@@ -7,7 +7,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
+from typing import Any, NamedTuple
 
 
 class Role(StrEnum):
@@ -120,9 +120,8 @@ class LineState:
     metadata: Mapping[str, Any] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
-class Line:
-    """A BOM line with what its child is called."""
+class Line(NamedTuple):
+    """A BOM line with what its child is called. There may be 100 000 in a tree, so it is made of a tuple."""
 
     id: str
     parent_id: int

@@ -62,33 +62,26 @@ def render_expanded(rows: Sequence[Occurrence]) -> bytes:
     of either. The pieces are those of ``line_to_wire``.
     """
     children: dict[int, bytes] = {}
+    parents: dict[str, bytes] = {}
     states: dict[int, bytes] = {}
     keep: list[LineState] = []  # states are found by their identity, which must not be given out anew
     parts: list[bytes] = []
     for line, parent, depth, total in rows:
-        child = children.get(line.child_id)
-        if child is None:
+        line_state = line.state
+        if (child := children.get(line.child_id)) is None:
             child = children[line.child_id] = _members(child_to_wire(line))
-        state = states.get(id(line.state))
-        if state is None:
-            keep.append(line.state)
-            state = states[id(line.state)] = _members(line_state_to_wire(line.state))
-        revisions = b""
-        if line.state.child_revision is None:
+        if (state := states.get(id(line_state))) is None:
+            keep.append(line_state)
+            state = states[id(line_state)] = _members(line_state_to_wire(line_state))
+        if (above := parents.get(parent)) is None:
+            above = parents[parent] = pydantic_core.to_json(parent)
+        if line_state.child_revision is None:
             revisions = b'"effective_revision":%d,"newer_revision_exists":false' % line.child_current_revision
         else:
             revisions = _members(revisions_to_wire(line))
         parts.append(
             b'{"id":"%b","parent_part_number":%b,%b,%b,%b,"depth":%d,"total_quantity":%b}'
-            % (
-                line.id.encode(),
-                pydantic_core.to_json(parent),
-                child,
-                state,
-                revisions,
-                depth,
-                repr(number(total)).encode(),
-            )
+            % (line.id.encode(), above, child, state, revisions, depth, repr(number(total)).encode())
         )
     return b"[" + b",".join(parts) + b"]"
 

@@ -85,25 +85,25 @@ def expand(graph: Graph, depth: int, limit: int) -> list[Occurrence]:
     """The tree as rows, parents before their children. CycleError where it never ends, TooLargeError."""
     order_of(graph)  # finds a cycle before it is walked
     rows: list[Occurrence] = []
-    names = {line.child_id: line.child_part_number for below in graph.lines.values() for line in below}
-    names[graph.root.id] = graph.root.part_number
-    stack = [(graph.root.id, 1, 1.0, iter(graph.lines.get(graph.root.id, ())))]
+    graph_lines = graph.lines
+    stack = [(graph.root.part_number, 1, 1.0, iter(graph_lines.get(graph.root.id, ())))]
     while stack:
-        item_id, level, factor, lines = stack[-1]
-        line = next(lines, None)
-        if line is None:
+        parent, level, factor, lines = stack[-1]
+        for line in lines:
+            state = line.state
+            total = factor * state.quantity
+            rows.append(Occurrence(line, parent, level, total))
+            below = graph_lines.get(line.child_id)
+            if below and level < depth and state.rel_type == "component":
+                stack.append((line.child_part_number, level + 1, total, iter(below)))
+                break
+        else:
             stack.pop()
-            continue
-        total = factor * line.state.quantity
-        rows.append(Occurrence(line, names[item_id], level, total))
         if len(rows) > limit:
             raise TooLargeError(
                 f"the expanded BOM of {graph.root.part_number} has more than {limit} lines; "
                 "ask for less with depth="
             )
-        below = graph.lines.get(line.child_id)
-        if below and level < depth and line.state.rel_type == "component":
-            stack.append((line.child_id, level + 1, total, iter(below)))
     return rows
 
 
