@@ -31,6 +31,7 @@ from silo.bom.resolve import (
     ItemLookup,
     consolidation_findings,
     look_up,
+    numbered_findings,
     resolve_part_numbers,
     resolve_with,
     unregistered_findings,
@@ -115,7 +116,7 @@ def resolve(extraction: Extraction, api: ItemLookup) -> Resolved:
         entries=tuple(entries),
         unresolved=tuple(unresolved),
         findings=(
-            *extraction.findings,
+            *numbered_findings(extraction.findings, known),
             *consolidation_findings(entries),
             *unregistered_findings(unresolved),
         ),

@@ -10,11 +10,13 @@ from typing import Any
 import pytest
 
 from silo.bom import FindingCode, Severity, resolve_part_numbers
+from silo.bom.findings import Finding
 from silo.bom.model import BomEntry
 from silo.bom.resolve import (
     consolidation_findings,
     consolidation_message,
     merge_lines,
+    numbered_findings,
     unregistered_findings,
 )
 
@@ -227,3 +229,16 @@ def test_unregistered_components_are_told() -> None:
     (finding,) = unregistered_findings([entry("new", uuid=None)])
     assert (finding.code, finding.severity) == (FindingCode.UNREGISTERED, Severity.WARNING)
     assert "new has no Silo part number" in finding.message
+
+
+def test_an_identity_is_told_by_the_number_that_people_know() -> None:
+    """A UUID says nothing to anybody who has to decide between two files."""
+    finding = Finding(
+        FindingCode.COPIED_IDENTITY,
+        Severity.WARNING,
+        "2 files carry the same Silo identity u-1: a, b. Which?",
+    )
+    other = Finding(FindingCode.MIRRORED, Severity.WARNING, "Silo identity u-1: not this one")
+    told = numbered_findings((finding, other), {"U-1": {"part_number": "M01-0001"}, "u-2": None})
+    assert told[0].message == "2 files carry the same Silo identity, that of M01-0001: a, b. Which?"
+    assert told[1] == other

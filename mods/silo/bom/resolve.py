@@ -85,6 +85,26 @@ def resolve_with(entries: Sequence[BomEntry], known: Known) -> tuple[list[BomEnt
     return resolved, unresolved
 
 
+def numbered_findings(findings: Iterable[Finding], known: Known) -> tuple[Finding, ...]:
+    """The findings, those about an identity with the part number that people know it by."""
+    numbers = {
+        uuid: str(item["part_number"]) for uuid, item in known.items() if item and item.get("part_number")
+    }
+    return tuple(
+        replace(finding, message=_numbered(finding.message, numbers))
+        if finding.code in (FindingCode.COPIED_IDENTITY, FindingCode.SHARED_IDENTITY)
+        else finding
+        for finding in findings
+    )
+
+
+def _numbered(message: str, numbers: Mapping[str, str]) -> str:
+    for uuid, number in numbers.items():
+        for spelt in (uuid, uuid.lower()):
+            message = message.replace(f"Silo identity {spelt}:", f"Silo identity, that of {number}:")
+    return message
+
+
 def merge_lines(entries: Iterable[BomEntry]) -> list[BomEntry]:
     """Entries of one parent with one part number become one line with the summed quantity."""
     lines: dict[str, BomEntry] = {}

@@ -8,9 +8,14 @@ from typing import Any
 
 from silo.workbench.qt import QtCore, QtGui, QtWidgets
 
+# The cell's data that holds the key of what is chosen now.
+KEY = QtCore.Qt.ItemDataRole.UserRole + 1
+
 
 class ChoiceDelegate(QtWidgets.QStyledItemDelegate):  # type: ignore[misc]  # PySide has no types
-    """Edits a cell by choosing; the chosen key is the cell's ``UserRole``, the text is what is shown.
+    """Edits a cell by choosing; a newly chosen key is set as ``UserRole``, the text is what is shown.
+
+    The cell holds the present key as :data:`KEY`, which need not be one that can be chosen.
 
     choices
         row → {key: text}.
@@ -31,14 +36,12 @@ class ChoiceDelegate(QtWidgets.QStyledItemDelegate):  # type: ignore[misc]  # Py
 
     def setEditorData(self, editor: Any, index: Any) -> None:
         """Begin with what is chosen now."""
-        shown = index.data(QtCore.Qt.ItemDataRole.DisplayRole)
-        place = editor.findText(shown)
-        editor.setCurrentIndex(max(place, 0))
+        editor.setCurrentIndex(editor.findData(index.data(KEY)))
 
     def setModelData(self, editor: Any, model: Any, index: Any) -> None:
         """Take over the choice."""
         key = editor.currentData()
-        if key is not None and editor.currentText() != index.data(QtCore.Qt.ItemDataRole.DisplayRole):
+        if key is not None and key != index.data(KEY):
             model.setData(index, key, QtCore.Qt.ItemDataRole.UserRole)
 
     def paint(self, painter: Any, option: Any, index: Any) -> None:

@@ -136,7 +136,10 @@ def rows(preview: Preview) -> tuple[Row, ...]:
     by_key = {one.resolved.assembly.key: one for one in preview.compared}
     base = os.path.dirname(preview.snapshot.path)
     table = [*_assembly_rows(preview.top, by_key, preview.names, frozenset())]
-    unregistered = tuple(_unregistered_row(e, base) for e in preview.top.resolved.unresolved)
+    unregistered = tuple(
+        _unregistered_row(entry, base, tuple(_below(entry, by_key, preview.names)))
+        for entry in preview.top.resolved.unresolved
+    )
     if unregistered:
         title = translate("Silo", "Without a part number: left out until registered")
         table.append(_group(title, unregistered))
@@ -161,7 +164,6 @@ def _assembly_rows(one: Compared, known: Known, names: Mapping[str, str], above:
     above = above | {one.resolved.assembly.key}
     for entry in one.resolved.entries:
         kind, silo, note = states.get(entry.part_number or "", (Kind.UNCHANGED, "", ""))
-        below = known.get(entry.key) if entry.is_assembly and entry.key not in above else None
         yield Row(
             kind,
             number=entry.part_number or "",
@@ -171,7 +173,7 @@ def _assembly_rows(one: Compared, known: Known, names: Mapping[str, str], above:
             note=note,
             document=one.resolved.assembly.doc_path,
             objects=entry.instances,
-            children=tuple(_assembly_rows(below, known, names, above)) if below is not None else (),
+            children=tuple(_below(entry, known, names, above)),
         )
     local = {entry.part_number for entry in one.resolved.entries}
     for kind, changes in ((Kind.UNREFERENCED, one.diff.removed), (Kind.MANUAL, one.diff.manual)):
@@ -180,6 +182,15 @@ def _assembly_rows(one: Compared, known: Known, names: Mapping[str, str], above:
                 number, amount = change.part_number, quantity(change.quantity)
                 name = names.get(number, "")
                 yield Row(kind, number=number, name=name, silo=amount, note=_notes()[kind])
+
+
+def _below(
+    entry: BomEntry, known: Known, names: Mapping[str, str], above: Keys = frozenset()
+) -> Iterator[Row]:
+    """The lines of a sub-assembly; none where it stands above itself (a loop is told as a finding)."""
+    one = known.get(entry.key) if entry.is_assembly and entry.key not in above else None
+    if one is not None:
+        yield from _assembly_rows(one, known, names, above)
 
 
 def _states(diff: BomDiff) -> dict[str, tuple[Kind, str, str]]:
@@ -207,12 +218,13 @@ def _notes() -> dict[Kind, str]:
     }
 
 
-def _unregistered_row(entry: BomEntry, base: str) -> Row:
+def _unregistered_row(entry: BomEntry, base: str, children: tuple[Row, ...]) -> Row:
     return Row(
         Kind.UNREGISTERED,
         name=display_name(entry),
         cad=quantity(entry.quantity),
         note=relative(entry.doc_path, base),
+        children=children,
     )
 
 

@@ -12,10 +12,12 @@ from silo.workbench import widgets
 from silo.workbench.activity import Tone
 from silo.workbench.preview import Kind, Preview, Row, rows, summary
 from silo.workbench.qt import QtCore, QtGui, QtWidgets
-from silo.workbench.words import counted, plain, translate
+from silo.workbench.words import counted, plain, tip, translate
 
 # A tree of more rows helps nobody to decide; `silo-mod diff --json` has them all.
 MOST_ROWS = 3000
+# Of the sentences below the table, only the first are broken into lines.
+MOST_WRAPPED = 200
 
 _TONES = {
     Kind.ADDED: Tone.GOOD,
@@ -88,7 +90,7 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         tree = QtWidgets.QTreeWidget()
         tree.setObjectName("rows")
         tree.setAlternatingRowColors(True)
-        tree.setUniformRowHeights(True)
+        tree.setUniformRowHeights(False)
         tree.setHeaderLabels(
             [
                 translate("Silo", "Part number"),
@@ -201,12 +203,13 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
                 ["", translate("Silo", "… and {n} more rows").replace("{n}", str(-left[0]))]
             )
             self.table.addTopLevelItem(more)
-        for column in range(4):
-            self.table.resizeColumnToContents(column)
-        for column, least, most in ((0, 150, 260), (1, 160, 300), (2, 70, 110), (3, 70, 110)):
-            self.table.setColumnWidth(column, min(max(self.table.columnWidth(column) + 10, least), most))
         for number in range(self.table.topLevelItemCount()):
             self._spread(self.table.topLevelItem(number))
+        for column in range(4):
+            self.table.resizeColumnToContents(column)
+        for column, least, most in ((0, 130, 240), (1, 150, 280), (2, 66, 110), (3, 66, 110)):
+            self.table.setColumnWidth(column, min(max(self.table.columnWidth(column) + 12, least), most))
+        self._wrap()
 
     def _spread(self, item: Any) -> None:
         """Sentences take the whole width; what is short enough is opened."""
@@ -215,6 +218,23 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         item.setExpanded(item.childCount() <= 12)
         for number in range(item.childCount()):
             self._spread(item.child(number))
+
+    def resizeEvent(self, event: Any) -> None:
+        """Sentences are broken anew for the new width."""
+        super().resizeEvent(event)
+        QtCore.QTimer.singleShot(0, self._wrap)
+
+    def _wrap(self) -> None:
+        """Break the sentences to the width that there is; the view itself would cut them."""
+        tree = self.table
+        for place in range(tree.topLevelItemCount()):
+            group = tree.topLevelItem(place)
+            width = tree.viewport().width() - 2 * tree.indentation() - 12
+            for number in range(min(group.childCount(), MOST_WRAPPED)):
+                item = group.child(number)
+                if item.data(1, QtCore.Qt.ItemDataRole.UserRole) == Kind.NOT_COUNTED.value:
+                    whole = item.data(2, QtCore.Qt.ItemDataRole.UserRole)
+                    item.setText(0, widgets.broken(whole, tree.fontMetrics(), width))
 
     def _items(self, wanted: Iterable[Row], left: list[int]) -> Iterable[Any]:
         only = self.changes_only.isChecked()
@@ -232,6 +252,7 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         if row.kind in _WIDE:
             texts = [" ".join(filter(None, (row.number, row.name or row.note)))]
         item = QtWidgets.QTreeWidgetItem(texts)
+        item.setData(2, QtCore.Qt.ItemDataRole.UserRole, texts[0])
         tone = Tone.ERROR if row.number == "✗" else _TONES.get(row.kind, Tone.PLAIN)
         if shade := widgets.colour(tone, self.table):
             brush = QtGui.QBrush(QtGui.QColor(shade))
@@ -244,7 +265,7 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
             font.setBold(True)
             item.setFont(0, font)
         if row.note:
-            item.setToolTip(0 if row.kind in _WIDE else 4, row.note)
+            item.setToolTip(0 if row.kind in _WIDE else 4, tip(row.note))
         item.setData(0, QtCore.Qt.ItemDataRole.UserRole, (row.document, list(row.objects)))
         item.setData(1, QtCore.Qt.ItemDataRole.UserRole, row.kind.value)
         item.addChildren(children)

@@ -11,11 +11,19 @@ from silo.bom.errors import SiloError
 from silo.registration import Registration
 from silo.workbench import widgets
 from silo.workbench.activity import Tone
-from silo.workbench.choice import ChoiceDelegate
+from silo.workbench.choice import KEY, ChoiceDelegate
 from silo.workbench.qt import QtCore, QtGui, QtWidgets
-from silo.workbench.register_rows import NEW, SAME, EditedRow, number_texts, type_words
+from silo.workbench.register_rows import (
+    NEW,
+    EditedRow,
+    choose,
+    group,
+    number_texts,
+    retype,
+    type_words,
+)
 from silo.workbench.registering import Offer, Order
-from silo.workbench.words import counted, plain, translate
+from silo.workbench.words import counted, plain, tip, translate
 
 # Rows have buttons, and nobody decides on a thousand parts at once; the next ones come after these.
 MOST_ROWS = 400
@@ -144,10 +152,10 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         for column in range(6):
             self.table.setItem(number, column, QtWidgets.QTableWidgetItem())
         entry = row.candidate.entry
-        self.table.item(number, COMPONENT).setToolTip(plain(f"{entry.doc_path} · {entry.object_name}", 300))
+        self.table.item(number, COMPONENT).setToolTip(tip(f"{entry.doc_path} · {entry.object_name}"))
         button = QtWidgets.QPushButton(translate("Silo", "Register"))
         button.setAutoDefault(False)
-        button.clicked.connect(lambda _checked=False: self._register([row]))
+        button.clicked.connect(lambda _checked=False: self._carry_out([row]))
         self.table.setCellWidget(number, BUTTON, button)
 
     def fail(self, error: SiloError) -> None:
@@ -198,32 +206,46 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         category = self._categories().get(row.category, row.category)
         kind = type_words().get(row.item_type, row.item_type)
         texts = (row.component(), row.name, kind, category, number_text, note)
+        keys = {TYPE: row.item_type, CATEGORY: row.category, NUMBER: row.number}
         for column, text in enumerate(texts):
             item = self.table.item(number, column)
             if item.text() != text:
                 item.setText(text)
-            flags = QtCore.Qt.ItemFlag.ItemIsEnabled | QtCore.Qt.ItemFlag.ItemIsSelectable
-            if row.editable and column in (NAME, TYPE, CATEGORY, NUMBER):
-                flags |= QtCore.Qt.ItemFlag.ItemIsEditable
-            if row.editable and column == COMPONENT:
-                flags |= QtCore.Qt.ItemFlag.ItemIsUserCheckable
-            item.setFlags(flags)
+            item.setData(KEY, keys.get(column))
+            item.setFlags(_flags(row, column))
         state = QtCore.Qt.CheckState.Checked if row.checked else QtCore.Qt.CheckState.Unchecked
         self.table.item(number, COMPONENT).setCheckState(state)
         remark = self.table.item(number, NOTE)
-        remark.setToolTip(note)
+        remark.setToolTip(tip(note))
         shade = widgets.colour(tone, self.table)
         remark.setForeground(QtGui.QBrush(QtGui.QColor(shade)) if shade else QtGui.QBrush())
-        self.table.cellWidget(number, BUTTON).setEnabled(row.can_register)
+        button = self.table.cellWidget(number, BUTTON)
+        button.setText(translate("Silo", "Keep") if row.can_keep else translate("Silo", "Register"))
+        button.setEnabled(row.can_register or row.can_keep)
 
     def _heading(self) -> str:
-        left = sum(1 for row in self._rows if not row.finished)
         more = len(self._offer.candidates) - len(self._rows)
         if not self._rows:
             text = translate("Silo", "All components of {name} have their Silo part number.")
             return text.replace("{name}", plain(self._title, 80))
+        left = [row for row in self._rows if not row.finished]
         if not left:
             return translate("Silo", "All of these have their part number now.")
+        copied = sum(1 for row in left if row.candidate.same_as)
+        told = [self._unregistered(len(left) - copied)] if len(left) > copied else []
+        if copied:
+            told.append(
+                translate(
+                    "Silo",
+                    "Where files carry one identity, choose in the column Part number: the same part, or a "
+                    "new one?",
+                )
+            )
+        if more > 0:
+            told.append(translate("Silo", "({n} more after these)").replace("{n}", str(more)))
+        return "\n".join(told)
+
+    def _unregistered(self, left: int) -> str:
         one = translate(
             "Silo",
             "The following component has no Silo part number and will be excluded from the BOM until "
@@ -234,14 +256,11 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
             "The following components have no Silo part number and will be excluded from the BOM until "
             "registered:",
         )
-        text = counted(left, one, many)
-        if more > 0:
-            text += " " + translate("Silo", "({n} more after these)").replace("{n}", str(more))
-        return text
+        return counted(left, one, many)
 
     def _enable(self) -> None:
-        chosen = [row for row in self._rows if row.checked and row.can_register]
-        self.register_button.setEnabled(bool(chosen))
+        chosen = any(row.checked and (row.can_register or row.can_keep) for row in self._rows)
+        self.register_button.setEnabled(chosen)
         done = bool(self._rows) and all(row.finished for row in self._rows)
         text = translate("Silo", "Close") if done or not self._rows else translate("Silo", "Skip All")
         self.skip_button.setText(text)
@@ -258,21 +277,31 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         elif column == NAME:
             row.name = str(item.text())
         elif column == TYPE and chosen:
-            row.item_type = chosen
+            retype(row, chosen, self._offer.categories)
+            self._need_number(row.category)
         elif column == NUMBER and chosen:
-            row.number = chosen
-            row.checked = chosen != SAME
+            choose(self._rows, row, chosen)
         elif column == CATEGORY and chosen:
             row.category = chosen
-            if chosen not in self._offer.numbers:
-                self._wishes.number(chosen)
+            self._need_number(chosen)
         self._refresh()
 
+    def _need_number(self, category: str) -> None:
+        if category not in self._offer.numbers:
+            self._wishes.number(category)
+
     def _register_checked(self) -> None:
-        same = [row for row in self._rows if row.number == SAME]
-        if same:
+        self._carry_out([row for row in self._rows if row.checked])
+
+    def _carry_out(self, rows: Sequence[EditedRow]) -> None:
+        # Keeping is said of all files of an identity together, or it is said of none.
+        kept = {id(other): other for row in rows if row.can_keep for other in group(self._rows, row)}
+        if same := [row for row in kept.values() if row.can_keep]:
             self._wishes.same(same)
-        self._register([row for row in self._rows if row.checked])
+            for row in same:
+                row.keep()
+            self._refresh()
+        self._register([row for row in rows if row.can_register])
 
     def _register(self, rows: Sequence[EditedRow]) -> None:
         ready = [row for row in rows if row.can_register]
@@ -285,3 +314,14 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
                 row.number = NEW
         self._refresh()
         self._wishes.register([row.order() for row in ready])
+
+
+def _flags(row: EditedRow, column: int) -> Any:
+    """What a person can do with a cell."""
+    flag = QtCore.Qt.ItemFlag
+    flags = flag.ItemIsEnabled | flag.ItemIsSelectable
+    if (row.editable and column in (NAME, TYPE, CATEGORY)) or (row.can_choose and column == NUMBER):
+        flags |= flag.ItemIsEditable
+    if column == COMPONENT and (row.can_register or row.can_keep):
+        flags |= flag.ItemIsUserCheckable
+    return flags

@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
+from silo.bom.naming import proposed_category
 from silo.registration import Registration
 from silo.workbench.activity import Tone
 from silo.workbench.registering import Candidate, Order, Similar, state_words
@@ -16,6 +17,7 @@ TYPES = ("part", "assembly", "consumable", "tool")
 
 NEW = "new"
 SAME = "same"
+ASK = "ask"
 
 
 def type_words() -> dict[str, str]:
@@ -33,7 +35,8 @@ class EditedRow:
     """A component with what the person chose for it.
 
     number
-        NEW for a new item, SAME to keep a copied identity, else the part number of an item to join.
+        NEW for a new item, else the part number of an item to join. For a copied identity first ASK, until the
+        person says NEW or SAME (keep it).
     result
         what became of it; None while it is not registered.
     """
@@ -56,7 +59,7 @@ class EditedRow:
             name=proposal.name,
             item_type=proposal.item_type,
             category=proposal.category,
-            number=SAME if candidate.same_as else NEW,
+            number=ASK if candidate.same_as else NEW,
             checked=candidate.wanted,
         )
 
@@ -71,9 +74,24 @@ class EditedRow:
         return self.candidate.state.usable and not self.finished and not self.running
 
     @property
+    def can_choose(self) -> bool:
+        """True while its number can be chosen; a copied identity can be kept without writing to the file."""
+        return self.editable or (bool(self.candidate.same_as) and not self.finished and not self.running)
+
+    @property
     def can_register(self) -> bool:
-        """True where pressing Register does something."""
-        return self.editable and bool(self.name.strip()) and self.number != SAME
+        """True where pressing Register gives it a number."""
+        return self.editable and bool(self.name.strip()) and self.number not in (SAME, ASK)
+
+    @property
+    def can_keep(self) -> bool:
+        """True where pressing the button keeps the identity that it has."""
+        return self.can_choose and self.number == SAME
+
+    def keep(self) -> None:
+        """It stays what it is."""
+        self.result = Registration(self.candidate.proposal, part_number=self.candidate.same_as)
+        self.checked = False
 
     def order(self) -> Order:
         """The row as an order for the worker."""
@@ -91,10 +109,14 @@ class EditedRow:
         if self.finished and self.result is not None:
             return self.result.part_number or ""
         if self.number == SAME:
-            text = translate("Silo", "{number} (same part)")
+            text = translate("Silo", "{number} (kept)")
             return text.replace("{number}", self.candidate.same_as)
+        if self.number == ASK:
+            return translate("Silo", "same or new part?")
         if self.number != NEW:
             return self.number
+        if not self.candidate.state.usable:
+            return ""
         following = numbers.get(self.category, "")
         if not following:
             return translate("Silo", "new")
@@ -103,10 +125,14 @@ class EditedRow:
 
     def choices(self) -> dict[str, str]:
         """What can be chosen as its number."""
-        found = {NEW: translate("Silo", "a new number")}
+        found = {}
         if self.candidate.same_as:
-            same = translate("Silo", "{number}: it is the same part")
+            same = translate("Silo", "same part: keep {number}")
             found[SAME] = same.replace("{number}", self.candidate.same_as)
+        if not self.candidate.state.usable:
+            return found
+        new = translate("Silo", "new part: a new number")
+        found[NEW] = new if self.candidate.same_as else translate("Silo", "a new number")
         for similar in self.candidate.similar:
             found[similar.part_number] = f"{similar.part_number} {plain(similar.name, 60)}"
         return found
@@ -116,10 +142,11 @@ class EditedRow:
         if self.result is not None and self.result.error is not None:
             return plain(str(self.result.error), 300), Tone.ERROR
         if self.finished:
-            return translate("Silo", "registered"), Tone.GOOD
+            kept, registered = translate("Silo", "stays as it is"), translate("Silo", "registered")
+            return kept if self.number == SAME else registered, Tone.GOOD
         if self.running:
             return translate("Silo", "registering…"), Tone.QUIET
-        if not self.candidate.state.usable:
+        if not self.candidate.state.usable and not self.candidate.same_as:
             return state_words()[self.candidate.state], Tone.WARNING
         told = [*self._suspicions(), state_words()[self.candidate.state]]
         text = "; ".join(filter(None, told))
@@ -128,9 +155,7 @@ class EditedRow:
     def _suspicions(self) -> list[str]:
         told = []
         if self.candidate.same_as:
-            text = translate(
-                "Silo", "carries the identity of {number}, as another file does: same or new part?"
-            )
+            text = translate("Silo", "carries the identity of {number}, as another file does")
             told.append(text.replace("{number}", self.candidate.same_as))
         told += [_similar_words(similar) for similar in self.candidate.similar[:2]]
         if self.candidate.twins:
@@ -145,6 +170,42 @@ def _similar_words(similar: Similar) -> str:
     else:
         text = translate("Silo", "Silo has {number} with the same name")
     return text.replace("{number}", similar.part_number)
+
+
+def group(rows: Sequence[EditedRow], row: EditedRow) -> list[EditedRow]:
+    """The rows that carry the same identity as this one, itself among them."""
+    if not row.candidate.same_as:
+        return [row]
+    return [other for other in rows if other.candidate.same_as == row.candidate.same_as]
+
+
+def choose(rows: Sequence[EditedRow], row: EditedRow, number: str) -> None:
+    """Take over what the person chose as a row's number, and what follows from it for its group."""
+    row.number, row.checked = number, True
+    asked = [other for other in group(rows, row) if other.number == ASK and not other.finished]
+    last = len(asked) == 1 and all(
+        other.number != SAME for other in group(rows, row) if other is not asked[0]
+    )
+    # "The same part" is said of all of them; once all others are new parts, the last one is the part itself.
+    for other in asked if number == SAME or last else ():
+        other.number, other.checked = SAME, True
+
+
+def retype(row: EditedRow, item_type: str, categories: Mapping[str, str]) -> None:
+    """Take over the chosen type; the category follows where it is still the one that was proposed.
+
+    categories
+        code → description, as the schema has them.
+    """
+
+    def proposed(kind: str) -> str:
+        entry = replace(row.candidate.entry, is_assembly=kind == "assembly")
+        return proposed_category(entry, row.name, categories)
+
+    was = row.item_type
+    row.item_type = item_type
+    if row.category in (row.candidate.proposal.category, proposed(was)):
+        row.category = proposed(item_type)
 
 
 def number_texts(rows: list[EditedRow], numbers: Mapping[str, str]) -> list[str]:
