@@ -36,7 +36,7 @@ class Box(QtWidgets.QFrame):  # type: ignore[misc]
         self.setObjectName("siloBox")
         edge = widgets.colour(entry.tone, self) or "palette(mid)"
         self.setStyleSheet(
-            "QFrame#siloBox { border: 1px solid palette(mid); border-radius: 4px; background: palette(base);"
+            f"QFrame#siloBox {{ border: 1px solid palette(mid); border-radius: 4px; background: {_ground(self)};"
             f" border-left: 4px solid {edge}; }}"
         )
         layout = QtWidgets.QVBoxLayout(self)
@@ -72,6 +72,11 @@ class Box(QtWidgets.QFrame):  # type: ignore[misc]
             layout.addLayout(buttons(line.actions, self._on_action))
 
 
+def _ground(widget: Any) -> str:
+    """The ground of a box. In a dark theme the palette may still be the light one."""
+    return "rgba(255, 255, 255, 13)" if widgets.is_dark(widget) else "palette(base)"
+
+
 def _clock(when: float) -> str:
     moment = time.localtime(when)
     today = time.strftime("%Y-%m-%d")
@@ -89,6 +94,10 @@ class BannerWidget(QtWidgets.QFrame):  # type: ignore[misc]
         self._layout = QtWidgets.QVBoxLayout(self)
         self._layout.setContentsMargins(8, 5, 8, 5)
         self._layout.setSpacing(2)
+
+    def forget(self) -> None:
+        """Draw anew next time, whatever the state."""
+        self._drawn = None
 
     def draw(self, told: Banner) -> None:
         """Show a state of the connection."""
@@ -112,8 +121,7 @@ class BannerWidget(QtWidgets.QFrame):  # type: ignore[misc]
             return
         made = [widgets.link_button(a.text, partial(self._on_action, a)) for a in told.actions]
         for button in made if told.ground else ():
-            style = f"QPushButton {{ color: {told.ink}; border: none; text-decoration: underline; }}"
-            button.setStyleSheet(style)
+            button.setStyleSheet(widgets.link_style(told.ink, "text-decoration: underline;"))
         self._layout.addLayout(widgets.row(*made))
 
 

@@ -78,6 +78,20 @@ class Pane(QtWidgets.QWidget):  # type: ignore[misc]
             self._day = today
             self._draw_entries(shown.activity.entries)
 
+    def changeEvent(self, event: Any) -> None:
+        """Another theme: what is coloured is made anew."""
+        super().changeEvent(event)
+        if event.type() in (QtCore.QEvent.Type.StyleChange, QtCore.QEvent.Type.PaletteChange):
+            shown, self._shown = self._shown, None
+            if shown is not None:
+                QtCore.QTimer.singleShot(0, lambda: self._draw_anew(shown))
+
+    def _draw_anew(self, shown: Shown) -> None:
+        if self._shown is None:
+            self._banner.forget()
+            self._drop(tuple(self._boxes))
+            self.draw(shown)
+
     def _draw_entries(self, entries: tuple[Entry, ...]) -> None:
         wanted = entries[: self._most]
         keys = {entry.key for entry in wanted}

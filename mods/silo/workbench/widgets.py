@@ -21,13 +21,18 @@ _COLOURS = {
 
 
 def is_dark(widget: Any) -> bool:
-    """True where the widget's ground is dark (FreeCAD's dark themes)."""
-    return bool(widget.palette().color(QtGui.QPalette.ColorRole.Window).lightness() < 128)
+    """True where the widget's ground is dark (FreeCAD's dark themes).
+
+    Told by the colour of its text: a theme that is a style sheet leaves the palette's ground as it was.
+    """
+    widget.ensurePolished()
+    return bool(widget.palette().color(QtGui.QPalette.ColorRole.WindowText).lightness() > 128)
 
 
 def colour(tone: Tone, widget: Any) -> str:
     """The colour of a tone, readable on the widget's ground; "" for the theme's own."""
     if tone is Tone.QUIET:
+        widget.ensurePolished()
         text = widget.palette().color(QtGui.QPalette.ColorRole.WindowText)
         ground = widget.palette().color(QtGui.QPalette.ColorRole.Window)
         parts = [
@@ -70,15 +75,20 @@ def link_button(text: str, call: Callable[[], None], tip: str = "") -> Any:
     made = QtWidgets.QPushButton(text)
     made.setFlat(True)
     made.setCursor(QtCore.Qt.CursorShape.PointingHandCursor)
-    shade = "#7cb7ff" if is_dark(made) else "#0b5cad"
-    made.setStyleSheet(
-        f"QPushButton {{ color: {shade}; border: none; padding: 1px 2px; text-align: left; }}"
-        "QPushButton:hover, QPushButton:focus { text-decoration: underline; }"
-    )
+    made.setStyleSheet(link_style("#7cb7ff" if is_dark(made) else "#0b5cad"))
     made.setSizePolicy(QtWidgets.QSizePolicy.Policy.Fixed, QtWidgets.QSizePolicy.Policy.Fixed)
     made.setToolTip(words.tip(tip))
     made.clicked.connect(lambda _checked=False: call())
     return made
+
+
+def link_style(shade: str, more: str = "") -> str:
+    """The style sheet of a link; it has to undo what FreeCAD's themes do to buttons."""
+    return (
+        f"QPushButton {{ color: {shade}; background: transparent; border: none; min-width: 0; min-height: 0;"
+        f" margin: 0; padding: 1px 2px; text-align: left; {more} }}"
+        "QPushButton:hover, QPushButton:focus { text-decoration: underline; }"
+    )
 
 
 def row(*widgets: Any, gap: int = 10) -> Any:
