@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Photograph the add-on in FreeCAD into ``docs/images/addon-*.png``: the example assembly, a real server.
+
+Run: ``.venv/bin/python scripts/screenshots_freecad.py [FOLDER] [STYLE]`` (needs a FreeCAD with Xvfb; the newest of
+``scripts/freecad-roots.sh --list`` is taken, or the one that ``SILO_PICTURES_FREECAD`` names, such as 1.0).
+STYLE names a style sheet of FreeCAD, to look at the windows in its dark theme.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT / "tests" / "freecad"), str(ROOT / "tests" / "support")]
+
+from freecad_cases import machines  # noqa: E402
+from gearbox_story import GearboxStory  # noqa: E402
+from gui_cases.window import Window, window  # noqa: E402
+
+from silo.api.client import SiloClient  # noqa: E402
+from silo.api.wire import MergeEntry, MergeRequest  # noqa: E402
+from silo.cli.common import read_assembly  # noqa: E402
+from silo.cli.register import proposals_for, register_all  # noqa: E402
+
+DOCS = ROOT / "docs" / "images"
+# These have no part number yet when the designer comes.
+LATER = ("Cover", "MotorMount")
+
+
+def main() -> None:
+    """Set the stage, then let FreeCAD photograph itself."""
+    folder = Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else DOCS
+    folder.mkdir(parents=True, exist_ok=True)
+    version = os.environ.get("SILO_PICTURES_FREECAD") or max(
+        machines.freecads(), key=lambda short: machines.freecads()[short].version
+    )
+    with tempfile.TemporaryDirectory(prefix="silo-pictures-") as scratch:
+        with window(version, Path(scratch).resolve()) as freecad:
+            freecad.prepare()
+            with freecad.server.client() as client:
+                prepare(freecad, client)
+            furnish(freecad.home / "user.cfg", sys.argv[2] if len(sys.argv) > 2 else "")
+            freecad.run("pictures.py", env={"SILO_PICTURES": str(folder), "QT_XCB_NO_MITSHM": "1"})
+    for picture in sorted(folder.glob("addon-*.png")):
+        print(f"{picture}  {picture.stat().st_size / 1000:.0f} kB")
+
+
+# A plain ground keeps the pictures small.
+VIEW = (
+    '<FCParamGroup Name="View"><FCBool Name="Simple" Value="1"/><FCBool Name="Gradient" Value="0"/>'
+    '<FCUInt Name="BackgroundColor" Value="4109760511"/></FCParamGroup>'
+)
+STYLE = '<FCParamGroup Name="MainWindow"><FCText Name="StyleSheet">{}</FCText></FCParamGroup>'
+
+
+def furnish(config: Path, style: str) -> None:
+    """FreeCAD's look, in its configuration file."""
+    mod = '<FCParamGroup Name="Mod">'
+    more = VIEW + (STYLE.format(style) if style else "")
+    config.write_text(config.read_text().replace(mod, more + mod))
+
+
+def prepare(freecad: Window, client: SiloClient) -> None:
+    """A server that knows the assembly from before, and on which people have worked since."""
+    story = GearboxStory(freecad.folder, client)
+    extraction = read_assembly(str(story.top))
+    early = [
+        proposal
+        for proposal in proposals_for(extraction, client, "kindred-rd")
+        if Path(proposal.entry.doc_path).stem not in LATER
+    ]
+    for done in register_all(early, extraction, client, schema="kindred-rd"):
+        if done.error is not None:
+            raise done.error
+    story.upload()
+    story.sync()
+    people_worked(story, client)
+
+
+def people_worked(story: GearboxStory, client: SiloClient) -> None:
+    top = story.number_of("TopAssembly")
+    oil = client.create_item("kindred-rd", "C01", "Gear oil ISO VG 220", item_type="consumable")
+    client.add_bom_line(top, oil.part_number, quantity=0.4, unit="l", notes="fill to the upper mark")
+    # A line that an earlier state of the assembly had.
+    plug = client.create_item("kindred-rd", "F01", "Drain plug M14", item_type="part")
+    lines = client.get_bom(top)
+    entries = [
+        MergeEntry(child_part_number=line.child_part_number, quantity=line.quantity)
+        for line in lines
+        if line.source != "manual"
+    ]
+    entries.append(MergeEntry(child_part_number=plug.part_number, quantity=1))
+    client.merge_bom(top, MergeRequest(entries=entries))
+    client.update_bom_line(top, story.number_of("BasePlate"), quantity=3)
+    # Probable duplicates: an item of that name, and one that has the very file.
+    client.create_item("kindred-rd", "S06", "Sensor Bracket")
+    cover = client.create_item("kindred-rd", "S06", "Cover")
+    client.upload_file(
+        cover.part_number, story.top.parent / "parts" / "Cover.FCStd", comment="from the archive"
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,282 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Inside FreeCAD: an afternoon with the example assembly, for ``scripts/screenshots_freecad.py``."""
+
+from __future__ import annotations
+
+import faulthandler
+import os
+import shutil
+import stat
+import sys
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, os.environ["SILO_TEST_CASES"])
+
+from inside import (
+    FOLDER,
+    App,
+    Gui,
+    QtCore,
+    QtGui,
+    QtWidgets,
+    addon,
+    ask,
+    boxes,
+    dialog,
+    run,
+    settled,
+    unmark,
+    wait,
+)
+
+PICTURES = Path(os.environ["SILO_PICTURES"])
+WIDTH, HEIGHT = 1320, 800
+MACHINE = FOLDER / "gearbox"
+PANE_WIDTH = 400
+
+
+def story() -> None:
+    # A long afternoon, on a busy machine; whoever started it ends what does not end.
+    faulthandler.cancel_dump_traceback_later()
+    one = addon()
+    one.preferences.set("AskRegister", False)
+    wait(lambda: one.session.shown.connection == "online")
+    top = open_machine()
+    arrange(one)
+    new_parts(top)
+    preview(one, top)
+    registering(one, top)
+    commit(one, top)
+    offline(one, top)
+    settings(one)
+
+
+# --- the stage -------------------------------------------------------------------------------------------
+
+
+def open_machine() -> Any:
+    doc = App.openDocument(str(MACHINE / "TopAssembly.FCStd"))
+    App.openDocument(str(MACHINE / "Gearbox.FCStd"))
+    App.setActiveDocument(doc.Name)
+    # FreeCAD marks files of an earlier version as changed when it opens them.
+    recompute()
+    return doc
+
+
+def recompute() -> None:
+    for doc in App.listDocuments().values():
+        doc.recompute()
+    for doc in App.listDocuments().values():
+        unmark(doc)
+
+
+def arrange(one: Any) -> None:
+    """A window of a size that can still be read in a page, the pane on its right."""
+    window = Gui.getMainWindow()
+    Gui.activateWorkbench("SiloWorkbench")
+    still()
+    window.showNormal()
+    window.setGeometry(0, 0, WIDTH, HEIGHT)
+    wait(lambda: window.width() == WIDTH)
+    overlays = [
+        w for w in window.findChildren(QtWidgets.QWidget) if "OverlayTab" in w.metaObject().className()
+    ]
+    if any(overlay.isVisible() for overlay in overlays):
+        # The empty task panel of newer FreeCADs lies over the model.
+        Gui.runCommand("Std_DockOverlayToggleRight")
+    for dock in window.findChildren(QtWidgets.QDockWidget):
+        dock.setVisible(dock.objectName() in ("Model", "Database Activity"))
+    for bar in window.findChildren(QtWidgets.QToolBar):
+        bar.setVisible(bar.objectName() in ("File", "Workbench", "Silo"))
+    one.dock.show_and_raise()
+    window.resizeDocks([one.dock], [PANE_WIDTH], QtCore.Qt.Orientation.Horizontal)
+    still()
+
+
+def still(milliseconds: int = 400) -> None:
+    """Let FreeCAD draw what it has to draw."""
+    waited = QtCore.QElapsedTimer()
+    waited.start()
+    wait(lambda: waited.elapsed() > milliseconds)
+
+
+def photograph(widget: Any, name: str) -> None:
+    """Save a widget as a small picture."""
+    still()
+    save(widget.grab().toImage(), name)
+
+
+def photograph_window(name: str) -> None:
+    """Save the main window as it is on the screen: what lies hidden in it is not."""
+    still()
+    screen = QtGui.QGuiApplication.primaryScreen() if hasattr(QtGui, "QGuiApplication") else None
+    save(screen.grabWindow(0, 0, 0, WIDTH, HEIGHT).toImage(), name)
+
+
+def save(image: Any, name: str) -> None:
+    """Save with the 256 commonest colours: for a window they are enough, and the file is a fifth."""
+    image = image.convertToFormat(QtGui.QImage.Format.Format_RGB32)
+    width, height = image.width(), image.height()
+    pixels = memoryview(bytes(image.constBits())[: 4 * width * height]).cast("I")
+    found = Counter(pixels)
+    table = [colour for colour, _count in found.most_common(256)]
+    places = {colour: place for place, colour in enumerate(table)}
+    for colour in found:
+        if colour not in places:
+            places[colour] = min(range(len(table)), key=lambda place: distance(table[place], colour))
+    # A line of an image begins at a multiple of four bytes.
+    padding = bytes(-width % 4)
+    lines = (bytes(places[c] for c in pixels[width * y : width * (y + 1)]) for y in range(height))
+    data = b"".join(line + padding for line in lines)
+    few = QtGui.QImage(data, width, height, width + len(padding), QtGui.QImage.Format.Format_Indexed8)
+    few.setColorTable(table)
+    few.save(str(PICTURES / f"addon-{name}.png"), "PNG", 0)
+
+
+def distance(one: int, other: int) -> int:
+    return sum(((one >> shift & 255) - (other >> shift & 255)) ** 2 for shift in (0, 8, 16))
+
+
+def part(file: str, label: str, size: tuple[float, float, float]) -> Any:
+    doc = App.newDocument(file)
+    box = doc.addObject("Part::Box", "Body")
+    box.Label = label
+    box.Length, box.Width, box.Height = size
+    doc.recompute()
+    doc.saveAs(str(MACHINE / "parts" / f"{file}.FCStd"))
+    unmark(doc)
+    return box
+
+
+def new_parts(top: Any) -> None:
+    """What the designer added this afternoon; one of them is a file of somebody else's, one a copy."""
+    container = top.getObject("Assembly") or next(
+        o for o in top.Objects if o.isDerivedFrom("Assembly::AssemblyObject")
+    )
+    made = [
+        part("SensorBracket", "Sensor Bracket", (30, 12, 40)),
+        part("Guard", "Guard", (200, 3, 60)),
+        part("ParallelKey", "Parallel Key", (6, 6, 24)),
+    ]
+    (MACHINE / "parts" / "Guard.FCStd").chmod(stat.S_IRUSR)
+    shutil.copy(MACHINE / "parts" / "BasePlate.FCStd", MACHINE / "parts" / "BasePlateLong.FCStd")
+    copy = App.openDocument(str(MACHINE / "parts" / "BasePlateLong.FCStd"))
+    unmark(copy)
+    made.append(next(o for o in copy.Objects if o.isDerivedFrom("Part::Feature")))
+    App.setActiveDocument(top.Name)
+    for number, obj in enumerate(made):
+        link = top.addObject("App::Link", obj.Document.Name)
+        link.LinkedObject = obj
+        link.Label = obj.Label
+        container.addObject(link)
+        link.Placement.Base = App.Vector(150 + 8 * number, -60, 12)
+    top.getObject("CoverBolts" if top.getObject("CoverBolts") else _named(top, "CoverBolts")).ElementCount = 6
+    top.recompute()
+    show(top)
+
+
+def _named(doc: Any, label: str) -> str:
+    return str(doc.getObjectsByLabel(label)[0].Name)
+
+
+def show(top: Any) -> None:
+    view = Gui.getDocument(top.Name).activeView()
+    view.viewIsometric()
+    view.fitAll()
+    view.setNavigationType("Gui::CADNavigationStyle")
+
+
+# --- what is photographed --------------------------------------------------------------------------------
+
+
+def preview(one: Any, top: Any) -> None:
+    App.setActiveDocument(top.Name)
+    Gui.runCommand("Silo_BOM")
+    window = wait(lambda: next(iter(one.previews._open.values()), None))
+    wait(lambda: window._preview is not None)
+    photograph(window, "preview")
+    window.close()
+    wait(lambda: not one.previews._open)
+
+
+def commit(one: Any, top: Any) -> None:
+    Gui.getDocument("Gearbox").Modified = True
+
+    def answer(found: Any) -> None:
+        found.comment.setPlainText("Guard and sensor bracket added, two more cover bolts")
+        photograph(found, "commit")
+        found.commit.click()
+
+    App.setActiveDocument(top.Name)
+    with dialog("SiloCommitDialog", answer):
+        Gui.runCommand("Origin_Commit")
+    wait(lambda: boxes("BOM Updated") and settled())
+    App.setActiveDocument(top.Name)
+    show(top)
+    photograph(one.dock, "activity")
+    photograph_window("window")
+
+
+def registering(one: Any, top: Any) -> None:
+    App.getDocument("ParallelKey").getObject("Body").Length = 8
+    Gui.getDocument("ParallelKey").Modified = True
+    App.setActiveDocument(top.Name)
+    Gui.runCommand("Silo_RegisterParts")
+    window = wait(lambda: next(iter(one.registrations._open.values()), None))
+    wait(lambda: window.rows)
+    photograph(window, "register")
+    window.close()
+    wait(lambda: not one.registrations._open)
+
+
+def offline(one: Any, top: Any) -> None:
+    ask("server down")
+    wait(lambda: one.session.shown.connection == "offline")
+    top.getObject(_named(top, "CoverBolts")).ElementCount = 8
+    top.recompute()
+
+    def answer(found: Any) -> None:
+        found.comment.setPlainText("Bolts on the train")
+        found.commit.click()
+
+    with dialog("SiloCommitDialog", answer):
+        Gui.runCommand("Origin_Commit")
+    wait(lambda: one.session.shown.waiting and settled())
+    photograph(one.dock, "offline")
+    ask("server up")
+    wait(lambda: one.session.shown.connection == "online", 60)
+
+
+def settings(one: Any) -> None:
+    def look(found: Any) -> None:
+        wait(lambda: any("SILO_API" in t or "token" in t.lower() for t in texts(found)))
+        photograph(found, "settings")
+        found.reject()
+
+    def sized(found: Any) -> None:
+        found.resize(880, 640)
+        look(found)
+
+    while_modal(sized)
+    Gui.showPreferences("Silo", 0)
+
+
+def texts(widget: Any) -> list[str]:
+    return [label.text() for label in widget.findChildren(QtWidgets.QLabel)]
+
+
+def while_modal(look: Callable[[Any], None]) -> None:
+    def try_again() -> None:
+        found = QtWidgets.QApplication.activeModalWidget()
+        if found is None:
+            QtCore.QTimer.singleShot(100, try_again)
+        else:
+            look(found)
+
+    QtCore.QTimer.singleShot(100, try_again)
+
+
+run(story)
