@@ -37,7 +37,7 @@ test: setup
 	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal -m "not freecad and not browser"
 
 test-machine: setup
-	$(BIN)/python -m pytest -n $(WORKERS) --dist loadgroup -m "freecad or browser"
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadscope -m "freecad or browser"
 
 check: setup
 	$(BIN)/ruff check .
