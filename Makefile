@@ -7,13 +7,14 @@ BIN := $(VENV)/bin
 DEV := $(VENV)/.installed-dev
 SERVER := $(VENV)/.installed-server
 
-.PHONY: help demo test test-machine check setup docs clean
+.PHONY: help demo test test-machine check translations setup docs clean
 
 help:
 	@echo "make demo   set up and sync a real assembly with the embedded server (DEMO=--keep leaves it running)"
 	@echo "make test   set up and run the tests"
 	@echo "make test-machine  the tests that need FreeCAD or Chromium on the machine"
 	@echo "make check  ruff, mypy, import directions"
+	@echo "make translations  bring the files for translators up to date"
 
 setup: $(DEV)
 
@@ -38,6 +39,9 @@ test: setup
 
 test-machine: setup
 	$(BIN)/python -m pytest -n $(WORKERS) --dist loadscope -m "freecad or browser"
+
+translations: setup
+	$(BIN)/python scripts/translations.py
 
 check: setup
 	$(BIN)/ruff check .

@@ -1,0 +1,1106 @@
+<?xml version="1.0" encoding="utf-8"?>
+<!DOCTYPE TS>
+<TS version="2.1" sourcelanguage="en">
+    <context>
+        <name>Silo</name>
+        <message>
+            <location filename="../../activity.py" />
+            <source>… and {n} more line</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../activity.py" />
+            <source>… and {n} more lines; the preview shows all</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../addon.py" />
+            <source>[Silo] This document is not open: </source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../addon.py" />
+            <source>[Silo] Not opened, for it is not on the Silo server in use: </source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../addon.py" />
+            <source>No browser could be opened. The address was copied.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../addon.py" />
+            <source>[Silo] No browser could be opened; the address was copied: </source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../addon.py" />
+            <source>[Silo] These objects are not in the document any more.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../banner.py" />
+            <source>Settings…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../banner.py" />
+            <source>Try again</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../banner.py" />
+            <source>No Silo server is set up yet.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../banner.py" />
+            <source>Connected to {host}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../banner.py" />
+            <source>{host} is read-only now. Commits wait here until it takes changes again.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../banner.py" />
+            <source>{host} works only in part. What cannot be sent waits here.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../banner.py" />
+            <source>No connection to {host}. Commits wait here and are sent later.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../banner.py" />
+            <source>{host} does not accept the token.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../banner.py" />
+            <source>Connecting to {host}…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../banner.py" />
+            <source>{host} sends no live events; what you commit is shown all the same.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../banner.py" />
+            <source>{host} (live events are off)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../boxes.py" />
+            <source>Stop</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../boxes.py" />
+            <source>{n} thing waits to be sent</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../boxes.py" />
+            <source>{n} things wait to be sent</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../boxes.py" />
+            <source>… and {n} more</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../boxes.py" />
+            <source>Send now</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../boxes.py" />
+            <source>Discard</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../boxes.py" />
+            <source>Retry</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <location filename="../../commit_dialog.py" />
+            <location filename="../../commit_flow.py" />
+            <source>Commit to Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Save this document and its changed sub-assemblies, upload them as new revisions, and bring the BOM to Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Compare BOM with Silo…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Show how the BOM of this assembly differs from the one in Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <location filename="../../commit_flow.py" />
+            <location filename="../../entries.py" />
+            <location filename="../../preview_dialog.py" />
+            <source>Register Parts…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Give part numbers to the components of this assembly that have none</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <location filename="../../dock.py" />
+            <source>Database Activity</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Show what happens in Silo, and what waits to be sent</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Silo Settings…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Server, token, and what a commit does</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit.py" />
+            <source>unsaved edits: will be saved</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit.py" />
+            <source>saved already</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit.py" />
+            <source>has no file yet: save it under a name first</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit.py" />
+            <source>FreeCAD has loaded it only in part and cannot save these edits: open the file itself and make them there</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit.py" />
+            <source>the file is read-only: these edits are not saved</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit.py" />
+            <source>made by a newer FreeCAD: saving it here would destroy its assemblies, so it is not saved</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit_dialog.py" />
+            <source>What changed?</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit_dialog.py" />
+            <source>A comment for this revision (may stay empty)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit_dialog.py" />
+            <source>This file is committed:</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit_dialog.py" />
+            <source>This file is committed, and {n} file below it that has unsaved edits, that one first:</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit_dialog.py" />
+            <source>This file is committed, and {n} files below it that have unsaved edits, the lowest first:</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit_dialog.py" />
+            <source>File</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit_dialog.py" />
+            <source>State</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit_dialog.py" />
+            <location filename="../../prefs.py" />
+            <source>Commit</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit_dialog.py" />
+            <source>Cancel</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit_dialog.py" />
+            <source>{name} has no file yet. Save it under a name first.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit_flow.py" />
+            <source>Not committed: {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit_flow.py" />
+            <source>No Silo server is set up: the files are saved, and wait to be sent.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit_flow.py" />
+            <source>There is no connection now: the files are saved, and sent later.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit_flow.py" />
+            <source>It has no Silo part number yet, so it was not sent.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit_flow.py" />
+            <source>Saved, but not in Silo: {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../dependencies.py" />
+            <source>Silo needs the Python packages {names}. Install them with silo-mod install-addon, or with: {command} – then start FreeCAD again.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../entries.py" />
+            <source>BOM Updated: {number}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../entries.py" />
+            <source>BOM not synced: {number}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../entries.py" />
+            <source>Committed: {number}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../entries.py" />
+            <source>BOM unchanged</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../entries.py" />
+            <source>+{n} added</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../entries.py" />
+            <source>~{n} qty changed</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../entries.py" />
+            <source>⚠{n} unreferenced</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../entries.py" />
+            <source>⚡{n} in conflict</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../entries.py" />
+            <source>no changes</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../entries.py" />
+            <source>Revision {n} uploaded</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../entries.py" />
+            <source>The file is in Silo already</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../entries.py" />
+            <source>{n} item in the Silo BOM is not referenced by components in this assembly.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../entries.py" />
+            <source>{n} items in the Silo BOM are not referenced by components in this assembly.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../entries.py" />
+            <source>The file is in Silo. The BOM waits until these are mended:</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../entries.py" />
+            <source>Show all…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../entries.py" />
+            <source>Same or new part…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../entries.py" />
+            <location filename="../../preview_dialog.py" />
+            <source>Show</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../entries.py" />
+            <source>{number}: the assembly has {cad}, a manual line in Silo says {silo}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../entries.py" />
+            <source>{n} component has no Silo part number</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../entries.py" />
+            <source>{n} components have no Silo part number</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../entries.py" />
+            <source>[Silo BOM] … and {n} more of these; the preview lists them all.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../entries.py" />
+            <source>Revision {n} of {number}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../entries.py" />
+            <source>New item: {number}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../entries.py" />
+            <source>Archived: {number}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../entries.py" />
+            <location filename="../../preview_dialog.py" />
+            <source>View in Silo →</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../online.py" />
+            <source>No Silo server is set up yet. Enter its address in the Silo preferences.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane.py" />
+            <source>Nothing has happened yet. Commit an assembly with File → Commit to Silo, and what becomes of it is shown here.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane.py" />
+            <source>Show older…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs.py" />
+            <source>Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs.py" />
+            <source>Server</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs.py" />
+            <source>Address</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs.py" />
+            <source>API token</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs.py" />
+            <source>FreeCAD's preferences (a plain file)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs.py" />
+            <source>Keep the token in</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs.py" />
+            <source>Check the server's certificate</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs.py" />
+            <source>the system's own, unless a file is given</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs.py" />
+            <source>Certificate authorities</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs.py" />
+            <source>Test the connection</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs.py" />
+            <source>Ask for a comment</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs.py" />
+            <source>Sync the BOM of an assembly after its file is committed</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs.py" />
+            <source>Then ask about components without a part number</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs.py" />
+            <source>hold the BOM back until they are mended</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs.py" />
+            <source>sync without them (they become unreferenced)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs.py" />
+            <source>Where links are broken</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs.py" />
+            <source>Part number schema</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs.py" />
+            <source>Window</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs.py" />
+            <source>Show what happens in Silo as it happens</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs.py" />
+            <source>Commit in the File menu of every workbench</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs.py" />
+            <source>Reading the settings</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs.py" />
+            <source>the keyring of the system ({name})</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs.py" />
+            <source>unchanged; enter another one to replace it</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs.py" />
+            <source>none yet: make one on the server's page</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs.py" />
+            <source>Keeping the token</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs.py" />
+            <source>Asking the server…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs.py" />
+            <source>Testing the connection</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs_work.py" />
+            <source>Enter the server's address too: a token belongs to its server.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs_work.py" />
+            <source>Enter the address of the server first.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs_work.py" />
+            <source>Connected as {user} ({role}); the server is in {mode} mode.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs_work.py" />
+            <source>No server is set up. To try it out, run: silo-mod serve</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs_work.py" />
+            <source>In use: {url} ({from}).</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs_work.py" />
+            <source>SILO_SSL_VERIFY decides about the certificate.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs_work.py" />
+            <source>from the environment variable SILO_API_URL</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs_work.py" />
+            <source>from this page</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs_work.py" />
+            <source>from the configuration file of silo-mod</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs_work.py" />
+            <source>Token: from the environment variable SILO_API_TOKEN.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs_work.py" />
+            <source>Token: from the system's keyring.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs_work.py" />
+            <source>Token: from FreeCAD's preferences, a plain file.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs_work.py" />
+            <source>Token: from the configuration file of silo-mod.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../prefs_work.py" />
+            <source>Token: none.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview.py" />
+            <source>Without a part number: left out until registered</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview.py" />
+            <source>Not counted, or counted with a remark</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview.py" />
+            <source>new in the assembly: will be added</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview.py" />
+            <source>will take the assembly's quantity</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview.py" />
+            <source>manual line in Silo with another quantity: a person decides there</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview.py" />
+            <source>not in the assembly: kept, marked unreferenced</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview.py" />
+            <source>manual line: not touched</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview.py" />
+            <source>{n} to add</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview.py" />
+            <source>{n} with another quantity</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview.py" />
+            <source>{n} unreferenced</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview.py" />
+            <source>{n} in conflict</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview.py" />
+            <source>{n} without a part number</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview.py" />
+            <source>Nothing to sync: all {n} lines agree with Silo.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview_dialog.py" />
+            <source>BOM in Silo: {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview_dialog.py" />
+            <source>Comparing with Silo…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview_dialog.py" />
+            <location filename="../../register_dialog.py" />
+            <source>Part number</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview_dialog.py" />
+            <location filename="../../register_dialog.py" />
+            <source>Name</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview_dialog.py" />
+            <location filename="../../register_rows.py" />
+            <source>Assembly</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview_dialog.py" />
+            <source>In Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview_dialog.py" />
+            <source>What a sync does</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview_dialog.py" />
+            <source>Show only lines that differ</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview_dialog.py" />
+            <source>Sync although links are broken (what they stood for becomes unreferenced)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview_dialog.py" />
+            <source>Select the instances in the 3D view and the tree</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview_dialog.py" />
+            <source>Compare again</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview_dialog.py" />
+            <source>Sync</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview_dialog.py" />
+            <location filename="../../register_dialog.py" />
+            <source>Close</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview_dialog.py" />
+            <source>Sync the {n} sub-assembly that differs too, before this one</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview_dialog.py" />
+            <source>Sync the {n} sub-assemblies that differ too, before this one</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview_dialog.py" />
+            <source>This assembly has no Silo part number yet. Register it to sync its BOM.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview_dialog.py" />
+            <source>{n} broken link: the BOM is not synced until it is mended.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview_dialog.py" />
+            <source>{n} broken links: the BOM is not synced until they are mended.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview_dialog.py" />
+            <source>… and {n} more rows</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview_flow.py" />
+            <source>{name} holds no assembly, so it has no BOM.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview_flow.py" />
+            <source>BOM in Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview_flow.py" />
+            <source>Comparing with Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_dialog.py" />
+            <location filename="../../register_flow.py" />
+            <source>Register Components</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_dialog.py" />
+            <source>Looking for components without a part number…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_dialog.py" />
+            <source>Component</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_dialog.py" />
+            <source>Type</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_dialog.py" />
+            <source>Category</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_dialog.py" />
+            <source>Remarks</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_dialog.py" />
+            <source>Ask after each commit</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_dialog.py" />
+            <source>Register Selected</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_dialog.py" />
+            <source>Skip All</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_dialog.py" />
+            <source>Register</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_dialog.py" />
+            <source>Keep</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_dialog.py" />
+            <source>All components of {name} have their Silo part number.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_dialog.py" />
+            <source>All of these have their part number now.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_dialog.py" />
+            <source>Where files carry one identity, choose in the column Part number: the same part, or a new one?</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_dialog.py" />
+            <source>({n} more after these)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_dialog.py" />
+            <source>The following component has no Silo part number and will be excluded from the BOM until registered:</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_dialog.py" />
+            <source>The following components have no Silo part number and will be excluded from the BOM until registered:</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_flow.py" />
+            <source>Looking for components without a part number</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_flow.py" />
+            <source>Asking for the next number</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_flow.py" />
+            <source>Registering</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_flow.py" />
+            <source>Registered</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_rows.py" />
+            <source>Part</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_rows.py" />
+            <source>Consumable</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_rows.py" />
+            <source>Tool</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_rows.py" />
+            <source>{number} (kept)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_rows.py" />
+            <source>same or new part?</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_rows.py" />
+            <source>new</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_rows.py" />
+            <source>{number} or later</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_rows.py" />
+            <source>{number} (new)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_rows.py" />
+            <source>same part: keep {number}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_rows.py" />
+            <source>new part: a new number</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_rows.py" />
+            <source>a new number</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_rows.py" />
+            <source>stays as it is</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_rows.py" />
+            <source>registered</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_rows.py" />
+            <source>registering…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_rows.py" />
+            <source>carries the identity of {number}, as another file does</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_rows.py" />
+            <source>the same content as {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_rows.py" />
+            <source>Silo has this very file as {number}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register_rows.py" />
+            <source>Silo has {number} with the same name</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../registering.py" />
+            <source>its unsaved edits are saved too</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../registering.py" />
+            <source>the file is read-only</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../registering.py" />
+            <source>has edits, but is loaded only in part: open the file itself first</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../registering.py" />
+            <source>was saved by somebody else since you opened it: open it again first</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../registering.py" />
+            <source>the file is missing</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../registering.py" />
+            <source>has no file yet: save it first</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../registering.py" />
+            <source>made by a newer FreeCAD: cannot be saved here</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../sending.py" />
+            <source>{file} → {number}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../sending.py" />
+            <source>Silo does not know {name}; register it, or check that this is the right server</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../sending.py" />
+            <source>BOM</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../sending.py" />
+            <source>file and BOM</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../sending.py" />
+            <source>file</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../session.py" />
+            <source>Connecting</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../session.py" />
+            <source>Keeping the commit</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../session.py" />
+            <source>Sending to Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../session.py" />
+            <source>Outbox</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../snapshot.py" />
+            <source>{name} holds {n} registered parts, so its file is no single item's and stays here.</source>
+            <translation type="unfinished" />
+        </message>
+    </context>
+</TS>

@@ -1,0 +1,149 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Collects the add-on's texts for translators: ``silo.ts``, and every ``silo_<language>.ts`` beside it.
+
+    scripts/translations.py            bring the files up to date
+    scripts/translations.py --check    change nothing; exit code 1 where one is out of date
+
+A text is what stands in ``translate("Silo", "…")`` in mods/silo/workbench; both arguments must be literals.
+What is translated already stays; a translation whose text is gone is marked as vanished, as Qt Linguist does.
+FreeCAD loads compiled files: ``lrelease silo_de.ts`` makes ``silo_de.qm``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import sys
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+SOURCES = ROOT / "mods" / "silo" / "workbench"
+FOLDER = SOURCES / "resources" / "translations"
+TEMPLATE = FOLDER / "silo.ts"
+CONTEXT = "Silo"
+
+
+class NotLiteral(Exception):
+    """A text that Qt's tools, and this one, could not see."""
+
+
+@dataclass(frozen=True)
+class Translation:
+    """What a translator wrote; ``state`` is "unfinished", "vanished" or "" (done)."""
+
+    text: str = ""
+    state: str = "unfinished"
+
+
+def texts_of(path: Path) -> list[str]:
+    """The texts of one Python file, in its order."""
+    found = []
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"), str(path))):
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "translate":
+            found.append((node.lineno, node.col_offset, _text(node, path)))
+    return [text for _line, _column, text in sorted(found)]
+
+
+def _text(call: ast.Call, path: Path) -> str:
+    values = [one.value if isinstance(one, ast.Constant) else None for one in call.args]
+    match values:
+        case [context, str(text)] if context == CONTEXT:
+            return text
+    raise NotLiteral(f'{path.name}:{call.lineno}: wanted translate("{CONTEXT}", "a text"), both as literals')
+
+
+def collect(folder: Path = SOURCES) -> dict[str, list[str]]:
+    """Text → the files that use it, in the order of files and lines. All mistakes at once."""
+    found: dict[str, list[str]] = {}
+    mistakes = []
+    for path in sorted(folder.glob("*.py")):
+        # words.py defines `translate`; its own call there passes variables on.
+        if path.name == "words.py":
+            continue
+        try:
+            texts = texts_of(path)
+        except NotLiteral as mistake:
+            mistakes.append(str(mistake))
+            continue
+        for text in texts:
+            files = found.setdefault(text, [])
+            if path.name not in files:
+                files.append(path.name)
+    if mistakes:
+        raise NotLiteral("\n".join(mistakes))
+    return found
+
+
+def read(path: Path) -> tuple[str, dict[str, Translation]]:
+    """Language and translations of a .ts file; ("", {}) where there is none."""
+    if not path.exists():
+        return "", {}
+    root = ET.parse(path).getroot()  # noqa: S314  # our own files
+    known = {}
+    for message in root.iter("message"):
+        element = message.find("translation")
+        if element is not None:
+            known[message.findtext("source", "")] = Translation(element.text or "", element.get("type", ""))
+    return root.get("language", ""), known
+
+
+def ts(texts: Mapping[str, Iterable[str]], language: str, known: Mapping[str, Translation]) -> str:
+    """A .ts file: all texts, with what is known of their translations."""
+    attributes = {"version": "2.1", "sourcelanguage": "en"} | ({"language": language} if language else {})
+    root = ET.Element("TS", attributes)
+    context = ET.SubElement(root, "context")
+    ET.SubElement(context, "name").text = CONTEXT
+    for text, files in texts.items():
+        old = known.get(text, Translation())
+        state = "unfinished" if old.state == "vanished" else old.state
+        _add(context, text, files, Translation(old.text, state))
+    for text, old in known.items():
+        if text not in texts and old.text:
+            _add(context, text, (), Translation(old.text, "vanished"))
+    ET.indent(root, "    ")
+    return f'<?xml version="1.0" encoding="utf-8"?>\n<!DOCTYPE TS>\n{ET.tostring(root, "unicode")}\n'
+
+
+def _add(context: ET.Element, text: str, files: Iterable[str], known: Translation) -> None:
+    message = ET.SubElement(context, "message")
+    for file in files:
+        # No line numbers: they would change with every edit.
+        ET.SubElement(message, "location", filename=f"../../{file}")
+    ET.SubElement(message, "source").text = text
+    made = ET.SubElement(message, "translation", {"type": known.state} if known.state else {})
+    made.text = known.text
+
+
+def wanted(folder: Path = FOLDER, sources: Path = SOURCES) -> dict[Path, str]:
+    """What each .ts file should hold."""
+    texts = collect(sources)
+    paths = [folder / TEMPLATE.name, *sorted(folder.glob("silo_*.ts"))]
+    return {path: ts(texts, *read(path)) for path in paths}
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Write, or check."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--check", action="store_true", help="change nothing, say what is out of date")
+    args = parser.parse_args(arguments)
+    try:
+        files = wanted()
+    except NotLiteral as mistakes:
+        print(mistakes, file=sys.stderr)
+        return 1
+    old = [p for p, text in files.items() if not p.exists() or p.read_text(encoding="utf-8") != text]
+    for path in old:
+        print(f"{path.relative_to(ROOT)} {'is out of date: make translations' if args.check else 'written'}")
+        if not args.check:
+            path.write_text(files[path], encoding="utf-8")
+    return 1 if old and args.check else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

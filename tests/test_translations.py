@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The texts for translators (``scripts/translations.py``)."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+SCRIPT = Path(__file__).resolve().parents[1] / "scripts" / "translations.py"
+
+
+@pytest.fixture(name="script", scope="module")
+def _script() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("silo_translations", SCRIPT)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    # Data classes look their module up by its name.
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(name="sources")
+def _sources(tmp_path: Path) -> Path:
+    (tmp_path / "one.py").write_text('translate("Silo", "Sync")\ntranslate("Silo", "Show & <hide>")\n')
+    (tmp_path / "two.py").write_text('f(translate("Silo", "Sync"), other("Silo", "not this"))\n')
+    return tmp_path
+
+
+def test_the_committed_files_are_up_to_date(script: ModuleType) -> None:
+    """After a text has changed: make translations."""
+    for path, text in script.wanted().items():
+        assert path.read_text(encoding="utf-8") == text, f"{path.name}: run make translations"
+
+
+def test_each_text_once_with_the_files_that_use_it(script: ModuleType, sources: Path) -> None:
+    """In the order of the files."""
+    assert script.collect(sources) == {"Sync": ["one.py", "two.py"], "Show & <hide>": ["one.py"]}
+
+
+def test_what_is_translated_stays_and_what_is_gone_is_marked(script: ModuleType, sources: Path) -> None:
+    """Nobody's work is lost when a text changes."""
+    known = {
+        "Sync": script.Translation("Abgleichen", ""),
+        "Gone": script.Translation("Weg", ""),
+        "Never done": script.Translation("", "unfinished"),
+    }
+    made = sources / "silo_de.ts"
+    made.write_text(script.ts(script.collect(sources), "de", known), encoding="utf-8")
+    assert script.read(made) == (
+        "de",
+        {
+            "Sync": script.Translation("Abgleichen", ""),
+            "Show & <hide>": script.Translation("", "unfinished"),
+            "Gone": script.Translation("Weg", "vanished"),
+        },
+    )
+
+
+def test_writing_again_changes_nothing(script: ModuleType, sources: Path) -> None:
+    """And the file is one that Qt's tools read: one context, one source per message."""
+    texts = script.collect(sources)
+    made = sources / "silo.ts"
+    made.write_text(script.ts(texts, "", {}), encoding="utf-8")
+    assert script.ts(texts, *script.read(made)) == made.read_text(encoding="utf-8")
+    text = made.read_text(encoding="utf-8")
+    assert re.findall("<name>(.*)</name>", text) == ["Silo"]
+    assert re.findall("<source>(.*)</source>", text) == ["Sync", "Show &amp; &lt;hide&gt;"]
+
+
+@pytest.mark.parametrize("call", ['translate("Silo", name)', 'translate(where, "x")', 'translate("x")'])
+def test_a_text_that_cannot_be_seen_is_a_mistake(script: ModuleType, sources: Path, call: str) -> None:
+    """Qt's tools read the source, they do not run it."""
+    (sources / "bad.py").write_text(f"\n{call}\n")
+    with pytest.raises(script.NotLiteral, match=r"bad\.py:2: wanted translate"):
+        script.collect(sources)
