@@ -57,7 +57,8 @@ def test_however_much_is_broken_registering_stays_within_reach(vault: Vault, con
     vault.commit(replace(snapshot, extraction=replace(snapshot.extraction, findings=lost)))
     vault.sending.run(vault.silo, control)
     made = box(vault)
-    assert [a.do for line in made.lines for a in line.actions if a.do is not Do.SHOW] == [Do.REGISTER]
+    offered = [a.do for line in made.lines for a in line.actions if a.do is not Do.SHOW]
+    assert offered == [Do.PREVIEW, Do.REGISTER]
     assert "… and 995 more lines; the preview shows all" in entry_text(made)
 
 

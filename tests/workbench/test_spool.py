@@ -62,6 +62,19 @@ def test_a_held_file_keeps_its_content_when_freecad_saves_again(spool: Spool, do
     assert waiting.file.read_bytes() == b"first"
 
 
+def test_a_commit_that_waits_shares_no_content_with_the_document(spool: Spool, document: Path) -> None:
+    """Not every program writes a new file: one that overwrites the old one must not reach what waits."""
+    key = new_key()
+    held = spool.hold(str(document), key)
+    kept = spool.add(Commit(key, Snapshot(str(document), "Top"), 1.0, file=held))
+    before = document.read_bytes()
+    with document.open("r+b") as file:
+        file.write(b"overwritten")
+    assert kept.file is not None
+    assert kept.file.read_bytes() == before
+    assert {path.name for path in kept.file.parent.iterdir()} == {"commit.json", document.name}
+
+
 def test_what_cannot_be_held_is_told_by_none(spool: Spool, tmp_path: Path) -> None:
     """Another disk, or no file at all: then it is copied."""
     assert spool.hold(str(tmp_path / "none.FCStd"), new_key()) is None

@@ -100,8 +100,10 @@ class Entry:
             object.__setattr__(self, "lines", shortened(self.lines))
 
 
-def shortened(lines: tuple[Line, ...], most: int = MOST_LINES) -> tuple[Line, ...]:
-    """The first lines, and how many more there are."""
+def shortened(
+    lines: tuple[Line, ...], most: int = MOST_LINES, actions: tuple[Action, ...] = ()
+) -> tuple[Line, ...]:
+    """The first lines, and how many more there are; ``actions`` is the way to see those."""
     if len(lines) <= most:
         return lines
     left = len(lines) - most + 1
@@ -110,7 +112,7 @@ def shortened(lines: tuple[Line, ...], most: int = MOST_LINES) -> tuple[Line, ..
         translate("Silo", "… and {n} more line"),
         translate("Silo", "… and {n} more lines; the preview shows all"),
     )
-    return (*lines[: most - 1], Line(more, Tone.QUIET))
+    return (*lines[: most - 1], Line(more, Tone.QUIET, actions))
 
 
 @dataclass(frozen=True)

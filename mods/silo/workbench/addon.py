@@ -220,6 +220,14 @@ class AddOn:
         else:
             self.registrations.start(doc)
 
+    def preview_path(self, path: str) -> None:
+        """Compare this document with the server, where it is open."""
+        doc = host.find_document(path)
+        if doc is None:
+            host.warning(translate("Silo", "[Silo] This document is not open: ") + plain(path))
+        else:
+            self.previews.start(doc)
+
     def show_activity(self) -> None:
         """Show the pane."""
         self.dock.show_and_raise()
@@ -247,18 +255,30 @@ class AddOn:
             self.session.discard(action.target)
         elif action.do is Do.STOP:
             self.session.cancel()
+        elif action.do is Do.PREVIEW:
+            self.preview_path(action.document)
         elif action.do in (Do.REGISTER, Do.DECIDE):
             self.register_path(action.document)
         elif action.do is Do.SETTINGS:
             self.show_settings()
 
     def open_page(self, url: str) -> None:
-        """Open a page of the server; where no browser opens, the address is on the clipboard."""
-        if not qt.open_url(url):
-            qt.copy(url)
-            host.message(
-                translate("Silo", "[Silo] No browser could be opened; the address was copied: ") + url
-            )
+        """Open a page of the server in use; where no browser opens, the address is on the clipboard."""
+        from silo.api.address import ServerAddress
+        from silo.bom.errors import SiloError
+
+        try:
+            # A box may be older than the settings.
+            page = ServerAddress.parse(self.session.shown.server.url).web(url)
+        except SiloError:
+            text = translate("Silo", "[Silo] Not opened, for it is not on the Silo server in use: ")
+            host.warning(text + plain(url, 300))
+            return
+        if not qt.open_url(page):
+            qt.copy(page)
+            qt.tell_at_pointer(translate("Silo", "No browser could be opened. The address was copied."))
+            text = translate("Silo", "[Silo] No browser could be opened; the address was copied: ")
+            host.message(text + page)
 
     def show_objects(self, path: str, names: tuple[str, ...]) -> None:
         """Select objects of a document in the 3D view and the tree."""

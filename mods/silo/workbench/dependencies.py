@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 
 from silo.workbench.words import translate
 
@@ -21,11 +21,17 @@ def missing(found: Callable[[str], bool] = _found) -> tuple[str, ...]:
     return tuple(package for name, package in NEEDED.items() if not found(name))
 
 
-def sentence(packages: Iterable[str]) -> str:
-    """What to tell the user, in one line."""
+def sentence(packages: Sequence[str], folder: str, python: tuple[int, int]) -> str:
+    """What to tell the user, in one line: a command that can be copied, for this very FreeCAD.
+
+    folder
+        where this FreeCAD looks for additional packages; python: its version of Python.
+    """
     text = translate(
         "Silo",
-        "Silo needs the Python packages {names}. Install them with the Addon Manager, "
-        "or with: silo-mod install-addon",
+        "Silo needs the Python packages {names}. Install them with silo-mod install-addon, or with: "
+        "{command} – then start FreeCAD again.",
     )
-    return text.replace("{names}", ", ".join(packages))
+    # FreeCAD's own Python has no pip in some systems; any other of the same version serves.
+    command = 'python{}.{} -m pip install --target "{}" {}'.format(*python, folder, " ".join(packages))
+    return text.replace("{names}", ", ".join(packages)).replace("{command}", command)

@@ -127,9 +127,10 @@ def _resolved_lines(sent: Sent) -> tuple[Line, ...]:
     if resolved is None:
         return ()
     base = os.path.dirname(resolved.assembly.doc_path)
+    rest = (Action(Do.PREVIEW, translate("Silo", "Show all…"), document=resolved.assembly.doc_path),)
     return (
-        *shortened(tuple(_finding_lines(resolved, base)), MOST_FINDINGS),
-        *shortened(tuple(_conflict_lines(sent, resolved)), MOST_CONFLICTS),
+        *shortened(tuple(_finding_lines(resolved, base)), MOST_FINDINGS, rest),
+        *shortened(tuple(_conflict_lines(sent, resolved)), MOST_CONFLICTS, rest),
         *unregistered_lines(resolved),
     )
 

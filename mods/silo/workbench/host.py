@@ -9,6 +9,7 @@ Imported at FreeCAD's start: what only some functions need, they import themselv
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -41,6 +42,12 @@ def version() -> tuple[int, int]:
 def user_data_folder() -> str:
     """FreeCAD's folder for the user's data, add-ons and Python packages."""
     return str(FreeCAD.getUserAppDataDir())
+
+
+def packages_folder() -> str:
+    """Where this FreeCAD looks for additional Python packages (facts §7.3)."""
+    base = os.path.join(user_data_folder(), "AdditionalPythonPackages")
+    return base if version() < (1, 0) else os.path.join(base, "py{}{}".format(*sys.version_info))
 
 
 def translate(context: str, text: str) -> str:

@@ -29,6 +29,7 @@ __all__ = [
     "later",
     "open_url",
     "run_dialog",
+    "tell_at_pointer",
 ]
 
 
@@ -77,6 +78,11 @@ def run_dialog(dialog: Any) -> bool:
 def open_url(url: str) -> bool:
     """Open a page in the browser; False where there is none."""
     return bool(QtGui.QDesktopServices.openUrl(QtCore.QUrl(url)))
+
+
+def tell_at_pointer(text: str) -> None:
+    """A word where the person has just clicked; it goes away by itself."""
+    QtWidgets.QToolTip.showText(QtGui.QCursor.pos(), text)
 
 
 def copy(text: str) -> None:

@@ -89,8 +89,7 @@ class Spool:
         folder = self._folder(commit.key)
         file = commit.file
         if file is not None:
-            if file.parent != folder:
-                file = self._copy(file, folder)
+            file = self._own(file, folder)
             commit = replace(commit, file=file, sha256=_sha256(file))
         data = {
             "key": commit.key,
@@ -166,8 +165,18 @@ class Spool:
                 "Make room or mend its permissions, then commit again"
             ) from error
 
-    def _copy(self, file: Path, folder: Path) -> Path:
-        target = folder / file.name
+    def _own(self, file: Path, folder: Path) -> Path:
+        """A copy in the commit's folder. What is held there under a second name is not one yet.
+
+        Not every program that changes a file writes a new one.
+        """
+        if file.parent != folder:
+            return self._copy(file, folder / file.name)
+        if file.exists() and file.stat().st_nlink > 1:
+            self._copy(file, folder / f"{file.name}.own").replace(file)
+        return file
+
+    def _copy(self, file: Path, target: Path) -> Path:
         try:
             shutil.copyfile(file, target)
         except OSError as error:

@@ -7,6 +7,7 @@ add-on may cost FreeCAD's start 50 ms.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -29,7 +30,7 @@ def start() -> None:
     words.use(host.translate)
     host.add_resources(str(RESOURCES / "icons"), str(RESOURCES / "translations"))
     if missing := dependencies.missing():
-        host.error(dependencies.sentence(missing))
+        host.error(dependencies.sentence(missing, host.packages_folder(), sys.version_info[:2]))
         return
     addon = AddOn()
     known = commands(addon)
