@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Photograph the add-on in FreeCAD into ``docs/images/addon-*.png``: the example assembly, a real server.
 
-Run: ``.venv/bin/python scripts/screenshots_freecad.py [FOLDER] [STYLE]`` (needs a FreeCAD with Xvfb; the newest of
-``scripts/freecad-roots.sh --list`` is taken, or the one that ``SILO_PICTURES_FREECAD`` names, such as 1.0).
-STYLE names a style sheet of FreeCAD, to look at the windows in its dark theme.
+Run: ``.venv/bin/python scripts/screenshots_freecad.py [FOLDER] [STYLE]``. It needs FreeCAD and Xvfb; the
+newest of ``scripts/freecad-roots.sh --list`` is taken, or that of ``SILO_PICTURES_FREECAD`` (such as 1.0).
+STYLE names a style sheet of FreeCAD, such as "FreeCAD Dark.qss", to look at the windows in another theme.
 """
 
 from __future__ import annotations
@@ -37,13 +37,15 @@ def main() -> None:
     version = os.environ.get("SILO_PICTURES_FREECAD") or max(
         machines.freecads(), key=lambda short: machines.freecads()[short].version
     )
-    with tempfile.TemporaryDirectory(prefix="silo-pictures-") as scratch:
-        with window(version, Path(scratch).resolve()) as freecad:
-            freecad.prepare()
-            with freecad.server.client() as client:
-                prepare(freecad, client)
-            furnish(freecad.home / "user.cfg", sys.argv[2] if len(sys.argv) > 2 else "")
-            freecad.run("pictures.py", env={"SILO_PICTURES": str(folder), "QT_XCB_NO_MITSHM": "1"})
+    with (
+        tempfile.TemporaryDirectory(prefix="silo-pictures-") as scratch,
+        window(version, Path(scratch).resolve()) as freecad,
+    ):
+        freecad.prepare()
+        with freecad.server.client() as client:
+            prepare(freecad, client)
+        furnish(freecad.home / "user.cfg", sys.argv[2] if len(sys.argv) > 2 else "")
+        freecad.run("pictures.py", env={"SILO_PICTURES": str(folder), "QT_XCB_NO_MITSHM": "1"})
     for picture in sorted(folder.glob("addon-*.png")):
         print(f"{picture}  {picture.stat().st_size / 1000:.0f} kB")
 

@@ -70,7 +70,7 @@ def test_a_copied_identity_asks(corners: dict[str, Any]) -> None:
     assert "2 files carry the same Silo identity" in box
     assert "[Same or new part…]" in box
     rows = {component: (number, checked) for component, number, checked in corners["copied_rows"]}
-    assert rows == {"Bracket.FCStd": ("same", False), "Bracket2.FCStd": ("same", False)}
+    assert rows == {"Bracket.FCStd": ("ask", False), "Bracket2.FCStd": ("ask", False)}
 
 
 def test_a_new_part_has_its_own_identity_then(corners: dict[str, Any]) -> None:
@@ -101,10 +101,14 @@ def test_missing_packages_are_one_plain_sentence(version: str, tmp_path: Path) -
         said = freecad.run("bare.py")
     assert said["commands"] == []
     (line,) = said["report"]
+    folder = said["folder"]
     assert line.endswith(
-        "Silo needs the Python packages requests, pydantic, sseclient-py. Install them with the Addon "
-        "Manager, or with: silo-mod install-addon"
+        "Silo needs the Python packages requests, pydantic, sseclient-py. Install them with silo-mod "
+        f'install-addon, or with: python{said["python"]} -m pip install --target "{folder}" requests pydantic '
+        "sseclient-py – then start FreeCAD again."
     )
+    # There FreeCAD finds them, as the next tests show, which put them into this profile's folder.
+    assert folder == str(freecad.packages)
 
 
 @pytest.mark.parametrize("version", WANTED)

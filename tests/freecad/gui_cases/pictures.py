@@ -81,10 +81,8 @@ def arrange(one: Any) -> None:
     window.showNormal()
     window.setGeometry(0, 0, WIDTH, HEIGHT)
     wait(lambda: window.width() == WIDTH)
-    overlays = [
-        w for w in window.findChildren(QtWidgets.QWidget) if "OverlayTab" in w.metaObject().className()
-    ]
-    if any(overlay.isVisible() for overlay in overlays):
+    inside = window.findChildren(QtWidgets.QWidget)
+    if any("OverlayTab" in widget.metaObject().className() and widget.isVisible() for widget in inside):
         # The empty task panel of newer FreeCADs lies over the model.
         Gui.runCommand("Std_DockOverlayToggleRight")
     for dock in window.findChildren(QtWidgets.QDockWidget):
@@ -174,7 +172,8 @@ def new_parts(top: Any) -> None:
         container.addObject(link)
         link.Placement.Base = App.Vector(150 + 8 * number, -60, 12)
     top.getObject("CoverBolts" if top.getObject("CoverBolts") else _named(top, "CoverBolts")).ElementCount = 6
-    top.recompute()
+    recompute()
+    Gui.getDocument(top.Name).Modified = True
     show(top)
 
 
