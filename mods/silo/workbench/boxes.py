@@ -36,8 +36,8 @@ class Box(QtWidgets.QFrame):  # type: ignore[misc]
         self.setObjectName("siloBox")
         edge = widgets.colour(entry.tone, self) or "palette(mid)"
         self.setStyleSheet(
-            f"QFrame#siloBox {{ border: 1px solid palette(mid); border-radius: 4px; background: {_ground(self)};"
-            f" border-left: 4px solid {edge}; }}"
+            "QFrame#siloBox { border: 1px solid palette(mid); border-radius: 4px;"
+            f" background: {_ground(self)}; border-left: 4px solid {edge}; }}"
         )
         layout = QtWidgets.QVBoxLayout(self)
         layout.setContentsMargins(9, 6, 8, 6)

@@ -35,8 +35,8 @@ class EditedRow:
     """A component with what the person chose for it.
 
     number
-        NEW for a new item, else the part number of an item to join. For a copied identity first ASK, until the
-        person says NEW or SAME (keep it).
+        NEW for a new item, else the part number of an item to join. A copied identity begins with ASK, until
+        the person says NEW or SAME (keep it).
     result
         what became of it; None while it is not registered.
     """
