@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""From a geometry file and a BOM to a report, as the command does it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from silo.inertia.bom import BomTable
+from silo.inertia.calculator import Task, calculate, read_geometry
+from silo.inertia.geometry import ReadOptions
+from silo.inertia.report import InertiaReport
+
+_GEOMETRY = Path(__file__).parents[1] / "geometry"
+if str(_GEOMETRY) not in sys.path:
+    # Test folders are no packages (import mode "importlib"): the writer of STEP files is known by its folder.
+    sys.path.insert(0, str(_GEOMETRY))
+
+from step_writer import StepDocument  # noqa: E402
+
+
+@pytest.fixture(name="step")
+def _step() -> Callable[[], StepDocument]:
+    """``step()``: a new STEP document."""
+    return StepDocument
+
+
+@pytest.fixture(name="pipeline")
+def _pipeline(materials: Any, bom: Callable[..., BomTable]) -> Callable[..., InertiaReport]:
+    """``pipeline(path, csv_text | None, **task)``: read in this process, without a cache."""
+
+    def run(path: Path, text: str | None, siblings: bool = True, **task: Any) -> InertiaReport:
+        assembly = read_geometry(path, ReadOptions(isolate=False, cache=False, siblings=siblings))
+        return calculate(assembly, bom(text) if text is not None else None, Task(materials, **task))
+
+    return run
