@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import os
 import uuid
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from typing import Any
 
 from silo.api.wire import SourceDocument
 from silo.bom.diff import diff_findings
-from silo.bom.errors import SiloError
+from silo.bom.errors import RemoteError, SiloError
 from silo.bom.findings import Finding
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.report import base_of, diff_json, entry_json, finding_json, relative
@@ -60,6 +60,17 @@ class TopResult:
     @property
     def fine(self) -> bool:
         return self.error is None and all(outcome.status in _FINE for outcome in self.outcomes)
+
+
+def exit_code(results: Sequence[TopResult]) -> int:
+    """0 where all is in order, 1 where something was left undone, 3 where only the server is to blame."""
+    left = [result for result in results if not result.fine]
+    causes = [
+        cause for result in left for cause in (result.error, *(o.error for o in result.outcomes)) if cause
+    ]
+    if left and len(causes) >= len(left) and all(isinstance(cause, RemoteError) for cause in causes):
+        return 3
+    return 1 if left else 0
 
 
 def findings_of(result: TopResult) -> tuple[Finding, ...]:

@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Iterable
 from pathlib import Path
 
-from silo.bom.errors import DocumentError
+from silo.bom.errors import DocumentError, InputError
 
 
 def documents_in(tops: Iterable[str]) -> list[str]:
@@ -20,6 +21,16 @@ def documents_in(tops: Iterable[str]) -> list[str]:
         else:
             found.append(top)
     return list(dict.fromkeys(found))
+
+
+def check_writable(*paths: str | None) -> None:
+    """Raise InputError for a file that cannot be written, before a long run ends with that news."""
+    for path in filter(None, paths):
+        folder = os.path.dirname(path) or "."
+        if not os.path.isdir(folder):
+            raise InputError(f"{path} cannot be written: there is no folder {folder}")
+        if os.path.isdir(path) or not os.access(path if os.path.exists(path) else folder, os.W_OK):
+            raise InputError(f"{path} cannot be written: it is a folder, or may not be changed")
 
 
 def sha256_of(path: str) -> str:

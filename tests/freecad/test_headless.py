@@ -5,12 +5,14 @@ from __future__ import annotations
 
 import json
 import os
+import pty
 import re
 import shutil
 import subprocess
+import sys
 import uuid
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -242,3 +244,59 @@ def test_wrong_arguments_are_told_in_plain_words(vault: Vault, version: str, tmp
         done = headless(freecad, vault, args, tmp_path, dependencies=False)
         assert (done.returncode, words in done.stdout) == (2, True), done.stdout
         assert "Traceback" not in done.stdout
+
+
+@pytest.mark.parametrize("version", WANTED)
+def test_a_server_that_does_not_answer_is_told_as_such(vault: Vault, version: str, tmp_path: Path) -> None:
+    """Exit code 3, and the reports are written all the same."""
+    away = replace(vault, env={**vault.env, "SILO_API_URL": "http://127.0.0.1:9"})
+    args = {"tops": ["vault/top.FCStd"], "json": "out.json", "report": "out.md"}
+    done = headless(machines.need(version), away, args, tmp_path, dependencies=True)
+    assert done.returncode == 3, done.stdout
+    (result,) = json.loads((tmp_path / "out.json").read_text())["results"]
+    assert result["error"]["code"] == "unreachable"
+    assert "0 of 1 files in order" in (tmp_path / "out.md").read_text()
+
+
+def test_an_empty_folder_is_no_success(vault: Vault, tmp_path: Path) -> None:
+    """A job that looks into the wrong folder must not be green."""
+    (tmp_path / "empty").mkdir()
+    args = {"tops": ["empty"]}
+    done = headless(machines.need("1.0"), vault, args, tmp_path, dependencies=True)
+    assert (done.returncode, "no FreeCAD files" in done.stdout) == (2, True), done.stdout
+
+
+def test_a_report_that_cannot_be_written_is_told_before_anything_is_done(
+    vault: Vault, tmp_path: Path
+) -> None:
+    """Not after an hour of work, and nothing is synced by half."""
+    args = {"tops": ["vault"], "report": "no/such/folder/out.md"}
+    done = headless(machines.need("1.0"), vault, args, tmp_path, dependencies=True)
+    assert done.returncode == 2, done.stdout
+    assert "no/such/folder" in done.stdout
+    assert vault.lines("top") == {}
+
+
+@pytest.mark.parametrize("via", ["files", "freecad"])
+def test_a_terminal_sees_how_far_the_run_is(
+    vault: Vault, via: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each file is named when it is begun, on a terminal only; the results stay clean on standard output."""
+    _use(machines.need("1.0"), tmp_path, monkeypatch)
+    ours, theirs = pty.openpty()
+    try:
+        done = subprocess.run(
+            [sys.executable, "-m", "silo.cli.main", "sync", "--via", via, "--json", str(vault.folder)],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=theirs,
+            timeout=120,
+            check=False,
+        )
+        told = os.read(ours, 65536).decode()
+    finally:
+        os.close(ours)
+        os.close(theirs)
+    assert done.returncode == 0, told
+    assert [line[:5] for line in told.splitlines()] == ["[1/4]", "[2/4]", "[3/4]", "[4/4]"]
+    assert len(json.loads(done.stdout)["results"]) == 4

@@ -8,13 +8,13 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from silo.batch import Options, TopResult, result_json, sync_top
-from silo.bom.errors import InputError, RemoteError, SiloError
+from silo.batch import Options, TopResult, exit_code, result_json, sync_top
+from silo.bom.errors import InputError, SiloError
 from silo.bom.model import Extraction
 from silo.bom_sync import Status
 from silo.cli import common
 from silo.cli.common import Commands
-from silo.files import documents_in
+from silo.files import check_writable, documents_in
 
 
 def register(commands: Commands) -> None:
@@ -53,6 +53,7 @@ def run(args: argparse.Namespace) -> int:
     tops = documents_in(args.tops)
     if not tops:
         raise InputError(f"no FreeCAD files (*.FCStd) in {', '.join(args.tops)}")
+    check_writable(args.report)
     options = Options(
         recursive=args.recursive,
         allow_missing=args.allow_missing,
@@ -61,9 +62,12 @@ def run(args: argparse.Namespace) -> int:
     )
     results: list[TopResult] = []
     with common.client_of(args) as client:
-        for number, (top, found) in enumerate(_extractions(args, tops), start=1):
-            if len(tops) > 1 and sys.stderr.isatty():
+        extractions = _extractions(args, tops)
+        for number, top in enumerate(tops, start=1):
+            # Before the file is read: a person wants to know which one takes so long.
+            if (len(tops) > 1 or args.via == "freecad") and sys.stderr.isatty():
                 print(f"[{number}/{len(tops)}] {top}", file=sys.stderr)
+            _, found = next(extractions)
             if number == 1 and isinstance(found, Extraction):
                 common.reach(client, found)
             results.append(sync_top(top, found, client, options))
@@ -75,18 +79,10 @@ def run(args: argparse.Namespace) -> int:
         Path(args.report).write_text(markdown(results), encoding="utf-8")
     if args.json:
         common.print_json({"results": [result_json(result) for result in results]})
-    return _exit_code(results)
-
-
-def _exit_code(results: list[TopResult]) -> int:
-    """3 where nothing but the server, or the way to it, stood in the way."""
-    left = [result for result in results if not result.fine]
-    causes = [
-        cause for result in left for cause in (result.error, *(o.error for o in result.outcomes)) if cause
-    ]
-    if left and len(causes) >= len(left) and all(isinstance(cause, RemoteError) for cause in causes):
-        return 3
-    return 1 if left else 0
+    elif len(results) > 1:
+        fine = sum(result.fine for result in results)
+        print(f"{fine} of {len(results)} files in order.")
+    return exit_code(results)
 
 
 def _extractions(args: argparse.Namespace, tops: list[str]) -> Iterator[tuple[str, Extraction | SiloError]]:

@@ -33,7 +33,7 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from silo.bom.errors import ConfigError, InputError, SiloError
-from silo.files import documents_in
+from silo.files import check_writable, documents_in
 
 if TYPE_CHECKING:
     from silo.batch import TopResult
@@ -84,6 +84,9 @@ def main(env: Mapping[str, str] = os.environ) -> int:
     """Do the job that the environment describes; the exit code."""
     try:
         job = Job.from_text(env.get("SILO_ARGS"))
+        check_writable(job.json, job.report)
+        if not documents_in(job.tops):
+            raise InputError(f"no FreeCAD files (*.FCStd) in {', '.join(job.tops)}")
         if job.lines is not None:
             with open(job.lines, "a", encoding="utf-8") as out:
                 return _write_lines(job, out)
@@ -151,7 +154,7 @@ def _sync(job: Job) -> int:
         client = _client()
     except ImportError as error:
         return _without_server(job, error)
-    from silo.batch import Options, sync_top
+    from silo.batch import Options, exit_code, sync_top
     from silo.workbench import host
 
     tops = documents_in(job.tops)
@@ -167,7 +170,7 @@ def _sync(job: Job) -> int:
             results.append(sync_top(top, found, client, options))
             host.message(f"Silo: [{number}/{len(tops)}] {_in_words(results[-1])}")
     _write_reports(job, results)
-    return OK if all(result.fine for result in results) else UNDONE
+    return exit_code(results)
 
 
 def _client() -> Any:
