@@ -14,7 +14,6 @@ import json
 import os
 import shutil
 import sqlite3
-import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
@@ -24,6 +23,7 @@ from typing import Any
 from uuid import uuid4
 
 from silo.bom.errors import InputError
+from silo.durable import replacing
 from silo.folders import data_folder
 from silo.workbench.snapshot import Snapshot, from_json, to_json
 
@@ -196,12 +196,8 @@ def _sha256(path: Path) -> str:
 
 def _write(path: Path, data: dict[str, Any]) -> None:
     try:
-        handle, name = tempfile.mkstemp(dir=path.parent, suffix=".new")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            json.dump(data, file)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(name, path)
+        with replacing(path) as file:
+            file.write(json.dumps(data).encode())
     except OSError as error:
         raise InputError(
             f"{path}: the commit cannot be kept ({error.strerror or error}); make room and commit again"
