@@ -98,17 +98,17 @@ def test_missing_packages_are_one_plain_sentence(version: str, tmp_path: Path) -
     """FreeCAD starts as ever, no traceback."""
     with window(version, tmp_path.resolve()) as freecad:
         freecad.prepare(dependencies=False)
+        freecad.packages.mkdir(parents=True)
         said = freecad.run("bare.py")
     assert said["commands"] == []
     (line,) = said["report"]
-    folder = said["folder"]
     assert line.endswith(
         "Silo needs the Python packages requests, pydantic, sseclient-py. Install them with silo-mod "
-        f'install-addon, or with: python{said["python"]} -m pip install --target "{folder}" requests pydantic '
-        "sseclient-py – then start FreeCAD again."
+        f"install-addon, or with: python{freecad.freecad.python} -m pip install --target "
+        f'"{freecad.packages}" requests pydantic sseclient-py – then start FreeCAD again.'
     )
-    # There FreeCAD finds them, as the next tests show, which put them into this profile's folder.
-    assert folder == str(freecad.packages)
+    # And that is where this FreeCAD looks for them.
+    assert said["on_path"]
 
 
 @pytest.mark.parametrize("version", WANTED)

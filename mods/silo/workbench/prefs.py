@@ -61,9 +61,11 @@ class PreferencePage:
         self.token.setEchoMode(QtWidgets.QLineEdit.EchoMode.Password)
         form.addRow(translate("Silo", "API token"), self.token)
         self.place = QtWidgets.QComboBox()
+        self.place.setObjectName("place")
         self.place.addItem(translate("Silo", "FreeCAD's preferences (a plain file)"), PREFERENCE)
         form.addRow(translate("Silo", "Keep the token in"), self.place)
         self.verify = QtWidgets.QCheckBox(translate("Silo", "Check the server's certificate"))
+        self.verify.setObjectName("verify")
         form.addRow("", self.verify)
         self.certificate = QtWidgets.QLineEdit()
         self.certificate.setPlaceholderText(translate("Silo", "the system's own, unless a file is given"))
@@ -110,12 +112,15 @@ class PreferencePage:
             ("AskRegister", translate("Silo", "Then ask about components without a part number")),
         ):
             self.flags[name] = QtWidgets.QCheckBox(text)
+            self.flags[name].setObjectName(name)
             form.addRow(self.flags[name])
         self.missing = QtWidgets.QComboBox()
+        self.missing.setObjectName("missing")
         self.missing.addItem(translate("Silo", "hold the BOM back until they are mended"), HOLD)
         self.missing.addItem(translate("Silo", "sync without them (they become unreferenced)"), ALLOW)
         form.addRow(translate("Silo", "Where links are broken"), self.missing)
         self.schema = QtWidgets.QLineEdit()
+        self.schema.setObjectName("schema")
         form.addRow(translate("Silo", "Part number schema"), self.schema)
         return box
 
@@ -127,6 +132,7 @@ class PreferencePage:
             ("ShowEverywhere", translate("Silo", "Commit in the File menu of every workbench")),
         ):
             self.flags[name] = QtWidgets.QCheckBox(text)
+            self.flags[name].setObjectName(name)
             form.addRow(self.flags[name])
         return box
 

@@ -12,8 +12,11 @@ from inside import Gui, QtCore, QtWidgets, tell
 
 
 def look() -> None:
+    from silo.workbench import host
+
     texts = [w.toPlainText() for w in Gui.getMainWindow().findChildren(QtWidgets.QTextEdit)]
     tell(
+        on_path=host.packages_folder() in [os.path.normpath(entry) for entry in sys.path],
         commands=[name for name in Gui.listCommands() if "Silo" in name or name == "Origin_Commit"],
         report=[
             line for text in texts for line in text.splitlines() if "Silo" in line or "Traceback" in line

@@ -99,6 +99,12 @@ class Window:
         self.vault.mkdir()
         (self.folder / "asked").mkdir()
 
+    @property
+    def packages(self) -> Path:
+        """Where this FreeCAD looks for additional Python packages."""
+        base = self.home / "AdditionalPythonPackages"
+        return base if self.freecad.version < (1, 0) else base / f"py{self.freecad.python.replace('.', '')}"
+
     def environment(self) -> dict[str, str]:
         """Everything of the user's is in the test's folder."""
         return {
