@@ -10,7 +10,7 @@ def test_a_window_serves_all_tests_of_its_version() -> None:
     """Whatever else the test is called with; another version is another window."""
     file = "tests/freecad/test_gui_story.py"
     first, second = group_of(f"{file}::test_one[0.20]"), group_of(f"{file}::test_two[upload-0.20]")
-    assert first == second
+    assert first == second == group_of(f"{file}::test_three[0.20-dark-2]")
     assert first != group_of(f"{file}::test_one[1.0]")
     assert first != group_of("tests/freecad/test_gui_corners.py::test_one[0.20]")
 

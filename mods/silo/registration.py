@@ -9,8 +9,6 @@ interrupted, the next run finds the intent, asks the server for that UUID, and g
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 import uuid
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -20,6 +18,7 @@ from typing import Any, Protocol
 from silo.bom.errors import InputError, SiloError
 from silo.bom.model import BomEntry
 from silo.bom.naming import Proposal
+from silo.durable import replacing
 
 # Servers that give UUIDs of their own still keep properties: this one finds an item made before a crash.
 REGISTRATION_PROPERTY = "registration_id"
@@ -98,12 +97,8 @@ class Journal:
 
     def _write(self, known: Mapping[str, str]) -> None:
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=self.path.parent, prefix=self.path.name, suffix=".new")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            json.dump(known, file, indent=1)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(name, self.path)
+        with replacing(self.path) as file:
+            file.write(json.dumps(known, indent=1).encode())
 
 
 def component_key(entry: BomEntry) -> str:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import IO
 
 from silo.bom.errors import NotFoundError
+from silo.durable import sync_folder
 from silo_server.services.revisions import StoredFile
 
 CHUNK = 1024 * 1024
@@ -68,20 +69,10 @@ class FileStore:
             target = self._place(digest.hexdigest())
             target.parent.mkdir(parents=True, exist_ok=True)
             os.replace(temporary, target)
-            _flush_folder(target.parent)
+            sync_folder(target.parent)
         finally:
             temporary.unlink(missing_ok=True)
         return digest.hexdigest(), size
-
-
-def _flush_folder(folder: Path) -> None:
-    # The name of a file is durable only with its folder; Windows neither needs nor allows this.
-    if os.name == "posix":
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
 
 
 def clean_name(name: str) -> str:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import pytest
 
-_VERSION = re.compile(r"\[(?:.*-)?(\d+\.\d+)\]$")
+_VERSION = re.compile(r"[\[-](\d+\.\d+)(?=[\]-])")
 
 
 def group_of(test_id: str) -> str:

@@ -15,7 +15,6 @@ import json
 import logging
 import os
 import stat
-import tempfile
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -24,6 +23,7 @@ from typing import Any
 
 from silo.api.address import ServerAddress
 from silo.bom.errors import ConfigError
+from silo.durable import replacing
 from silo.folders import config_folder
 
 log = logging.getLogger("silo.api")
@@ -167,16 +167,9 @@ def _warn_if_open(path: Path, mode: int) -> None:
 def _write_private(path: Path, text: str) -> None:
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        # mkstemp makes the file for its owner only, before a byte of the token is in it.
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=path.name)
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                file.write(text)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(name, path)
-        finally:
-            Path(name).unlink(missing_ok=True)
+        # The new file is its owner's alone before a byte of the token is in it.
+        with replacing(path) as file:
+            file.write(text.encode())
     except OSError as error:
         raise ConfigError(
             f"{path}: the configuration cannot be written ({error.strerror or error})"

@@ -4,8 +4,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
-import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
@@ -17,6 +15,7 @@ from silo.api.replies import error_of
 from silo.api.transport import MAX_ERROR, Call, Cancel, Transport
 from silo.api.wire import Revision
 from silo.bom.errors import DocumentError, ServerFaultError
+from silo.durable import replacing
 
 MAX_DOWNLOAD = 4 << 30
 
@@ -108,19 +107,8 @@ def _write(path: Path, pieces: Iterator[bytes], total: int, on_progress: Progres
 
 @contextmanager
 def _replacing(path: Path) -> Iterator[BinaryIO]:
-    # A temporary file beside the target, so that the rename at the end stays within one file system.
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{path.name[:50]}.", suffix=".part", dir=path.parent)
-    except OSError as error:
-        raise DocumentError(str(path), f"cannot be written here ({error.strerror})") from error
-    temporary = Path(name)
-    try:
-        with os.fdopen(handle, "wb") as file:
+        with replacing(path) as file:
             yield file
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(path)
     except OSError as error:
         raise DocumentError(str(path), f"cannot be written ({error.strerror or error})") from error
-    finally:
-        temporary.unlink(missing_ok=True)

@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from silo.bom.errors import DocumentError, InputError
+from silo.durable import sync_folder
 
 _ORPHAN_AGE = 3600.0
 _BLOCK = 1 << 20
@@ -186,7 +187,7 @@ class Store:
                 write.flush()
                 os.fsync(write.fileno())
             os.replace(partial, target)
-            _sync_folder(self.copies)
+            sync_folder(self.copies)
         except OSError as error:
             partial.unlink(missing_ok=True)
             raise DocumentError(
@@ -322,13 +323,3 @@ def _private(path: Path) -> Iterator[Any]:
     handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_BINARY", 0), 0o600)
     with os.fdopen(handle, "wb") as file:
         yield file
-
-
-def _sync_folder(folder: Path) -> None:
-    # A rename is on disk only when its folder is; Windows has no such call and needs none.
-    if os.name == "posix":
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)

@@ -17,6 +17,7 @@ from pathlib import Path
 
 from silo.bom.errors import DocumentError
 from silo.bom.identity import META_KEY, meta_key
+from silo.durable import sync_folder
 from silo.fcstd.container import DOCUMENT_XML, ContainerFile, FileState
 from silo.fcstd.inflate import Inflater
 from silo.fcstd.library import Library
@@ -149,7 +150,7 @@ def _write(path: str, state: FileState, content: bytes, key: str, identity: str)
         with contextlib.suppress(OSError):
             os.unlink(temporary)
         raise
-    _sync_folder(folder)
+    sync_folder(folder)
 
 
 def _read_back(path: str, temporary: str, key: str, identity: str) -> None:
@@ -181,14 +182,3 @@ def _state(path: str) -> FileState | None:
         return FileState.of(os.stat(path))
     except OSError:
         return None
-
-
-def _sync_folder(folder: str) -> None:
-    # So that the new name survives a power cut; Windows cannot open folders.
-    if os.name != "posix":
-        return
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

@@ -7,8 +7,6 @@ One small JSON file in the user's data folder. Losing it costs a repeated questi
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +14,7 @@ from pathlib import Path
 from silo.bom.findings import Finding, FindingCode
 from silo.bom.identity import walk_entries
 from silo.bom.model import Extraction
+from silo.durable import replacing
 from silo.folders import data_folder
 
 
@@ -63,9 +62,7 @@ class Decisions:
     def _write(self, known: dict[str, list[str]]) -> None:
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
-            handle, name = tempfile.mkstemp(dir=self._path.parent, suffix=".new")
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                json.dump(known, file, indent=1)
-            os.replace(name, self._path)
+            with replacing(self._path) as file:
+                file.write(json.dumps(known, indent=1).encode())
         except OSError:
             return

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Files that are replaced whole or not at all, and stay replaced after a power cut. Standard library only."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+
+@contextmanager
+def replacing(path: Path | str) -> Iterator[BinaryIO]:
+    """Write the new content of a file: at any moment ``path`` has all of the old content or all of the new.
+
+    The new file can be read by its owner only. Where writing fails or the block raises, the old content stays
+    and nothing lies beside it. Raises OSError.
+    """
+    target = Path(path)
+    # Beside the target, so that the rename at the end stays within one file system.
+    handle, temporary = tempfile.mkstemp(prefix=f".{target.name[:50]}.", suffix=".part", dir=target.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(temporary, target)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+    sync_folder(target.parent)
+
+
+def sync_folder(folder: Path | str) -> None:
+    """Put the names in a folder on disk: a rename is there only with its folder. Raises OSError."""
+    if os.name != "posix":  # Windows neither needs nor allows it
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""A file is replaced whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from silo.durable import replacing
+
+
+@pytest.mark.parametrize("before", [None, b"old"])
+def test_the_new_content_is_there_in_one_step(tmp_path: Path, before: bytes | None) -> None:
+    """While it is being written, the name has what it had."""
+    path = tmp_path / "journal.json"
+    if before is not None:
+        path.write_bytes(before)
+    with replacing(path) as file:
+        file.write(b"new")
+        file.flush()
+        assert (path.read_bytes() if path.exists() else None) == before
+    assert path.read_bytes() == b"new"
+    assert os.listdir(tmp_path) == ["journal.json"]
+
+
+def test_a_failure_leaves_the_old_content_and_nothing_else(tmp_path: Path) -> None:
+    """Whatever the block raises, also a stop by the user."""
+    path = tmp_path / "journal.json"
+    path.write_bytes(b"old")
+
+    def stopped_halfway() -> None:
+        with replacing(path) as file:
+            file.write(b"half")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        stopped_halfway()
+    assert path.read_bytes() == b"old"
+    assert os.listdir(tmp_path) == ["journal.json"]
+
+
+def test_a_folder_that_is_not_there_is_an_error(tmp_path: Path) -> None:
+    """It is not made: the caller knows whether it should be."""
+    with pytest.raises(FileNotFoundError), replacing(tmp_path / "none" / "x"):
+        pass
+
+
+@pytest.mark.skipif(os.name != "posix", reason="modes of POSIX")
+def test_it_belongs_to_its_owner_alone(tmp_path: Path) -> None:
+    """What is kept by programs may hold a token."""
+    with replacing(tmp_path / "x") as file:
+        file.write(b"secret")
+    assert (tmp_path / "x").stat().st_mode & 0o077 == 0
+
+
+def test_a_name_of_any_length_can_be_replaced(tmp_path: Path) -> None:
+    """The name of the temporary file does not become too long."""
+    path = tmp_path / ("n" * 255)
+    with replacing(path) as file:
+        file.write(b"x")
+    assert path.read_bytes() == b"x"
