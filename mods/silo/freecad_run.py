@@ -16,12 +16,12 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
 
-from silo.bom.errors import ConfigError, DocumentError, InputError, SiloError
+from silo.bom.errors import CancelledError, ConfigError, DocumentError, InputError, SiloError
 from silo.bom.model import Extraction
 from silo.bom.snapshot import from_plain
 
@@ -78,7 +78,8 @@ def run_freecad(
     rest = [os.path.abspath(top) for top in tops]
     told = dict(zip(rest, tops, strict=True))
     while rest:
-        with _Run(freecadcmd, rest, assembly, timeout_s, env or {}) as run:
+        job = {"tops": rest, **({"assembly": assembly} if assembly is not None else {})}
+        with FreeCADRun(freecadcmd, HEADLESS, job, timeout_s, env or {}) as run:
             for line in run.lines():
                 path = rest.pop(0)
                 yield told[path], _result(line)
@@ -90,22 +91,32 @@ def run_freecad(
 
 def _result(line: Mapping[str, Any]) -> Extraction | SiloError:
     error = line.get("error")
-    if error is None:
-        return from_plain(line["extraction"])
+    return from_plain(line["extraction"]) if error is None else told_error(error)
+
+
+def told_error(error: Mapping[str, str]) -> SiloError:
+    """An error that the script inside FreeCAD wrote into its lines."""
     if error.get("path") and error.get("reason"):
         return DocumentError(error["path"], error["reason"])
     return InputError(error["message"])
 
 
 @dataclass
-class _Run:
-    """One process, over as many files as it survives."""
+class FreeCADRun:
+    """One process that does one job, and writes its results as JSON lines.
+
+    script
+        runs inside FreeCAD, with ``job`` and the path for the ``lines`` as JSON in ``SILO_ARGS``.
+    timeout_s
+        for one line, FreeCAD's start included.
+    """
 
     freecadcmd: str
-    tops: list[str]
-    assembly: str | None
+    script: Path
+    job: Mapping[str, Any]
     timeout_s: float
     env: Mapping[str, str]
+    cancelled: Callable[[], bool] | None = None
     begun: bool = False
     timed_out: bool = False
     _folder: tempfile.TemporaryDirectory[str] = field(
@@ -121,14 +132,13 @@ class _Run:
     def _log(self) -> Path:
         return Path(self._folder.name) / "log.txt"
 
-    def __enter__(self) -> _Run:
+    def __enter__(self) -> FreeCADRun:
         self._results.touch()
-        job = {"tops": self.tops, "assembly": self.assembly, "lines": str(self._results)}
         env = {
             **os.environ,
             **self.env,
-            "SILO_SCRIPT": str(HEADLESS),
-            "SILO_ARGS": json.dumps({key: value for key, value in job.items() if value is not None}),
+            "SILO_SCRIPT": str(self.script),
+            "SILO_ARGS": json.dumps({**self.job, "lines": str(self._results)}),
         }
         try:
             with open(self._log, "wb") as log:
@@ -153,7 +163,7 @@ class _Run:
         self._folder.cleanup()
 
     def lines(self) -> Iterator[dict[str, Any]]:
-        """The results as they are written; ends with the process, or with its time."""
+        """The results as they are written; ends with the process, or with its time. CancelledError."""
         assert self._process is not None  # entered
         deadline = time.monotonic() + self.timeout_s
         with open(self._results, encoding="utf-8") as results:
@@ -161,16 +171,20 @@ class _Run:
                 # Asked first: what a process wrote before it ended is read in this same round.
                 over = self._process.poll() is not None
                 for line in _complete_lines(results):
+                    if "stage" in line:
+                        # How far it is, within the file's own time.
+                        yield line
+                        continue
                     deadline = time.monotonic() + self.timeout_s
-                    if "begun" in line:
-                        self.begun = True
-                    else:
-                        self.begun = False
+                    self.begun = "begun" in line
+                    if not self.begun:
                         yield line
                         # The reader may have taken its time; FreeCAD's runs from now.
                         deadline = time.monotonic() + self.timeout_s
                 if over:
                     return
+                if self.cancelled is not None and self.cancelled():
+                    raise CancelledError("reading in FreeCAD was cancelled")
                 if time.monotonic() > deadline:
                     self.timed_out = True
                     return
