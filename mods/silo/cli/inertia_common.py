@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from silo.bom.errors import ConfigError, InputError
 from silo.cli import common
+from silo.inertia.wording import counted
 
 if TYPE_CHECKING:
     from silo.inertia.bom import BOMParser
@@ -311,11 +312,6 @@ def _say(text: str) -> None:
     from silo.cli.show import plain
 
     print(plain(text), file=sys.stderr)
-
-
-def counted(number: int, what: str) -> str:
-    """ "1 item", "2 items"."""
-    return f"{number} {what}{'' if number == 1 else 's'}"
 
 
 def names_of(values: Sequence[str], limit: int = 8) -> str:

@@ -13,6 +13,7 @@ from silo.inertia.bom.rows import BOMEntry, BomTable
 from silo.inertia.codes import Decided
 from silo.inertia.names import plain
 from silo.inertia.products import Product
+from silo.inertia.wording import counted
 
 MASS_TOLERANCE = 0.02
 """Relative: how well density times volume must fit a mass to decide between rows (quantum apart)."""
@@ -145,8 +146,8 @@ def _in_order(state: _Open) -> None:
             product,
             bundle,
             Decided.ORDER,
-            f"{left[0]} parts and {left[1]} rows named “{product.name}” cannot be told apart by parent, "
-            f"quantity or mass; in order of appearance this one got line {lines}",
+            f"{counted(left[0], 'part')} and {counted(left[1], 'row')} named “{product.name}” cannot be told "
+            f"apart by parent, quantity or mass; in order of appearance this one got line {lines}",
         )
 
 

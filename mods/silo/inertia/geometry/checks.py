@@ -13,6 +13,7 @@ from silo.inertia.geometry.graph import bottom_up
 from silo.inertia.geometry.mesh import Floats
 from silo.inertia.geometry.names import has_lost_characters
 from silo.inertia.model import GeometryCode, GeometryProblem, Instance, Prototype
+from silo.inertia.wording import counted
 
 if TYPE_CHECKING:
     from silo.inertia.geometry.siblings import Siblings
@@ -72,7 +73,8 @@ def split_problems(siblings: Siblings) -> list[GeometryProblem]:
         problems.append(
             GeometryProblem(
                 GeometryCode.EXTERNAL_FILE,
-                f"a split assembly: geometry read from {len(siblings.used)} files beside it ({names}{more})",
+                f"a split assembly: geometry read from {counted(len(siblings.used), 'file')} beside it "
+                f"({names}{more})",
             )
         )
     if siblings.missing:
@@ -80,8 +82,8 @@ def split_problems(siblings: Siblings) -> list[GeometryProblem]:
         problems.append(
             GeometryProblem(
                 GeometryCode.NO_GEOMETRY,
-                f"{len(siblings.missing)} products have no geometry here or beside the file ({names}); "
-                "put their files into its folder, or export the assembly as one file",
+                f"{counted(len(siblings.missing), 'product')} without geometry, here or beside the file "
+                f"({names}); put their files into its folder, or export the assembly as one file",
             )
         )
     return problems
@@ -142,7 +144,7 @@ def scaled_problems(instances: Sequence[Instance]) -> list[GeometryProblem]:
     return [
         GeometryProblem(
             GeometryCode.SCALED,
-            f"{len(scaled)} placements scale their part ({', '.join(scaled[:3])}{more}); "
+            f"placements that scale their part: {len(scaled)} ({', '.join(scaled[:3])}{more}); "
             "volume and inertia are scaled with it, a mass from the BOM is not",
         )
     ]

@@ -11,6 +11,7 @@ from silo.bom.errors import DocumentError, InputError
 from silo.bom.kinds import Kind, kind_of, members
 from silo.bom.roots import DocumentRoot, choose_assembly
 from silo.inertia.geometry.freecad_facts import Facts
+from silo.inertia.wording import listed
 
 Note = Callable[[str, str], None]
 """Takes a remark: its code, and a plain sentence."""
@@ -42,14 +43,14 @@ _CONSUMING = frozenset(
 
 def counted(container: Any, facts: Facts, note: Note) -> list[Any]:
     """The members that have a mass of their own."""
-    listed = list(_flat(container, facts, note, set()))
-    eaten = {name for member in listed for name in _consumed(member)}
-    left = [m for m in listed if object_name(m) not in eaten or kind_of(m) is Kind.CONTAINER]
+    found = list(_flat(container, facts, note, set()))
+    eaten = {name for member in found for name in _consumed(member)}
+    left = [m for m in found if object_name(m) not in eaten or kind_of(m) is Kind.CONTAINER]
     hidden = [m for m in left if kind_of(m) is Kind.LOCAL and own(m, "Visibility") is False]
     shown = [m for m in left if kind_of(m) is Kind.LOCAL and own(m, "Visibility") is not False]
     if hidden and shown:
-        names = ", ".join(label_of(m) for m in hidden[:4])
-        note("hidden", f"hidden bodies beside visible ones are not counted: {names}")
+        names = listed([label_of(m) for m in hidden])
+        note("hidden", f"bodies hidden beside visible ones are not counted: {names}")
         left = [m for m in left if m not in hidden]
     return left
 
@@ -62,14 +63,17 @@ def _flat(container: Any, facts: Facts, note: Note, seen: set[str]) -> Iterable[
         seen.add(name)
         kind = kind_of(member)
         if own(member, "Suppressed") is True or own(member, "SiloBomExclude") is True:
-            note("not_counted", f"{label_of(member)} is suppressed or excluded: no mass")
+            note(
+                "not_counted",
+                f"“{label_of(member)}” is suppressed, or excluded from the BOM; its mass is not counted",
+            )
         elif kind is Kind.FOLDER:
             yield from _flat(member, facts, note, seen)
         elif kind in (Kind.LOCAL, Kind.FOREIGN):
             if facts.shape(member) is not None:
                 yield member
             elif derived(member, "Mesh::Feature"):
-                note("not_counted", f"{label_of(member)} is a mesh, and has no mass here")
+                note("not_counted", f"“{label_of(member)}” is a mesh and no solid; its mass is not counted")
         elif kind is not Kind.NOTHING and not name.startswith("CopyOnChangeGroup"):
             yield member
 

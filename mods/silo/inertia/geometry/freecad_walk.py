@@ -81,7 +81,7 @@ class Walk:
         if key in self.nodes:
             return key
         if key in self._open or len(self._open) > MAX_DEPTH:
-            self.note("cycle", f"{label_of(obj)} contains itself; it is left out there")
+            self.note("cycle", f"“{label_of(obj)}” contains itself; it is left out where the ring closes")
             return self._nothing(obj, "it contains itself")
         self._open.append(key)
         if is_container(obj) or getattr(obj, "is_document_root", False):
@@ -187,7 +187,8 @@ class Walk:
             return [(self._broken(link), np.eye(4))]
         steps = steps_of(sub)
         if steps is None:  # a reference to a face or an edge of something is no component
-            self.note("not_counted", f"{label_of(link)} refers to {sub} of a part, and has no mass")
+            words = f"“{label_of(link)}” leads to {sub} of a part and not to a part; it has no mass"
+            self.note("not_counted", words)
             return []
         if flexible is not None and not is_assembly_link(target):
             return [(self.product(target, copies=flexible), np.eye(4))]
@@ -223,9 +224,8 @@ class Walk:
             return [Child(label_of(array), self.product(array), _metres(self.facts.placement(array)))]
         count = own(array, "Count", 0)
         if not places and isinstance(count, int) and count > 1:
-            self.note(
-                "not_counted", f"the array {label_of(array)} was saved without its placements; counted once"
-            )
+            words = f"the array “{label_of(array)}” was saved without its {count} placements; counted once"
+            self.note("not_counted", words)
         inside = self._resolved(base, own(array, "LinkTransform") is True, None, MAX_HOPS)
         outer = self.facts.placement(array)
         return [
@@ -239,11 +239,13 @@ class Walk:
         target = target[0] if isinstance(target, tuple) else target
         if target is not None and same_document(target.Document, link.Document):
             if own(link, "LinkCopyOnChangeSource") is not None:
-                self.note("variant", f"{label_of(link)} is a variant of its part; measured as the variant is")
+                words = f"“{label_of(link)}” is a variant of its part; its mass is that of the variant"
+                self.note("variant", words)
             else:
                 self.note(
                     "in_document",
-                    f"{label_of(link)} links within its own document: it has a mass, but no line in the BOM",
+                    f"“{label_of(link)}” is a link within its own document: its mass counts, "
+                    "though it is no line of the BOM",
                 )
 
 

@@ -28,6 +28,7 @@ from silo.inertia.geometry.scene import (
 )
 from silo.inertia.geometry.shading import Shaded, ellipsoid, shaded
 from silo.inertia.model import Assembly
+from silo.inertia.wording import counted
 
 _SMOOTH = 2
 """The picture is drawn this many times as large, and averaged."""
@@ -310,7 +311,8 @@ def _legend(
     _write(page, fitted(assembly.name, 15, room), left, y, 15)
     total = sum(view.props.mass for view in views if view.props is not None)
     y += 28
-    _write(page, f"{len([v for v in views if v.name])} links, {mass_words(total)}", left, y, 9.5, _FAINT)
+    links = counted(len([view for view in views if view.name]), "link")
+    _write(page, f"{links}, {mass_words(total)}", left, y, 9.5, _FAINT)
     y += 40
     for number, (view, colour) in enumerate(zip(views, colours, strict=True)):
         if y > height - 125 and number < len(views) - 1:

@@ -20,6 +20,7 @@ from silo.bom.errors import ConfigError, SiloError
 from silo.inertia.geometry import store
 from silo.inertia.geometry.options import Reading, ReadOptions
 from silo.inertia.model import GeometryCode, GeometryProblem
+from silo.inertia.wording import counted
 
 _COMPLAINT = re.compile(rb"ERR|Fail|\*\*\*|Exception|Unresolved", re.IGNORECASE)
 _COLOUR = re.compile(rb"\x1b\[[0-9;]*m")
@@ -87,7 +88,8 @@ def with_complaints(reading: Reading, lines: list[str]) -> Reading:
     if not lines:
         return reading
     problem = GeometryProblem(
-        GeometryCode.READER, f"the geometry kernel complained {len(lines)} times while reading: {lines[0]}"
+        GeometryCode.READER,
+        f"the geometry kernel complained {counted(len(lines), 'time')} while reading: {lines[0]}",
     )
     assembly = replace(reading.assembly, problems=(*reading.assembly.problems, problem))
     return replace(reading, assembly=assembly)
