@@ -6,7 +6,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
@@ -110,9 +110,10 @@ def add_push_options(parser: argparse.ArgumentParser) -> None:
     common.add_server_options(parser)
 
 
-def need_inertia_extra() -> None:
-    """One plain sentence where the extra is not installed."""
-    missing = [name for name in ("numpy", "OCP", "trimesh", "rapidfuzz", "yaml") if find_spec(name) is None]
+def need_inertia_extra(via: str = "files") -> None:
+    """One plain sentence where the extra is not installed; FreeCAD brings a geometry kernel of its own."""
+    wanted = ("numpy", "rapidfuzz") if via == "freecad" else ("numpy", "OCP", "trimesh", "rapidfuzz", "yaml")
+    missing = [name for name in wanted if find_spec(name) is None]
     if missing:
         raise ConfigError(
             f"mass and inertia need the packages of the extra “inertia” ({', '.join(missing)} not found); "
@@ -161,12 +162,17 @@ def check_targets(args: argparse.Namespace) -> None:
             raise InputError(f"{name}: there is no folder {Path(name).parent}")
 
 
-def read(path: str, args: argparse.Namespace, **more: Any) -> Assembly:
-    """The geometry, with progress on a terminal; Ctrl-C stops it at once."""
+def read(path: str, args: argparse.Namespace, *, via: str = "files", **more: Any) -> Assembly:
+    """The geometry, with progress on a terminal; Ctrl-C stops it at once. ``via``: who opens the file."""
     from dataclasses import replace
 
-    from silo.inertia.calculator import read_geometry
     from silo.inertia.geometry import ReadOptions
+
+    reader: Callable[[str, ReadOptions], Assembly]
+    if via == "freecad":
+        from silo.freecad_mass import read_in_freecad as reader
+    else:
+        from silo.inertia.calculator import read_geometry as reader
 
     options: ReadOptions = ReadOptions(
         mesh_unit=args.mesh_unit,
@@ -176,7 +182,7 @@ def read(path: str, args: argparse.Namespace, **more: Any) -> Assembly:
         **more,
     )
     with _progress(Path(path).name) as told:
-        return read_geometry(path, replace(options, progress=told))
+        return reader(path, replace(options, progress=told))
 
 
 @contextmanager

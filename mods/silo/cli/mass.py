@@ -34,6 +34,12 @@ def register(commands: Commands) -> None:
         metavar="RHO",
         help="kg/m³ of parts without a material (default: they count as zero, and are listed)",
     )
+    parser.add_argument(
+        "--via",
+        choices=("files", "freecad"),
+        default="files",
+        help="read the files directly (default), or let freecadcmd open and measure them",
+    )
     shared.add_geometry_options(parser)
     shared.add_result_options(parser)
     shared.add_push_options(parser)
@@ -42,7 +48,7 @@ def register(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Calculate and show; 1 for warnings with --strict, or items that a push did not find."""
-    shared.need_inertia_extra()
+    shared.need_inertia_extra(args.via)
     shared.check_targets(args)
     if args.default_density is not None and args.default_density <= 0:
         raise InputError(f"--default-density: wanted kg/m³ above 0, got {args.default_density:g}")
@@ -53,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
     parser = shared.bom_parser(args)
     table = parser.parse(args.bom) if args.bom else None
     materials = shared.material_table(args)
-    assembly = shared.read(args.top, args, object_name=args.assembly)
+    assembly = shared.read(args.top, args, via=args.via, object_name=args.assembly)
     name = assembly.name or "assembly"
     # A FreeCAD document is its own BOM: where it states no material, nobody does.
     options = Options(
