@@ -109,6 +109,8 @@ class Window:
         """Everything of the user's is in the test's folder."""
         return {
             "FREECAD_USER_HOME": str(self.home),
+            # Qt and Mesa map their shader caches into memory; FreeCADs that run at once must not share them.
+            "XDG_CACHE_HOME": str(self.folder / "cache"),
             "XDG_DATA_HOME": str(self.folder / "data"),
             "XDG_CONFIG_HOME": str(self.folder / "config"),
             "XDG_RUNTIME_DIR": str(self.folder / "runtime"),
