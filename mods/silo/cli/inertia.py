@@ -68,9 +68,7 @@ def register(commands: Commands) -> None:
 def run(args: argparse.Namespace) -> int:
     """Calculate and show; 1 for warnings with --strict, or items that a push did not find."""
     shared.need_inertia_extra()
-    shared.check_targets(args)
-    if args.default_density <= 0:
-        raise InputError(f"--default-density: wanted kg/m³ above 0, got {args.default_density:g}")
+    shared.check_options(args, asks_server=args.push and not args.dry_run)
     if args.urdf_out and not args.urdf:
         raise InputError("--urdf-out needs --urdf, the file to start from")
     if args.snippet and args.json:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -148,8 +149,21 @@ def material_table(args: argparse.Namespace) -> MaterialTable:
     return load_materials(args.materials, freecad=not args.no_freecad_materials)
 
 
-def check_targets(args: argparse.Namespace) -> None:
-    """Bad names of output files are told before minutes of reading, not after."""
+def check_options(args: argparse.Namespace, *, asks_server: bool) -> None:
+    """Bad numbers, output files and a missing server are told before minutes of reading, not after."""
+    density = args.default_density
+    if density is not None and not (density > 0 and math.isfinite(density)):
+        raise InputError(f"--default-density: wanted kg/m³ above 0, got {density:g}")
+    if not (args.timeout >= 0 and math.isfinite(args.timeout)):
+        raise InputError(f"--timeout: wanted seconds, 0 for no limit, got {args.timeout:g}")
+    if asks_server:
+        from silo.api.config import resolve_server
+
+        resolve_server(args.server, args.token)
+    _check_targets(args)
+
+
+def _check_targets(args: argparse.Namespace) -> None:
     bad = [name for name in args.report if Path(name).suffix.lower() not in REPORTS]
     if bad:
         raise InputError(f"--report writes {', '.join(REPORTS)}; got {', '.join(bad)}")

@@ -7,7 +7,6 @@ import argparse
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from silo.bom.errors import InputError
 from silo.cli import common
 from silo.cli import inertia_common as shared
 from silo.cli.common import Commands
@@ -49,9 +48,8 @@ def register(commands: Commands) -> None:
 def run(args: argparse.Namespace) -> int:
     """Calculate and show; 1 for warnings with --strict, or items that a push did not find."""
     shared.need_inertia_extra(args.via)
-    shared.check_targets(args)
-    if args.default_density is not None and args.default_density <= 0:
-        raise InputError(f"--default-density: wanted kg/m³ above 0, got {args.default_density:g}")
+    # The documents hold identities; their part numbers are the server's, for a preview as well.
+    shared.check_options(args, asks_server=args.push)
     from silo.inertia.calculator import Task, calculate
     from silo.inertia.links import Link, LinkMap
     from silo.inertia.massrule import Options

@@ -159,6 +159,14 @@ def test_snippets(run: Run, arm: Path, kind: str, words: str) -> None:
     assert ran.out.startswith("<")
 
 
+def test_the_picture_of_a_report_is_found_whatever_it_is_called(run: Run, arm: Path) -> None:
+    """Spaces and brackets in a file's name do not break the link in the Markdown."""
+    run("inertia", arm / "arm.step", "--report", arm / "my (first) report.md")
+    text = (arm / "my (first) report.md").read_text("utf-8")
+    assert "(my%20%28first%29%20report.png)" in text
+    assert (arm / "my (first) report.png").exists()
+
+
 def test_strict_and_allow(run: Run, arm: Path) -> None:
     """Any warning is a failure, unless it is allowed by its code."""
     command = ["inertia", arm / "arm.step", "--bom", arm / "bom.csv", "--strict"]
@@ -199,6 +207,10 @@ def test_bom_and_material_options_reach_the_calculation(run: Run, arm: Path) -> 
         (["--urdf", "bom.csv", "--frame", "own"], "no XML"),
         (["--snippet", "sdf", "--json"], "--report OUT.json"),
         (["--default-density", "0"], "above 0"),
+        (["--default-density", "nan"], "above 0"),
+        (["--default-density", "1e999"], "above 0"),
+        (["--timeout", "-1"], "--timeout"),
+        (["--push"], "no Silo server is configured"),
         (["--column", "mass"], "ROLE=HEADER"),
         (["--materials", "none.csv"], "none.csv"),
     ],

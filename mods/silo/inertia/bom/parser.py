@@ -16,6 +16,7 @@ from silo.inertia.bom.numbers import Mark, parse_number
 from silo.inertia.bom.rows import BomCode, BOMEntry, BomTable, BomWarning
 from silo.inertia.bom.sheet import Row, Sheet, read_sheet
 from silo.inertia.bom.structure import with_structure
+from silo.inertia.wording import counted
 
 
 class BOMParser:
@@ -155,7 +156,7 @@ def _check_length(sheet: Sheet, row: Row, name: str, warnings: list[BomWarning])
         warnings.append(
             BomWarning(
                 BomCode.ROW_LENGTH,
-                f"has {len(row.cells)} cells where the header has {len(sheet.header)}; "
+                f"has {counted(len(row.cells), 'cell')} where the header has {len(sheet.header)}; "
                 "a comma without quotes shifts the columns",
                 row.line,
                 name,
@@ -165,7 +166,7 @@ def _check_length(sheet: Sheet, row: Row, name: str, warnings: list[BomWarning])
         warnings.append(
             BomWarning(
                 BomCode.ROW_LENGTH,
-                f"has {len(row.cells)} cells where the header has {len(sheet.header)}; "
+                f"has {counted(len(row.cells), 'cell')} where the header has {len(sheet.header)}; "
                 "the missing ones count as empty",
                 row.line,
                 name,

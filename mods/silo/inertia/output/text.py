@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
+from urllib.parse import quote
 
 from rich.console import Group, RenderableType
 from rich.table import Table
@@ -157,9 +158,9 @@ def _places(where: Sequence[str]) -> str:
 def report_markdown(report: InertiaReport, picture: str | None = None) -> str:
     """The report as Markdown; ``picture``: path of an image, relative to the file it goes into."""
     out = [f"# Mass properties of {_cell(report.assembly or 'the assembly')}", ""]
-    out += [f"Geometry: `{report.source}`  ", f"BOM: `{report.bom}`" if report.bom else "BOM: none", ""]
+    out += [f"Geometry: {_cell(report.source)}  ", f"BOM: {_cell(report.bom) or 'none'}", ""]
     if picture:
-        out += [f"![Links with centres of mass and inertia ellipsoids]({picture})", ""]
+        out += [f"![Links with centres of mass and inertia ellipsoids]({quote(picture)})", ""]
     out += ["## Links", "", *_link_rows(report), "", *_frames(report), ""]
     out += ["## Parts", "", *_part_rows(report), ""]
     if report.unclaimed:
