@@ -75,6 +75,13 @@ def test_a_part_closed_by_hand_never_reads_as_removed(session: dict[str, Any]) -
     assert "bolt.FCStd" in answer["message"]
 
 
+def test_a_lost_original_of_a_changed_copy_is_named(session: dict[str, Any]) -> None:
+    """FreeCAD shows the copy and says nothing; the file that a person has to bring back is told."""
+    answer = session["lost_original"]
+    assert (answer["bom"], answer["findings"], answer["blocked"]) == ({}, ["missing_file"], True)
+    assert "copy_on_change/bolt.FCStd is missing (it is the original of a changed copy)" in answer["message"]
+
+
 def test_a_document_that_was_never_saved_can_be_read(session: dict[str, Any]) -> None:
     """It has no file and no components yet."""
     assert session["unsaved_document"] == {"bom": {}, "findings": ["empty_bom"], "blocked": False}

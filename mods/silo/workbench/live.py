@@ -99,10 +99,10 @@ def canonical_paths() -> Callable[[str], str]:
     return lru_cache(maxsize=None)(os.path.realpath)
 
 
-def stored_target(link: Any) -> tuple[str, str] | None:
+def stored_target(link: Any, name: str = "LinkedObject") -> tuple[str, str] | None:
     """File and object ``Name`` that a link has stored; ("", "") where it was never set, None where untold."""
     try:
-        packed = link.dumpPropertyContent("LinkedObject", Compression=0)
+        packed = link.dumpPropertyContent(name, Compression=0)
         with zipfile.ZipFile(io.BytesIO(bytes(packed))) as content:
             text = content.read("Persistence.xml").decode("utf-8", "replace")
     except (AttributeError, NameError, RuntimeError, KeyError, zipfile.BadZipFile):
@@ -115,16 +115,23 @@ def stored_target(link: Any) -> tuple[str, str] | None:
 
 
 class LinkInspector:
-    """Tells why links have no target; for one walk, so that no file is looked at twice."""
+    """Tells why links have no target, or only a changed copy of a lost original.
+
+    For one walk, so that no file is looked at twice.
+    """
 
     def __init__(self) -> None:
         self._library: Any = None
 
     def __call__(self, link: Any) -> LinkProblem | None:
-        """None where that is not known, or where the link has a target."""
-        if getattr(link, "LinkedObject", None) is not None:
-            return None
-        stored = stored_target(link)
+        """None where that is not known, or where nothing is missing."""
+        if getattr(link, "LinkedObject", None) is None:
+            stored = stored_target(link)
+        elif getattr(link, "LinkCopyOnChangeSource", None) is None:
+            stored = stored_target(link, "LinkCopyOnChangeSource")
+            stored = stored if stored != ("", "") else None
+        else:
+            stored = None
         if stored is None:
             return None
         file, name = stored

@@ -102,6 +102,13 @@ def broken_file() -> str:
     return "opened"
 
 
+def lost_original() -> dict[str, Any]:
+    folder = CASES / "copy_on_change"
+    (folder / "bolt.FCStd").unlink()
+    found = live.extract_live(saving.open_fully(str(folder / "top.FCStd")))
+    return {**told(found), "message": found.findings[0].message}
+
+
 def main() -> None:
     answers = {}
     for step in (
@@ -111,6 +118,7 @@ def main() -> None:
         part_document_is_completed,
         closed_part,
         unsaved_document,
+        lost_original,
         hostile_file,
         broken_file,
     ):
