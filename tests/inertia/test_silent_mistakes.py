@@ -90,3 +90,62 @@ def test_a_row_that_is_no_total_clears_the_others(
     report = compute(asm, HEAD + rows)
     assert codes(report, "bolt") == ["row_total"]
     assert codes(report, "nut") == []
+
+
+def in_modules(*parts: Any) -> list[Any]:
+    """Two of each part in each of three modules."""
+    return [
+        (f"top/module<{m}>/{part.name}{i}", part, None, f"top/module/{part.name}")
+        for part in parts
+        for m in range(3)
+        for i in range(2)
+    ]
+
+
+STRUCTURED = "Item,Quantity,Material,Mass,Name\n"
+
+
+def test_quantities_of_a_structured_bom_are_read_one_way(
+    assemble: Fixture, compute: Fixture, part: Fixture, codes: Fixture
+) -> None:
+    """Six bolts in three modules of two: the bolts prove that quantities are per parent.
+
+    So the clip of which there are six is the row of 2 × 3, and the one of which there are two is that of the
+    base; read either way, both rows would fit both clips.
+    """
+    few = cube("clip", 0.03, key="few")
+    placed = in_modules(cube("bolt"), cube("clip", 0.02, key="many"))
+    placed += [(f"top/base/clip{i}", few, None, "top/base/clip") for i in range(2)]
+    rows = (
+        "1,1,,,base frame\n1.1,2,,50.00 g,clip\n2,3,,,module kit\n2.1,2,,10.00 g,bolt\n2.2,2,,20.00 g,clip\n"
+    )
+    report = compute(assemble(*placed), STRUCTURED + rows)
+    clips = {p.quantity: p.mass for _, p in report.parts() if p.name == "clip"}
+    assert clips == {6: 0.02, 2: 0.05}
+    assert "ambiguous" not in codes(report)
+    assert "count_differs" not in codes(report)
+
+
+def test_quantities_that_are_sums_already(assemble: Fixture, compute: Fixture, codes: Fixture) -> None:
+    """The same assembly from a tool that lists six bolts below the module: no false alarm, no other clip."""
+    few = cube("clip", 0.03, key="few")
+    placed = in_modules(cube("bolt"), cube("clip", 0.02, key="many"))
+    placed += [(f"top/base/clip{i}", few, None, "top/base/clip") for i in range(2)]
+    rows = (
+        "1,1,,,base frame\n1.1,2,,50.00 g,clip\n2,3,,,module kit\n2.1,6,,10.00 g,bolt\n2.2,6,,20.00 g,clip\n"
+    )
+    report = compute(assemble(*placed), STRUCTURED + rows)
+    clips = {p.quantity: p.mass for _, p in report.parts() if p.name == "clip"}
+    assert clips == {6: 0.02, 2: 0.05}
+    assert not {"ambiguous", "count_differs"} & set(codes(report))
+
+
+def test_a_wrong_quantity_is_told_although_another_reading_would_fit(
+    assemble: Fixture, compute: Fixture, codes: Fixture
+) -> None:
+    """The bolts prove "per parent", so that a row of 6 in a module of three means 18 and not 6."""
+    placed = in_modules(cube("bolt"), cube("nut"), cube("pin"))
+    rows = "1,3,,,module\n1.1,2,,10.00 g,bolt\n1.2,2,,10.00 g,nut\n1.3,6,,10.00 g,pin\n"
+    report = compute(assemble(*placed), STRUCTURED + rows)
+    assert codes(report) == ["count_differs"]
+    assert report.warnings[0].part_name == "pin"

@@ -6,8 +6,10 @@ Rows with equal data are one :class:`Bundle`: nobody needs to tell them apart.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import TypeVar
 
 from silo.inertia.bom.rows import BOMEntry, BomTable
 from silo.inertia.codes import Decided
@@ -66,11 +68,57 @@ class _Open:
         self.pairs.append(Pair(product, bundle, decided, doubt))
 
 
+class Reading(StrEnum):
+    """What a quantity in a structured BOM counts."""
+
+    PER_PARENT = "per_parent"  # pieces in one parent
+    TOTAL = "total"  # pieces in the whole product
+
+
+BOTH = frozenset(Reading)
+
+
+def readings(products: Sequence[Product], table: BomTable) -> frozenset[Reading]:
+    """Which reading of the quantities the parts that nothing can be mistaken for agree on; else both.
+
+    Only rows count on which the readings differ, of a name that one row and one product have.
+    """
+    by_name = _once((plain(product.name), product) for product in products)
+    rows = _once((plain(row.name), row) for row in table.rows if not row.has_children)
+    fits = dict.fromkeys(Reading, 0)
+    for name in by_name.keys() & rows.keys():
+        row, count = rows[name], by_name[name].count
+        total = table.total_quantity(row)
+        if row.quantity is None or total is None or row.quantity == total:
+            continue
+        fits[Reading.PER_PARENT] += count == total
+        fits[Reading.TOTAL] += count == row.quantity
+    best = [reading for reading in Reading if fits[reading]]
+    if len(best) == 2 and max(fits.values()) >= 2 * min(fits.values()):
+        best = [max(fits, key=lambda reading: fits[reading])]
+    return frozenset(best) if len(best) == 1 else BOTH
+
+
+_T = TypeVar("_T")
+
+
+def _once(pairs: Iterable[tuple[str, _T]]) -> dict[str, _T]:
+    """What stands under a name of its own."""
+    found: dict[str, list[_T]] = {}
+    for name, value in pairs:
+        found.setdefault(name, []).append(value)
+    return {name: values[0] for name, values in found.items() if len(values) == 1}
+
+
 def assign(
-    products: Sequence[Product], rows: Sequence[BOMEntry], table: BomTable, density: DensityOf
+    products: Sequence[Product],
+    rows: Sequence[BOMEntry],
+    table: BomTable,
+    density: DensityOf,
+    read: frozenset[Reading] = BOTH,
 ) -> list[Pair]:
     """Pairs of products and rows of one name. A product without a pair has no row."""
-    bundles = bundled(rows, table)
+    bundles = bundled(rows, table, read)
     if len(bundles) == 1:
         return _one_bundle(list(products), bundles[0], density)
     state = _Open(list(products), bundles)
@@ -84,19 +132,21 @@ def assign(
     return state.pairs
 
 
-def bundled(rows: Sequence[BOMEntry], table: BomTable) -> list[Bundle]:
+def bundled(rows: Sequence[BOMEntry], table: BomTable, read: frozenset[Reading] = BOTH) -> list[Bundle]:
     """Rows of one name, those with equal data together, in the order of their first row."""
     groups: dict[tuple[str | None, float | None], list[BOMEntry]] = {}
     for row in rows:
         groups.setdefault(row.data, []).append(row)
-    return [_bundle(tuple(group), table) for group in groups.values()]
+    return [_bundle(tuple(group), table, read) for group in groups.values()]
 
 
-def _bundle(rows: tuple[BOMEntry, ...], table: BomTable) -> Bundle:
+def _bundle(rows: tuple[BOMEntry, ...], table: BomTable, read: frozenset[Reading]) -> Bundle:
     # Quantities of a structured BOM are per parent here and per product there; either may be meant.
-    each = [row.quantity for row in rows]
-    total = [table.total_quantity(row) for row in rows]
-    sums = {sum(q for q in kind if q is not None) for kind in (each, total) if None not in kind}
+    kinds = {
+        Reading.TOTAL: [row.quantity for row in rows],
+        Reading.PER_PARENT: [table.total_quantity(row) for row in rows],
+    }
+    sums = {sum(q for q in kinds[r] if q is not None) for r in read if None not in kinds[r]}
     above = {table.rows[row.parent].name if row.parent is not None else "" for row in rows}
     return Bundle(rows, frozenset(sums), frozenset(plain(name) for name in above))
 

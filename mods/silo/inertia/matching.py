@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
 
-from silo.inertia.assign import Bundle, DensityOf, Pair, assign
+from silo.inertia.assign import Bundle, DensityOf, Pair, Reading, assign, readings
 from silo.inertia.bom.rows import BOMEntry, BomTable
 from silo.inertia.codes import Decided, Rule
 from silo.inertia.names import bare, could_be, is_lossy, plain
@@ -47,7 +47,8 @@ def match(
     parts: Sequence[Product], groups: Sequence[Product], table: BomTable, density: DensityOf
 ) -> Matching:
     """Match leaf products first, then sub-assemblies with the rows that no leaf used."""
-    claims = _Claims(table)
+    read = readings(parts, table)
+    claims = _Claims(table, read)
     by_part = _tiers(parts, _rows_for_parts(table), table, density, claims)
     by_group = _tiers(groups, table.rows, table, lambda row, product: None, claims)
     unused = tuple(row for row in table.rows if not claims.used(row) and not row.has_children)
@@ -57,8 +58,9 @@ def match(
 class _Claims:
     """Which row was given to how many instances."""
 
-    def __init__(self, table: BomTable) -> None:
+    def __init__(self, table: BomTable, read: frozenset[Reading]) -> None:
         self._table = table
+        self.read = read
         self._count: dict[int, int] = defaultdict(int)
         self._used: set[int] = set()
 
@@ -74,7 +76,7 @@ class _Claims:
         """A used row still takes a product where its quantity leaves room for all of its instances."""
         if not self.used(row):
             return True
-        total = self._table.total_quantity(row)
+        total = self._table.total_quantity(row) if Reading.PER_PARENT in self.read else row.quantity
         return total is not None and self._count[id(row)] + product.count <= total
 
 
@@ -96,7 +98,7 @@ def _tiers(
         wanted = [product for product in products if product.key not in found]
         options = {p.key: [r for r in candidates(p) if claims.open_for(r, p)] for p in wanted}
         for same, theirs in _components(wanted, options):
-            for pair in assign(same, theirs, table, density):
+            for pair in assign(same, theirs, table, density, claims.read):
                 claims.take(pair)
                 found[pair.product.key] = Match(pair.bundle, rule, pair.decided, pair.doubt)
     return found

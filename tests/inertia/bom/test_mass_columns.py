@@ -87,3 +87,28 @@ def test_dotted_levels_are_item_numbers(bom: Bom) -> None:
     assert table["arm"].has_children
     assert [row.parent for row in table.rows] == [None, 0, 0]
     assert [row.level for row in table.rows] == [1, 2, 2]
+
+
+@pytest.mark.parametrize(
+    "header",
+    ["Mass (total)", "Total mass (kg)", "Weight [total] kg", "Masse (gesamt)", "Mass (extended)",
+     "Gewicht, gesamt", "Total weight, kg", "Summe Masse", "質量（合計）", "总重量"],
+)  # fmt: skip
+def test_a_header_that_says_total_is_no_mass_of_one_piece(bom: Bom, header: str) -> None:
+    """Wherever the word stands: half of the total is the mass of one of two."""
+    table = bom(f'Name,Quantity,Material,"{header}"\nplate,2,,0.600 kg\n')
+    assert table["plate"].mass_kg == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize("header", ["Mass (unit)", "Mass (each)", "Unit mass (g)", "Masse in g"])
+def test_a_header_that_says_each_is_that_of_one(bom: Bom, header: str) -> None:
+    """Other words beside it do not make it a total."""
+    assert bom(f"Name,Quantity,Material,{header}\nplate,2,,0.600 kg\n")["plate"].mass_kg == 0.6
+
+
+@pytest.mark.parametrize("mass", ["1e300 kg", "1e13 kg", "99999999999999 kg"])
+def test_a_mass_beyond_all_parts_is_told(bom: Bom, mass: str) -> None:
+    """Sums of it would not be finite; no part weighs a million million kilograms."""
+    table = bom(f"Name,Material,Mass\nplate,,{mass}\n")
+    assert table["plate"].mass_kg is None
+    assert codes(table) == [BomCode.UNREADABLE_MASS]

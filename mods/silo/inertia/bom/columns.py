@@ -52,7 +52,7 @@ _ALIASES: dict[Role, str] = {
         peso unitario; massa; massa unitaria; 質量; 重量; 单重; 質量 単体; 质量; 单件质量; 單重""",
     Role.TOTAL_MASS: """total mass; total weight; mass total; weight total; extended mass; extended weight;
         gesamtmasse; gesamtgewicht; masse totale; poids total; masa total; peso total; massa totale;
-        peso totale; 総質量; 総重量; 合計質量; 总质量; 总重; 總重""",
+        peso totale; 总重量; 総質量; 総重量; 合計質量; 总质量; 总重; 總重""",
     Role.QUANTITY: """quantity; qty; count; pieces; pcs; menge; anzahl; stückzahl; stück; quantité; qté; nb;
         cantidad; cant; quantità; q tà; qta; quantita; 数量; 個数; 員数; 數量""",
     Role.ITEM: """item; item no; index; pos; position; find number; find no; row; line; nr; lfd nr; rang;
@@ -110,6 +110,9 @@ class Columns:
         return bool({Role.NAME, Role.PART_NUMBER, Role.DESCRIPTION} & self.at.keys())
 
 
+_TOTAL_WORDS = frozenset(
+    {"total", "totale", "gesamt", "summe", "sum", "extended", "ext", "row", "line", "zeile"}
+)
 _MASSES = (Role.MASS, Role.TOTAL_MASS)
 _ONE_ONLY = (*_MASSES, Role.MATERIAL)
 _SILOS_OWN = {"part number", "total quantity", "unreferenced since"}
@@ -157,6 +160,22 @@ def _given_roles(given: Mapping[str, str]) -> dict[Role, str]:
 def _role_of(cell: str) -> tuple[Role, int] | None:
     """Role and rank of one header cell: "Mass", "Mass (g)", "mass_kg", "Gewicht in kg"."""
     text = normal(cell)
+    found = _alias(text)
+    if found is not None and found[0] is Role.MASS and _says_total(cell):
+        return Role.TOTAL_MASS, found[1]
+    if found is None and _says_total(cell):
+        # "Weight, total kg", "Summe Masse": what is left without the word is a mass or nothing.
+        rest = _alias(" ".join(word for word in text.split() if word not in _TOTAL_WORDS))
+        return (Role.TOTAL_MASS, rest[1]) if rest is not None and rest[0] is Role.MASS else None
+    return found
+
+
+def _says_total(cell: str) -> bool:
+    text = unicodedata.normalize("NFKC", cell).casefold()
+    return bool(_TOTAL_WORDS & set(re.findall(r"[^\W_]+", text))) or "合計" in text
+
+
+def _alias(text: str) -> tuple[Role, int] | None:
     if text in _ROLE_OF:
         return _ROLE_OF[text]
     stem, _, unit = text.rpartition(" ")

@@ -15,6 +15,9 @@ from dataclasses import dataclass
 
 from silo.inertia.bom.numbers import Mark, Number, parse_number
 
+HEAVIEST = 1e12
+"""[kg] no part weighs that much; sums of such numbers would lose everything else."""
+
 _POUND = 0.45359237  # exactly, by definition (NIST Handbook 44, appendix C)
 
 MASS_UNITS: dict[str, float] = {
@@ -105,8 +108,8 @@ def parse_mass(text: str, *, mark: Mark | None = None, unit: str | None = None) 
 
 def _cell(number: Number, factor: float, unit: str, overridden: bool) -> MassCell:
     value = number.value * factor
-    if not math.isfinite(value):
-        return MassCell(problem="is not finite")
+    if not math.isfinite(value) or value >= HEAVIEST:
+        return MassCell(problem=f"is above {HEAVIEST:g} kg" if math.isfinite(value) else "is not finite")
     if value < 0:
         return MassCell(problem="is negative")
     return MassCell(
