@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Inside FreeCAD: several commits before the first one has arrived; a page without a browser."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import Any
+
+sys.path.insert(0, os.environ["SILO_TEST_CASES"])
+
+from inside import (
+    App,
+    Gui,
+    QtWidgets,
+    addon,
+    ask,
+    assembly,
+    link,
+    pane,
+    part,
+    register,
+    run,
+    settled,
+    tell,
+    wait,
+)
+
+TIMES = 5
+
+
+def burst(one: Any, top: Any, bolt: Any) -> None:
+    """Edit, commit, edit, commit … without a look at what became of it."""
+    for number in range(TIMES):
+        if number:
+            link(top, f"More{number}", bolt)
+        App.setActiveDocument(top.Document.Name)
+        Gui.runCommand("Origin_Commit")
+    tell(running=one.commits.running)
+    wait(lambda: not one.commits.running and settled() and not one.session.shown.waiting)
+
+
+def one_after_the_other(one: Any, top: Any, bolt: Any) -> None:
+    """The same while nothing can be sent: each is a state of its own, and none is left out."""
+    ask("server down")
+    wait(lambda: one.session.shown.connection == "offline")
+    for number in range(3):
+        link(top, f"Offline{number}", bolt)
+        App.setActiveDocument(top.Document.Name)
+        Gui.runCommand("Origin_Commit")
+        wait(lambda number=number: len(one.session.shown.waiting) > number and settled())
+    tell(waiting=len(one.session.shown.waiting))
+    ask("server up")
+    one.session.retry_all()
+    wait(lambda: settled() and not one.session.shown.waiting)
+
+
+def told() -> list[str]:
+    """The boxes of our commits, oldest first."""
+    return [box for box in reversed(pane()) if box.startswith(("BOM Updated", "Committed"))]
+
+
+def page(one: Any) -> None:
+    """Without a browser the address is on the clipboard; another server's page is not opened at all."""
+    from silo.workbench import qt
+
+    asked: list[str] = []
+
+    def no_browser(url: str) -> bool:
+        asked.append(url)
+        return False
+
+    qt.open_url = no_browser
+    clipboard = QtWidgets.QApplication.clipboard()
+    one.open_page("https://example.org/items/A01-0001/bom")
+    one.open_page("javascript:alert(1)//")
+    one.open_page("file:///etc/passwd")
+    one.open_page(os.environ["SILO_API_URL"] + "/items/A01-0001/bom")
+    tell(asked=asked, copied=clipboard.text())
+
+
+def story() -> None:
+    one = addon()
+    one.preferences.set("AskComment", False)
+    one.preferences.set("AskRegister", False)
+    bolt = part("Bolt")
+    top = assembly("Top", ("B1", bolt, 0))
+    numbers = register(bolt.Document, top.Document)
+    wait(lambda: one.session.shown.connection == "online")
+    burst(one, top, bolt)
+    tell(numbers=numbers, first=told())
+    one_after_the_other(one, top, bolt)
+    tell(boxes=told())
+    page(one)
+
+
+run(story)
