@@ -3,7 +3,14 @@
 
 from __future__ import annotations
 
+import fcntl
+import hashlib
+import os
+import re
+import uuid
 from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -21,10 +28,23 @@ def _freecad(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
 
 
 @pytest.fixture(name="said", scope="module")
-def _said(freecad: Window) -> dict[str, Any]:
+def _said(freecad: Window) -> Iterator[dict[str, Any]]:
     with freecad.server.client() as client:
         client.create_item("kindred-rd", "M01", "Twin")
-    return freecad.run("registering.py")
+    with ExitStack() as other:
+        freecad.answers["open Construction elsewhere"] = lambda: other.enter_context(another_freecad(freecad))
+        yield freecad.run("registering.py")
+
+
+@contextmanager
+def another_freecad(freecad: Window) -> Iterator[str]:
+    """What a second FreeCAD that has Construction.FCStd open keeps in the user's cache."""
+    cache = freecad.home / "temp"
+    digest = hashlib.sha1(bytes(freecad.vault / "Construction.FCStd")).hexdigest()
+    (cache / f"FreeCAD_Doc_{uuid.uuid4()}_{digest[:6]}_1").mkdir()
+    with (cache / "FreeCAD_1.lock").open("w") as lock:
+        fcntl.lockf(lock, fcntl.LOCK_EX)
+        yield lock.name
 
 
 def test_every_component_is_offered_with_a_proposal(said: dict[str, Any]) -> None:
@@ -45,6 +65,22 @@ def test_a_read_only_file_has_its_own_row_state_and_the_rest_goes_on(said: dict[
     """It is not checked and stays unregistered."""
     assert said["offered"]["Fixed.FCStd"][3:] == [False, "the file is read-only"]
     assert sorted(said["left"]) == ["Construction.FCStd", "Fixed.FCStd"]
+
+
+def test_a_file_open_in_another_freecad_is_not_registered_unasked(said: dict[str, Any]) -> None:
+    """That one would overwrite the identity with its next save; the person may do it all the same."""
+    name, kind, category, checked, note = said["offered"]["Construction.FCStd"]
+    assert (name, kind, checked) == ("Construction", "part", False)
+    assert note == "open in another FreeCAD: close it there first, or saving there undoes this"
+    assert category
+
+
+def test_freecad_keeps_open_files_in_its_cache_as_we_think(freecad: Window, said: dict[str, Any]) -> None:
+    """The names that tell what is open; another version may change them."""
+    digest = hashlib.sha1(os.fsencode(said["path"])).hexdigest()
+    found = re.fullmatch(rf"(.+)_Doc_[0-9a-f-]{{36}}_{digest[:6]}_(\d+)", Path(said["folder"]).name)
+    assert found is not None
+    assert (freecad.home / "temp" / f"{found[1]}_{found[2]}.lock").exists()
 
 
 def test_the_items_are_on_the_server(freecad: Window, said: dict[str, Any]) -> None:
@@ -98,4 +134,18 @@ def test_an_unsaved_edit_is_not_lost(said: dict[str, Any]) -> None:
 def test_skipped_ones_are_asked_for_at_the_next_commit(said: dict[str, Any]) -> None:
     """Spec §2, point 5."""
     assert sorted(said["asked_again"]) == ["Construction.FCStd", "Fixed.FCStd"]
-    assert said["button"] == "Skip All"
+    assert said["button_after_skipping"] == "Skip All"
+
+
+def test_a_copied_identity_is_not_decided_by_registering_others(said: dict[str, Any]) -> None:
+    """It stays a question, and there is nothing to register until it is answered."""
+    assert said["asked"] == {"Bracket.FCStd": "ask", "BracketCopy.FCStd": "ask"}
+    assert not said["selected_before"]
+
+
+def test_the_same_part_is_kept_and_not_asked_for_again(said: dict[str, Any]) -> None:
+    """One answer stands for both files; the next time there is nothing left."""
+    assert set(said["answered"].values()) == {"same"}
+    assert said["notes"] == ["stays as it is"] * 2
+    assert said["button"] == "Close"
+    assert said["left_to_ask"] == []

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from silo.bom.errors import DocumentError, SiloError
@@ -14,6 +15,7 @@ from silo.folders import data_folder
 from silo.registration import Journal, Registration
 from silo.workbench import host, live, saving, widgets
 from silo.workbench.commit_flow import CommitFlow, take_snapshot
+from silo.workbench.elsewhere import Elsewhere
 from silo.workbench.preferences import Preferences
 from silo.workbench.registering import Candidate, Order, Seen, State, carry_out, next_number, offer
 from silo.workbench.session import Session
@@ -48,7 +50,7 @@ class RegisterFlow:
     def start(self, doc: Any) -> None:
         """Show the components of a document that have no number."""
         try:
-            taken = take_snapshot(doc)
+            taken = self._commits.decided(take_snapshot(doc))
         except SiloError as error:
             widgets.warn(host.main_window(), translate("Silo", "Register Components"), str(error))
             return
@@ -177,7 +179,15 @@ def whole(taken: Snapshot) -> Extraction:
 def look_at(paths: Iterable[str]) -> dict[str, Seen]:
     """How the files of components stand. GUI thread; what needs the disk's content is left to the worker."""
     known = host.documents_by_path()
-    return {path: _look_at(path, known) for path in dict.fromkeys(paths)}
+    own = next((str(doc.TransientDir) for doc in known.values()), "")
+    elsewhere = Elsewhere(own)
+    seen = {}
+    for path in dict.fromkeys(paths):
+        seen[path] = _look_at(path, known)
+        spelt = known[path].FileName if path in known else ""
+        if seen[path].state.usable and elsewhere.has(path, spelt):
+            seen[path] = replace(seen[path], state=State.ELSEWHERE)
+    return seen
 
 
 def _look_at(path: str, known: Mapping[str, Any]) -> Seen:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from silo.bom.naming import proposed_category
 from silo.registration import Registration
 from silo.workbench.activity import Tone
-from silo.workbench.registering import Candidate, Order, Similar, state_words
+from silo.workbench.registering import Candidate, Order, Similar, State, state_words
 from silo.workbench.words import plain, translate
 
 TYPES = ("part", "assembly", "consumable", "tool")
@@ -150,7 +150,8 @@ class EditedRow:
             return state_words()[self.candidate.state], Tone.WARNING
         told = [*self._suspicions(), state_words()[self.candidate.state]]
         text = "; ".join(filter(None, told))
-        return text, Tone.WARNING if self._suspicions() else Tone.QUIET
+        doubtful = bool(self._suspicions()) or self.candidate.state is State.ELSEWHERE
+        return text, Tone.WARNING if doubtful else Tone.QUIET
 
     def _suspicions(self) -> list[str]:
         told = []

@@ -35,6 +35,7 @@ class State(StrEnum):
 
     READY = "ready"
     EDITED = "edited"  # has unsaved edits, which are saved along with the identity
+    ELSEWHERE = "elsewhere"  # another FreeCAD has it open, and may overwrite what is saved here
     READ_ONLY = "read-only"
     PARTIAL = "partial"  # unsaved edits in a partly loaded document: FreeCAD cannot save them
     NEWER = "newer"  # somebody else saved the file since it was opened here
@@ -45,7 +46,7 @@ class State(StrEnum):
     @property
     def usable(self) -> bool:
         """True where the identity can be written."""
-        return self in (State.READY, State.EDITED)
+        return self in (State.READY, State.EDITED, State.ELSEWHERE)
 
 
 def state_words() -> dict[State, str]:
@@ -53,6 +54,9 @@ def state_words() -> dict[State, str]:
     return {
         State.READY: "",
         State.EDITED: translate("Silo", "its unsaved edits are saved too"),
+        State.ELSEWHERE: translate(
+            "Silo", "open in another FreeCAD: close it there first, or saving there undoes this"
+        ),
         State.READ_ONLY: translate("Silo", "the file is read-only"),
         State.PARTIAL: translate("Silo", "has edits, but is loaded only in part: open the file itself first"),
         State.NEWER: translate("Silo", "was saved by somebody else since you opened it: open it again first"),
@@ -105,7 +109,8 @@ class Candidate:
     @property
     def wanted(self) -> bool:
         """Checked to begin with? Not where a person has to look first."""
-        return self.state.usable and not self.same_as and not any(s.same_file for s in self.similar)
+        fine = self.state.usable and self.state is not State.ELSEWHERE
+        return fine and not self.same_as and not any(s.same_file for s in self.similar)
 
 
 @dataclass(frozen=True)

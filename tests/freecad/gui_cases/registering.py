@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import stat
 import sys
 from typing import Any
@@ -16,9 +17,12 @@ from inside import (
     Gui,
     QtCore,
     addon,
+    ask,
     assembly,
     boxes,
     close_all,
+    labels,
+    link,
     part,
     run,
     settled,
@@ -27,7 +31,7 @@ from inside import (
     wait,
 )
 
-NUMBER, COMPONENT, NAME = 4, 0, 1
+COMPONENT, NAME, NUMBER, BUTTON = 0, 1, 4, 6
 
 
 def story() -> None:
@@ -37,6 +41,8 @@ def story() -> None:
     parts = {name: part(name) for name in ("Bracket", "MotorMount", "Fixed", "Twin", "Construction")}
     two = two_parts()
     (VAULT / "Fixed.FCStd").chmod(stat.S_IRUSR)
+    tell(folder=two.TransientDir, path=two.FileName)
+    ask("open Construction elsewhere")
     made = assembly(
         "Top",
         *((name, box, 0) for name, box in parts.items()),
@@ -66,7 +72,7 @@ def story() -> None:
     tell(
         registered={row.component(): row.result.part_number for row in dialog.rows if row.finished},
         left=[row.component() for row in dialog.rows if not row.finished],
-        button=dialog.skip_button.text(),
+        button_after_skipping=dialog.skip_button.text(),
     )
     dialog.skip_button.click()
     wait(lambda: not one.registrations._open)
@@ -78,6 +84,58 @@ def story() -> None:
     wait(lambda: again.rows)
     tell(asked_again=[row.component() for row in again.rows])
     again.close()
+    wait(lambda: not one.registrations._open)
+    same_part(one)
+
+
+def same_part(one: Any) -> None:
+    """Two files of one identity, in an assembly with a new part; the person says they are the same."""
+    close_all()
+    shutil.copy(VAULT / "Bracket.FCStd", VAULT / "BracketCopy.FCStd")
+    copies = [App.openDocument(str(VAULT / f"{name}.FCStd")) for name in ("Bracket", "BracketCopy")]
+    targets = [*(doc.getObject("Box") for doc in copies), part("Extra")]
+    frame = App.newDocument("Frame")
+    container = frame.addObject("App::Part", "Assembly")
+    container.Type = "Assembly"
+    frame.saveAs(str(VAULT / "Frame.FCStd"))
+    for target in targets:
+        link(container, target.Document.Name, target)
+    frame.recompute()
+    # FreeCAD 0.20's save command would ask about the files that the links have touched.
+    frame.save()
+
+    def rows() -> Any:
+        App.setActiveDocument(frame.Name)
+        Gui.runCommand("Silo_RegisterParts")
+        found = wait(lambda: next(iter(one.registrations._open.values()), None))
+        wait(lambda: found.rows)
+        return found
+
+    dialog = rows()
+    for number in (row_of(dialog, "Extra.FCStd"), row_of(dialog, "Frame.FCStd")):
+        dialog.table.cellWidget(number, BUTTON).click()
+        wait(lambda row=dialog.rows[number]: row.finished and settled())
+    asked = {row.component(): row.number for row in dialog.rows if row.candidate.same_as}
+    selected_before = dialog.register_button.isEnabled()
+    item = dialog.table.item(row_of(dialog, "Bracket.FCStd"), NUMBER)
+    item.setData(QtCore.Qt.ItemDataRole.UserRole, "same")
+    answered = {row.component(): row.number for row in dialog.rows if row.candidate.same_as}
+    dialog.register_button.click()
+    wait(settled)
+    tell(
+        asked=asked,
+        selected_before=selected_before,
+        answered=answered,
+        notes=[row.note()[0] for row in dialog.rows if row.candidate.same_as],
+        button=dialog.skip_button.text(),
+    )
+    dialog.close()
+    wait(lambda: not one.registrations._open)
+    App.setActiveDocument(frame.Name)
+    Gui.runCommand("Silo_RegisterParts")
+    empty = wait(lambda: next(iter(one.registrations._open.values()), None))
+    wait(lambda: "have their Silo part number" in " ".join(labels(empty)))
+    tell(left_to_ask=[row.component() for row in empty.rows])
 
 
 def two_parts() -> Any:
