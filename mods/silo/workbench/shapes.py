@@ -244,7 +244,8 @@ def _cross_checked(solid: Any, mesh: Mesh, volume: float) -> tuple[Mesh, float]:
     if deviation < CLOSE or len(mesh) > MANY:
         return mesh, deviation
     # Thin curved wires lose several per cent to chords: fine against their thickness, not their length.
-    finer = _mesh(solid, min(_fineness(solid) / 5, 0.02 * volume / max(solid.Area, 1e-12)))
+    wanted = min(_fineness(solid) / 5, 0.02 * volume / max(solid.Area, 1e-12))
+    finer = _mesh(solid, max(wanted, _fineness(solid) / 50))
     return mesh, min(deviation, abs(abs(mesh_volume(finer)) * MM**-3 / volume - 1))
 
 
