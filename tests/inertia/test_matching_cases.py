@@ -179,6 +179,15 @@ def test_case_27_quantity_differs_from_count(assemble: Fixture, compute: Fixture
     assert "3" in warning.message
 
 
+def test_a_row_too_many_of_a_name_is_told_as_such(
+    assemble: Fixture, compute: Fixture, codes: Fixture
+) -> None:
+    """Two rows "Part 1", one part: the other row's warning does not say that there is no such part."""
+    report = compute(assemble(("l/a", cube("Part 1"))), HEAD + "1,1,,steel,,Part 1\n2,3,,brass,,Part 1\n")
+    (left,) = [w for w in report.warnings if w.code == "row_unused"]
+    assert "all parts of this name belong to other rows" in left.message
+
+
 def test_case_28_row_without_geometry(assemble: Fixture, compute: Fixture, codes: Fixture) -> None:
     """Glue has a row and no shape: named, and not counted."""
     report = compute(assemble(("l/a", cube("a"))), HEAD + "1,1,,steel,,a\n2,1,,,0.02 kg,glue\n")

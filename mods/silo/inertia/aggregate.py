@@ -21,6 +21,7 @@ from silo.inertia.links import Claims
 from silo.inertia.masses import Placed
 from silo.inertia.matching import Matching
 from silo.inertia.model import Assembly
+from silo.inertia.names import plain
 from silo.inertia.products import companions, leaf_products, sub_assemblies
 from silo.inertia.report import InertiaReport, LinkResult, PartResult, PartWarning, SubAssemblyResult
 
@@ -207,12 +208,16 @@ def tell_bom(report: InertiaReport, table: BomTable) -> None:
 
 def tell_rows(report: InertiaReport, assembly: Assembly, matching: Matching) -> None:
     """BOM rows that no part uses, and rows whose quantity is not the number of parts."""
+    names = {plain(product.name) for product in (*leaf_products(assembly), *sub_assemblies(assembly))}
     for row in matching.unused:
         quantity = f", quantity {row.quantity:g}" if row.quantity is not None else ""
+        why = "no part in the geometry has this name"
+        if plain(row.name) in names:
+            why = "all parts of this name belong to other rows"
         report.add_warning(
             "",
             row.name,
-            f"BOM line {row.line}{quantity}: no part in the geometry has this name; its mass is not counted",
+            f"BOM line {row.line}{quantity}: {why}; its mass is not counted",
             MassCode.ROW_UNUSED,
         )
     beside = companions(assembly)

@@ -118,6 +118,9 @@ def plan_push(
         items.append(PushItem(part_number, parts[0].name, _json(_properties(parts[0]))))
     for one in report.sub_assemblies:
         _plan_sub_assembly(one, {item.part_number for item in items}, items, skipped)
+    for warning in report.warnings:
+        if warning.code == MassCode.ROW_UNUSED:
+            skipped[Skipped(warning.part_name, "no part of the geometry belongs to its row")] = None
     if top is not None:
         _plan_top(report, top, gaps, items, skipped)
     return PushPlan(tuple(items), tuple(skipped), _comment(report))

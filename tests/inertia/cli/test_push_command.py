@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -92,6 +93,28 @@ def test_a_bought_unit_is_rolled_up_by_its_own_mass(run: Run, arm: Path, client:
     rolled = roll_up(client, top, {servo: 3})
     assert rolled["total_mass_kg"] == pytest.approx(3 * 0.165)
     assert rolled["missing"] == []
+
+
+def test_the_roll_up_of_the_whole_arm_is_our_total(run: Run, arm: Path, client: SiloClient) -> None:
+    """Every row an item: parts, bolts and the servos; the server adds up what the geometry weighs."""
+    category = next(iter(client.categories()))
+    with (arm / "bom.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    for row in rows:
+        row["Part number"] = item_for(client, row["Name"], category)
+    with (arm / "numbered.csv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, rows[0].keys())
+        writer.writeheader()
+        writer.writerows(rows)
+    ran = run("inertia", arm / "arm.step", "--bom", arm / "numbered.csv", "--push", "--json")
+    assert ran.code == 0, ran.err
+    assert "Not written: Threadlocker: no part of the geometry belongs to its row" in ran.err
+    top = client.create_item("kindred-rd", category, "Arm", name="Arm", item_type="assembly").part_number
+    counts = {row["Part number"]: int(row["Quantity"]) for row in rows}
+    rolled = roll_up(client, top, counts)
+    assert rolled["total_mass_kg"] == pytest.approx(ran.json()["total"]["mass"], rel=1e-9)
+    without = {row["Part number"] for row in rows if row["Name"] in ("Cable duct", "Threadlocker")}
+    assert set(rolled["missing"]) == without
 
 
 def test_dry_run_asks_no_server(run: Run, arm: Path) -> None:
