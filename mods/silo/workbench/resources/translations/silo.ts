@@ -1024,6 +1024,11 @@
         </message>
         <message>
             <location filename="../../registering.py" />
+            <source>open in another FreeCAD: close it there first, or saving there undoes this</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../registering.py" />
             <source>the file is read-only</source>
             <translation type="unfinished" />
         </message>
