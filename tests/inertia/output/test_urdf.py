@@ -67,6 +67,19 @@ def test_the_rest_of_the_file_stays_byte_for_byte() -> None:
     assert filled.untouched == ("empty", "a > b", "bare")
 
 
+@pytest.mark.parametrize("behind", ["<!-- guessed > <b> -->", "<visual/>", " <?note <inertial/> ?>", "é", ""])
+@pytest.mark.parametrize(
+    "old", ["<inertial/>", "<inertial />", "<inertial></inertial >", "<inertial\n>\n</inertial>"]
+)
+def test_an_empty_inertial_is_replaced_and_nothing_behind_it(old: str, behind: str) -> None:
+    """Whatever follows it stays, to the byte."""
+    data = f"<robot><link name='a'>{old}{behind}</link></robot>".encode()
+    filled = fill_urdf(data, {"a": PROPS}).data
+    assert filled.startswith(b"<robot><link name='a'><inertial>")
+    assert filled.endswith(f"</inertial>{behind}</link></robot>".encode())
+    ET.fromstring(filled)  # noqa: S314 (our own text)
+
+
 def test_filling_twice_changes_nothing_more() -> None:
     """The second run writes the same file."""
     links = {"empty": PROPS, "old": PROPS, "bare": PROPS}

@@ -204,7 +204,9 @@ class _Reader:
         self._stack.pop()
         above = self._stack[-1] if self._stack else ""
         if self._open is not None and tag == "inertial" and above == "link":
-            self._open.inertial = (self._inertial_at, self._tag_end(here)[0])
+            # For a tag that closes itself expat tells the place behind it as that of its end.
+            first, closed = self._tag_end(self._inertial_at)
+            self._open.inertial = (self._inertial_at, first if closed else self._tag_end(here)[0])
             self._open.inertials += 1
         elif self._open is not None and tag == "link":
             self._open.end = here
