@@ -53,6 +53,7 @@ def run(args: argparse.Namespace) -> int:
     from silo.inertia.calculator import Task, calculate
     from silo.inertia.links import Link, LinkMap
     from silo.inertia.massrule import Options
+    from silo.inertia.model import GeometryCode
 
     parser = shared.bom_parser(args)
     table = parser.parse(args.bom) if args.bom else None
@@ -61,10 +62,16 @@ def run(args: argparse.Namespace) -> int:
     name = assembly.name or "assembly"
     # A FreeCAD document is its own BOM: where it states no material, nobody does.
     options = Options(
-        args.default_density or 1000.0, step_density=True, unknown_is_zero=args.default_density is None
+        args.default_density or 1000.0,
+        step_density=True,
+        unknown_is_zero=args.default_density is None,
+        own_bom=True,
     )
-    whole = LinkMap((Link(name, ("**",)),))
+    whole = LinkMap((Link(name, ("**",)),)) if assembly.instances else None
     report = calculate(assembly, table, Task(materials, options, whole, simulated=False))
+    if not assembly.instances:
+        words = "the document holds no part with a shape: there is nothing to weigh"
+        report.add_warning("", "", words, GeometryCode.NO_GEOMETRY)
     shared.show(args, report, assembly)
     pushed = _push(args, report) if args.push else 0
     return max(pushed, shared.verdict(args, report))

@@ -30,12 +30,15 @@ class Options:
         use the density of the geometry file before the default and before zero (a tier of its own).
     unknown_is_zero
         without a BOM, a part whose file states no density counts as 0 kg instead of the default density:
-        for FreeCAD documents, which are their own BOM.
+        for FreeCAD documents.
+    own_bom
+        the geometry file is its own BOM, so that nobody misses another one.
     """
 
     default_density: float = 1000.0
     step_density: bool = False
     unknown_is_zero: bool = False
+    own_bom: bool = False
 
 
 @dataclass(frozen=True)
@@ -170,6 +173,8 @@ class MassRule:
         stated = prototype.step_density
         base = Decision(source=Source.DEFAULT_DENSITY)
         message = "Part not found in BOM" if self.has_bom else "There is no BOM"
+        if self.options.own_bom and not self.has_bom:
+            message = "The document assigns no material with a density"
         alike = self.suggester.near(prototype.name) if self.has_bom else ()
         if alike:
             message += ", which has " + ", ".join(f"“{name}”" for name in alike)
@@ -179,7 +184,7 @@ class MassRule:
             notes = [Note(MassCode.NOT_IN_BOM, words)] if self.has_bom else []
             return self._from_file(base, prototype, tuple(notes))
         if not self.has_bom and self.options.unknown_is_zero:
-            words = "The document assigns no material with a density: counted as 0 kg"
+            words = f"{message}: counted as 0 kg"
             return _with(
                 base, source=Source.ZERO, mass_kg=0.0, notes=(Note(MassCode.NO_MASS_NO_MATERIAL, words),)
             )

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import shutil
+import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -72,6 +73,8 @@ def test_without_a_material_library_parts_are_zero_and_named(run: Run, gearbox: 
     assert not any(w["code"] == "zero_mass_link" for w in data["warnings"])
     guessed = run("mass", gearbox, "--json", "--default-density", "1000").json()
     assert guessed["total"]["mass"] > 1
+    (words,) = {w["message"] for w in guessed["warnings"] if w["code"] == "no_bom"}
+    assert words.startswith("The document assigns no material with a density; the default density (1000")
 
 
 def test_a_bom_outranks_the_document(run: Run, gearbox: Path, cards: Path, tmp_path: Path) -> None:
@@ -106,6 +109,23 @@ def _silo(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[SiloClien
         monkeypatch.setenv("SILO_API_TOKEN", token)
         with SiloClient(server.base_url, token) as client:
             yield client
+
+
+def test_a_document_without_parts_is_told(run: Run, tmp_path: Path) -> None:
+    """Sketches and sheets only: no mass, said in plain words and not as a pattern of a link map."""
+    (tmp_path / "Document.xml").write_text(
+        '<Document SchemaVersion="4" ProgramVersion="1.0" FileVersion="1"><Properties Count="0"/>'
+        '<Objects Count="0"/><ObjectData Count="0"/></Document>', "utf-8",
+    )  # fmt: skip
+    with zipfile.ZipFile(tmp_path / "empty.FCStd", "w") as file:
+        file.write(tmp_path / "Document.xml", "Document.xml")
+    ran = run("mass", tmp_path / "empty.FCStd", "--json")
+    assert ran.code == 0, ran.err
+    data = ran.json()
+    assert data["total"]["mass"] == 0
+    (warning,) = data["warnings"]
+    assert warning["code"] == "no_geometry"
+    assert "nothing to weigh" in warning["message"]
 
 
 def test_mistakes_are_one_plain_sentence(run: Run, tmp_path: Path) -> None:
