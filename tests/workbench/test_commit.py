@@ -31,6 +31,15 @@ class Documents:
     def __init__(self) -> None:
         self.saved: list[str] = []
 
+    def linked(self, doc: Any, /) -> list[Any]:
+        found, left = {doc.Name: doc}, [doc]
+        while left:
+            for below in left.pop().OutList:
+                if below.Name not in found:
+                    found[below.Name] = below
+                    left.append(below)
+        return list(found.values())
+
     def is_modified(self, doc: Any, /) -> bool:
         return bool(doc.marks.get("changed"))
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from silo.workbench import host, qt
@@ -50,6 +51,13 @@ class AddOn:
 
     def _begin(self) -> None:
         self.session.begin(live=self.preferences.flag("LiveActivity"))
+        # The first commit is to be as quick as the others: what it needs is imported while nobody waits.
+        self.session.aside(
+            "Getting ready",
+            lambda _control: import_module("silo.workbench.commit_flow"),
+            done=lambda _module: None,
+            failed=self._bug,
+        )
         self._timer = qt.QtCore.QTimer()
         self._timer.timeout.connect(self.session.tick)
         self._timer.start(TICK_MS)
@@ -285,5 +293,10 @@ class AddOn:
         doc = host.find_document(path)
         if doc is None:
             host.warning(translate("Silo", "[Silo] This document is not open: ") + plain(path))
-        elif not host.select(doc, names):
+            return
+        found = host.select(doc, names)
+        if not found:
             host.warning(translate("Silo", "[Silo] These objects are not in the document any more."))
+        elif found > host.MOST_SELECTED:
+            text = translate("Silo", "[Silo] The first {n} of {all} objects are selected.")
+            host.message(text.replace("{n}", str(host.MOST_SELECTED)).replace("{all}", str(found)))

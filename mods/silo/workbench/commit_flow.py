@@ -30,6 +30,7 @@ from silo.workbench.words import translate
 class LiveDocuments:
     """FreeCAD's documents, as :class:`silo.workbench.commit.Documents` wants them."""
 
+    linked = staticmethod(host.linked_documents)
     is_partial = staticmethod(host.is_partial)
     is_modified = staticmethod(saving.is_modified)
     is_writable = staticmethod(saving.is_writable)

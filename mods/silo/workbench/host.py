@@ -113,6 +113,11 @@ def find_document(path: str) -> Any:
     return documents_by_path().get(os.path.realpath(path))
 
 
+def linked_documents(doc: Any) -> list[Any]:
+    """A document and all that it links to, directly or not, in no order."""
+    return list(doc.getDependentDocuments(False))
+
+
 def is_partial(doc: Any) -> bool:
     """True where only the objects that links need are loaded: saving such a document writes nothing."""
     return bool(getattr(doc, "Partial", False))
@@ -260,11 +265,18 @@ def selected_objects() -> list[Any]:
     return list(gui().Selection.getSelection())
 
 
+# FreeCAD looks through all that is selected for each further object: 10 000 take it many seconds.
+MOST_SELECTED = 2000
+
+
 def select(doc: Any, names: Iterable[str]) -> int:
-    """Select objects of a document in the 3D view and the tree; how many there were."""
+    """Select objects of a document in the 3D view and the tree; how many there are.
+
+    Of very many, only the first :data:`MOST_SELECTED` are selected.
+    """
     gui().Selection.clearSelection()
     found = [name for name in names if doc.getObject(name) is not None]
-    for name in found:
+    for name in found[:MOST_SELECTED]:
         gui().Selection.addSelection(doc.Name, name)
     return len(found)
 

@@ -181,6 +181,9 @@ def lost_assemblies(document: Any) -> list[str]:
     """
     if host.version() >= ASSEMBLY_SINCE or not document.FileName:
         return []
+    # Reading a large file takes long, and what an old FreeCAD has written holds nothing that this one drops.
+    if (by := saved_by(document)) is not None and by < ASSEMBLY_SINCE:
+        return []
     from silo.fcstd import Library
 
     try:
@@ -192,6 +195,12 @@ def lost_assemblies(document: Any) -> list[str]:
         for obj in in_file
         if obj.TypeId.startswith("Assembly::Assembly") and document.getObject(obj.Name) is None
     ]
+
+
+def saved_by(document: Any) -> tuple[int, int] | None:
+    """The FreeCAD that saved a document, such as (1, 0); None where that is not known."""
+    found = re.match(r"(\d+)\.(\d+)", document.getProgramVersion() or "")
+    return (int(found[1]), int(found[2])) if found else None
 
 
 def _lost(document: Any, names: list[str]) -> Extraction:
