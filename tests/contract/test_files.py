@@ -6,6 +6,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import uuid
 import zipfile
 from typing import Any
 
@@ -119,3 +120,17 @@ def test_what_is_no_upload_is_refused(api: Api) -> None:
     assert api.get(f"/api/items/{number}/revisions") == []
     api.bad(404, "GET", f"/api/items/{number}/file")
     api.bad(404, "GET", f"/api/items/{number}/file/1")
+
+
+def test_a_file_is_found_by_its_content(api: Api) -> None:
+    """Searching for a SHA-256 finds the items that have, or had, this very file, whatever their name."""
+    content = uuid.uuid4().bytes
+    older, newer = api.item(name="Motor bracket"), api.item(name="Mount")
+    checksum = upload(api, older, content).json()["file_checksum"]
+    upload(api, older, b"a later revision")
+    known = {"properties": {"file_sha256": checksum}}
+    assert api.call("PUT", f"/api/items/{newer}", known).status == 200
+    for query in (checksum, f"sha256:{checksum}".upper()):
+        found = api.get(f"/api/items/search?q={query}")
+        assert {item["part_number"] for item in found} == {older, newer}
+    assert api.get(f"/api/items/search?q={'0' * 64}") == []

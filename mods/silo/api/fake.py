@@ -102,11 +102,11 @@ class FakeSilo(FakeStore):
     def search_items(
         self, query: str = "", *, item_type: str | None = None, limit: int = 50, offset: int = 0
     ) -> list[Item]:
-        words = query.casefold().split()
+        words = query.casefold().removeprefix("sha256:").split()
         found = [
             stored.item
             for _, stored in sorted(self.items.items())
-            if all(w in f"{stored.item.part_number}\n{stored.item.name}".casefold() for w in words)
+            if all(word in stored.search_text() for word in words)
             and item_type in (None, stored.item.item_type)
         ]
         return found[offset : offset + limit]

@@ -35,6 +35,11 @@ class Stored:
     lines: list[dict[str, Any]] = field(default_factory=list)
     answers: dict[str, tuple[list[tuple[str, float]], MergeResult]] = field(default_factory=dict)
 
+    def search_text(self) -> str:
+        """What a search looks into: number, name, and the hashes of its files."""
+        hashes = [self.item.properties.get("file_sha256"), *(r.file_checksum for r in self.revisions)]
+        return "\n".join(map(str, (self.item.part_number, self.item.name, *filter(None, hashes)))).casefold()
+
 
 def _nothing(name: str) -> None:
     return None

@@ -247,9 +247,11 @@ def _with_look_alikes(
 def _look_alikes(candidate: Candidate, api: Any, own: str) -> tuple[Similar, ...]:
     name = candidate.proposal.name
     try:
-        found = api.search_items(name, limit=8)
+        named = api.search_items(name, limit=8)
+        # A server that does not search by content finds nothing; what has the name is compared all the same.
+        with_file = api.search_items(candidate.sha256, limit=4) if candidate.sha256 else []
         told = []
-        for item in found:
+        for item in {item.id: item for item in (*with_file, *named)}.values():
             same_name = clean_name(item.name).casefold() == name.casefold()
             same_file = bool(candidate.sha256) and candidate.sha256 in _checksums(item, api)
             if (same_name or same_file) and item.part_number != candidate.same_as and item.id != own:
