@@ -143,4 +143,6 @@ def _print_snippet(kind: str, report: InertiaReport) -> None:
     from silo.inertia.output.snippets import snippets
     from silo.inertia.output.values import writable
 
-    sys.stdout.write(snippets(writable(report.links.values()), kind))
+    text = snippets(writable(report.links.values()), kind)
+    encoding = sys.stdout.encoding or "ascii"
+    sys.stdout.write(text.encode(encoding, "xmlcharrefreplace").decode(encoding))

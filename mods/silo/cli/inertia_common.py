@@ -234,7 +234,8 @@ def show(args: argparse.Namespace, report: InertiaReport, assembly: Assembly, *,
     if args.json:
         from silo.inertia.output.data import report_json
 
-        sys.stdout.write(report_json(report))
+        # A pipe on Windows takes the country's code page: names must not turn into question marks there.
+        sys.stdout.write(report_json(report, sys.stdout.encoding or "ascii"))
         return
     from silo.inertia.output.text import report_tables
 

@@ -12,6 +12,7 @@ import signal
 import subprocess
 import sys
 import time
+import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -269,6 +270,32 @@ def test_json_alone_goes_to_standard_output(run: Run, arm: Path) -> None:
     assert ran.json()["format"] == "silo-inertia/1"
     for words in ("--strict: ", "wrote the inertia", "Would write "):
         assert words in ran.err
+
+
+@pytest.mark.parametrize("output", ["--json", "--snippet=urdf"])
+def test_names_survive_a_pipe_of_another_code_page(arm: Path, output: str) -> None:
+    """A pipe on Windows, or a job in a C locale: escaped, never a question mark."""
+    (arm / "map.yaml").write_text("links: {größe_Ω: [base_link]}\n", "utf-8")
+    ran = subprocess.run(
+        [
+            sys.executable,
+            "-m",
+            "silo.cli.main",
+            "inertia",
+            arm / "arm.step",
+            "--links",
+            arm / "map.yaml",
+            output,
+        ],
+        env={**os.environ, "PYTHONIOENCODING": "cp1252", "PYTHONUTF8": "0"},
+        capture_output=True,
+        check=True,
+    )
+    text = ran.stdout.decode("cp1252")
+    if output == "--json":
+        assert json.loads(text)["links"][0]["name"] == "größe_Ω"
+    else:
+        assert ET.fromstring(text).get("name") == "größe_Ω"  # noqa: S314 (our own text)
 
 
 def test_a_snippet_comes_with_the_reports(run: Run, arm: Path) -> None:

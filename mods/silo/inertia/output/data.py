@@ -32,9 +32,15 @@ def report_data(report: InertiaReport) -> dict[str, Any]:
     }
 
 
-def report_json(report: InertiaReport) -> str:
-    """:func:`report_data` as text; floats read back unchanged."""
-    return json.dumps(report_data(report), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+def report_json(report: InertiaReport, encoding: str = "utf-8") -> str:
+    """:func:`report_data` as text; floats read back unchanged. What ``encoding`` cannot hold is escaped."""
+    data = report_data(report)
+    text = json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False)
+    try:
+        text.encode(encoding)
+    except UnicodeEncodeError:
+        text = json.dumps(data, indent=2, allow_nan=False)
+    return text + "\n"
 
 
 def _props(props: MassProps) -> dict[str, Any]:
