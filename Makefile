@@ -1,8 +1,10 @@
 # `make demo` and `make test` do all their own set-up; nothing else is needed but python3 (>= 3.11) with venv.
 PYTHON ?= python3
 VENV ?= .venv
-# How many processes share the tests: a number, 0 for none, or all processors of the machine.
+# How many processes share the tests: a number, 0 for none, or all processors of the machine. Not more than eight,
+# for each takes some 400 MB, and a container may be shown more processors than it has.
 WORKERS ?= logical
+SPREAD = -n $(WORKERS) --maxprocesses 8
 BIN := $(VENV)/bin
 DEV := $(VENV)/.installed-dev
 SERVER := $(VENV)/.installed-server
@@ -35,10 +37,10 @@ demo: $(SERVER)
 	$(BIN)/silo-mod demo $(DEMO)
 
 test: setup
-	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal -m "not freecad and not browser"
+	$(BIN)/python -m pytest $(SPREAD) --dist worksteal -m "not freecad and not browser"
 
 test-machine: setup
-	$(BIN)/python -m pytest -n $(WORKERS) --dist loadscope -m "freecad or browser"
+	$(BIN)/python -m pytest $(SPREAD) --dist loadscope -m "freecad or browser"
 
 translations: setup
 	$(BIN)/python scripts/translations.py
