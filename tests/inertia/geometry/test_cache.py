@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from silo.bom.errors import DocumentError, InputError
+from silo.folders import cache_folder
 from silo.inertia.geometry import Mesh, ReadOptions, read, store
 from silo.inertia.geometry.cache import Cache, default_folder, key_of
 from silo.inertia.model import Assembly, GeometryProblem, Instance, Prototype, SolidProps
@@ -108,11 +109,44 @@ def test_a_sibling_that_appears_or_changes_is_noticed(box: Any, step: Any, tmp_p
     assert volume() == pytest.approx(64)
 
 
-def test_the_folder_follows_the_platform(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """XDG_CACHE_HOME is honoured where it applies."""
-    monkeypatch.setattr("sys.platform", "linux")
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert default_folder() == tmp_path / "silo-mod" / "geometry"
+def test_the_folder_is_the_user_s_cache_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Where everything of ours that can be made again lies; an empty or relative variable moves nothing."""
+    for value in (str(tmp_path), "", "relative"):
+        monkeypatch.setenv("XDG_CACHE_HOME", value)
+        assert default_folder() == cache_folder() / "geometry"
+
+
+def test_it_survives_in_the_user_s_folder(
+    box: Any, step_part: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing said about it: the second reading needs no kernel, also of a copy elsewhere."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
+    path = step_part(box(1, 2, 3))
+    read(path)
+    (tmp_path / "elsewhere").mkdir()
+    copy = path.rename(tmp_path / "elsewhere" / path.name)
+    assert read(copy, options=ReadOptions(memory_mb=IMPOSSIBLE)).source == str(copy)
+    assert files(default_folder())
+
+
+def test_a_folder_without_the_right_to_write_is_no_error(
+    box: Any, step_part: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A home that cannot be written (here: a file in the way): read all the same, and nothing kept."""
+    (tmp_path / "home").write_text("in the way")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
+    assert read(step_part(box(1, 2, 3))).instances
+    assert (tmp_path / "home").read_text() == "in the way"
+
+
+def test_another_kernel_is_another_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What version 7 measured is not given out as version 8's."""
+    path = tmp_path / "x.step"
+    path.write_bytes(b"content")
+    options = ReadOptions().content_options()
+    before = key_of(path, options)
+    monkeypatch.setattr("silo.inertia.geometry.cache.KERNELS", ("numpy",))
+    assert key_of(path, options) != before
 
 
 def test_the_key_depends_on_content_name_and_options(tmp_path: Path) -> None:

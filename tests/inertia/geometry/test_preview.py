@@ -21,9 +21,10 @@ from silo.bom.errors import InputError
 from silo.inertia.core import MassProps
 from silo.inertia.geometry import Mesh
 from silo.inertia.geometry.glb import quaternion, write_glb
+from silo.inertia.geometry.legend import mass_words
 from silo.inertia.geometry.lettering import fitted, text_mask
 from silo.inertia.geometry.mesh import mesh_volume
-from silo.inertia.geometry.picture import mass_words, write_picture
+from silo.inertia.geometry.picture import write_picture
 from silo.inertia.geometry.png import write_png
 from silo.inertia.geometry.preview import LinkView, preview_bytes, write_preview
 from silo.inertia.geometry.raster import Canvas

@@ -12,7 +12,6 @@ import hashlib
 import importlib.metadata
 import json
 import os
-import sys
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -20,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from silo.bom.errors import InputError
+from silo.folders import cache_folder
 from silo.inertia.geometry import store
 from silo.inertia.geometry.folder import step_files
 from silo.inertia.geometry.names import file_key
@@ -30,14 +30,8 @@ KERNELS = ("cadquery-ocp-novtk", "cadquery-ocp", "trimesh")
 
 
 def default_folder() -> Path:
-    """The user's cache folder for this, by the platform's convention. Nothing is created."""
-    if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-    elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return base / "silo-mod" / "geometry"
+    """Where readings are kept. Nothing is created."""
+    return cache_folder() / "geometry"
 
 
 def content_hash(path: Path) -> str:

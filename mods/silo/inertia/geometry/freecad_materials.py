@@ -16,7 +16,7 @@ from typing import Any
 
 from silo.bom.document import own
 from silo.inertia.geometry.freecad_places import material_uuid
-from silo.inertia.geometry.products import MAX_DENSITY
+from silo.inertia.geometry.product_materials import MAX_DENSITY
 from silo.inertia.materials.cards import MAX_CARD_BYTES, card_folders
 from silo.inertia.materials.density import LOWEST_SOLID, parse_density
 
