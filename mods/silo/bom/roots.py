@@ -16,6 +16,9 @@ from silo.bom.errors import InputError
 from silo.bom.kinds import COMPONENTS, INLINE, Kind, flattened, is_assembly3, kind_of, no_component
 from silo.bom.targets import Inspect, first_of, is_assembly_link, is_excluded, is_link, resolve_target
 
+# What to do where a document holds several assemblies. The window says it in words of its own.
+NAME_ONE = "Name the one that is meant (--assembly NAME)."
+
 _CONTAINERS = frozenset({Kind.CONTAINER, Kind.LINK_GROUP, Kind.ASSEMBLY_LINK})
 _FOLDERS = frozenset({Kind.FOLDER})
 
@@ -96,10 +99,7 @@ def choose_assembly(document: Any, name: str | None = None) -> Any:
     if best and found[0][0][0] < 3:
         likely = [obj for obj in best if _holds_components(obj)] or best
         if len(likely) > 1:
-            raise InputError(
-                f"{_file(document)} holds {len(likely)} assemblies: {_told(likely)}. Name the one that is "
-                "meant (--assembly NAME)."
-            )
+            raise InputError(f"{_file(document)} holds {len(likely)} assemblies: {_told(likely)}. {NAME_ONE}")
         return likely[0]
     loose = _loose_links(document)
     if loose or not best:

@@ -17,7 +17,7 @@ from silo.bom.errors import InputError
 from silo.bom.identity import META_KEY, identity_of
 from silo.bom.links import extract
 from silo.bom.model import Extraction
-from silo.bom.roots import choose_assembly
+from silo.bom.roots import NAME_ONE, choose_assembly
 from silo.bom.snapshot import from_plain, to_plain
 from silo.workbench.words import plain, translate
 
@@ -66,7 +66,8 @@ def take(doc: Any, *, assembly: Any = None, walk: Walk = extract) -> Snapshot:
     try:
         container = _choose(doc, assembly)
     except InputError as error:
-        return Snapshot(path, label, part_identity(doc), problem=str(error))
+        here = translate("Silo", "Make the one that is meant active: double-click it in the tree.")
+        return Snapshot(path, label, part_identity(doc), problem=str(error).replace(NAME_ONE, here))
     extraction = walk(container)
     head = extraction.assembly
     if not (extraction.entries or extraction.blocked or _is_assembly_object(container)):

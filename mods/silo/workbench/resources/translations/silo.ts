@@ -39,6 +39,11 @@
             <translation type="unfinished" />
         </message>
         <message>
+            <location filename="../../addon.py" />
+            <source>[Silo] The first {n} of {all} objects are selected.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
             <location filename="../../banner.py" />
             <source>Settings…</source>
             <translation type="unfinished" />
@@ -1100,6 +1105,11 @@
         <message>
             <location filename="../../session.py" />
             <source>Outbox</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../snapshot.py" />
+            <source>Make the one that is meant active: double-click it in the tree.</source>
             <translation type="unfinished" />
         </message>
         <message>
