@@ -5,8 +5,10 @@ from __future__ import annotations
 
 import fcntl
 import hashlib
+import json
 import os
 import re
+import shutil
 import uuid
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -14,9 +16,18 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from freecad_cases import machines
 from freecad_cases.machines import WANTED
 from gui_cases.window import Window, window
 
+from silo.bom.identity import walk_entries
+from silo.bom.links import extract
+from silo.bom.model import Extraction
+from silo.bom.roots import choose_assembly
+from silo.fcstd import Library
+from silo.freecad_run import run_freecad
+
+RESAVE = Path(__file__).parent / "freecad_cases" / "resave.py"
 pytestmark = [pytest.mark.freecad, pytest.mark.slow]
 
 
@@ -115,6 +126,32 @@ def test_identity_survives_in_this_version(said: dict[str, Any]) -> None:
     (identity,) = bracket["objects"].values()
     assert bracket["meta"] == {"SiloUUID": identity}
     assert bracket["property"] == (identity if said["properties"] else None)
+
+
+@pytest.mark.parametrize("reader", WANTED)
+def test_every_version_reads_and_keeps_the_identities(
+    freecad: Window, said: dict[str, Any], reader: str, tmp_path: Path
+) -> None:
+    """Opened in this one or another, and saved there: each component is the item that it was registered as."""
+    with freecad.server.client() as client:
+        wanted = {number: client.get_item(number).id for number in said["registered"].values()}
+    folder = tmp_path.resolve() / "vault"
+    shutil.copytree(freecad.vault, folder)
+    top, other = folder / "Top.FCStd", machines.need(reader)
+    env = other.profile(tmp_path / "profile")
+    ((_, live),) = run_freecad([str(top)], command=other.command, env=env)
+    assert isinstance(live, Extraction), live
+    assert identities(live) == set(wanted.values())
+
+    files = [str(path) for path in sorted(folder.glob("*.FCStd")) if path.stem not in ("Top", "Fixed")]
+    done = other.run(RESAVE, {**env, "SILO_FILES": json.dumps([*files, str(top)])}, cwd=tmp_path)
+    assert done.returncode == 0, done.stdout
+    with Library() as library:
+        assert identities(extract(choose_assembly(library.open(top)))) == set(wanted.values())
+
+
+def identities(found: Extraction) -> set[str]:
+    return {e.silo_uuid for e in walk_entries((found.assembly, *found.entries)) if e.silo_uuid}
 
 
 def test_two_parts_of_one_file_have_an_identity_each(said: dict[str, Any]) -> None:
