@@ -132,7 +132,7 @@ def test_identity_survives_in_this_version(said: dict[str, Any]) -> None:
 def test_every_version_reads_and_keeps_the_identities(
     freecad: Window, said: dict[str, Any], reader: str, tmp_path: Path
 ) -> None:
-    """Opened in this one or another, and saved there: each component is the item that it was registered as."""
+    """Opened here or in another one, and saved there: each component is the item that it was made."""
     with freecad.server.client() as client:
         wanted = {number: client.get_item(number).id for number in said["registered"].values()}
     folder = tmp_path.resolve() / "vault"
