@@ -40,7 +40,6 @@ def start() -> None:
     host.add_preference_page(addon.preference_page(), PREFERENCE_GROUP)
     _kept.append(addon)
     qt.later(0, lambda: when_loaded(lambda: finish(addon, known)))
-    addon.begin()
 
 
 def when_loaded(call: Callable[[], None]) -> None:
@@ -63,6 +62,7 @@ def finish(addon: AddOn, known: dict[str, Command]) -> None:
             addon.hook_commit(OWN_COMMIT)
     _kept.append(place([commit, BOM], addon.shown_everywhere))
     host.reload_workbench()
+    addon.begin()
 
 
 def silo_workbench() -> Any:
