@@ -104,7 +104,7 @@ class Notes:
             FindingCode.UNREADABLE_FILE,
             str(error),
             Severity.ERROR,
-            f"The file {error.path} cannot be read ({error.reason})",
+            f"The file {error.path} cannot be read in full ({error.reason})",
             obj,
             "not counted: {users}",
         )
