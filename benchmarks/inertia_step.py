@@ -11,6 +11,7 @@ ours     each product measured once (tolerance 1e-8, instances placed in numpy),
          cross-check, which the usual way does not have
 usual    volume, centre and tensor of every instance by the kernel's default integration, as CadQuery,
          build123d and FreeCAD do it: three integrations per instance
+imports  are not counted in either (inertia_aggregate.py tells them)
 read     the kernel's own reading of the file, which both need; not in the ratios
 error    of the whole assembly's volume, against an integration at 1e-11
 """
@@ -38,6 +39,9 @@ from silo.inertia.core import combine_arrays, place
 from silo.inertia.geometry import occt
 from silo.inertia.geometry.options import ReadOptions
 from silo.inertia.geometry.step import read_step
+from silo.inertia.geometry.worker import without
+without("scipy", "networkx")
+import trimesh.triangles
 occt.quiet()
 marks = {}
 def report(stage, done, total):
