@@ -7,7 +7,7 @@ Pure, but for :func:`ask`, which reads from the server and belongs into the work
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
@@ -131,14 +131,25 @@ def ask(snapshot: Snapshot, api: Any, control: Control) -> Preview:
     return Preview(snapshot, tuple(compared), names_of(whole, all_lines), blocking(whole), page)
 
 
-def rows(preview: Preview) -> tuple[Row, ...]:
-    """The table: the lines of the assembly, then what is left out and why."""
+# Nested assemblies share their lines: some dozen small files can stand for more rows than memory holds.
+MOST_ROWS = 3000
+
+
+def rows(preview: Preview, most: int = MOST_ROWS) -> tuple[Row, ...]:
+    """The table: the lines of the assembly, then what is left out and why.
+
+    most
+        so many rows of sub-assemblies at most, each of which gets its share; the rest is told by one row.
+    """
     by_key = {one.resolved.assembly.key: one for one in preview.compared}
     base = os.path.dirname(preview.snapshot.path)
-    table = [*_assembly_rows(preview.top, by_key, preview.names, frozenset())]
+    room = most // 2
+    table = [*_assembly_rows(preview.top, by_key, preview.names, frozenset(), room)]
+    unresolved = preview.top.resolved.unresolved
+    share = _share(room, unresolved)
     unregistered = tuple(
-        _unregistered_row(entry, base, tuple(_below(entry, by_key, preview.names)))
-        for entry in preview.top.resolved.unresolved
+        _unregistered_row(entry, base, tuple(_below(entry, by_key, preview.names, frozenset(), share)))
+        for entry in unresolved
     )
     if unregistered:
         title = translate("Silo", "Without a part number: left out until registered")
@@ -158,9 +169,20 @@ Known = Mapping[tuple[str, str], Compared]
 Keys = frozenset[tuple[str, str]]
 
 
-def _assembly_rows(one: Compared, known: Known, names: Mapping[str, str], above: Keys) -> Iterator[Row]:
-    """The assembly's own lines in its own order, then those that only the server has."""
+def _share(room: int, entries: Sequence[BomEntry]) -> int:
+    return room // max(1, sum(entry.is_assembly for entry in entries))
+
+
+def _assembly_rows(
+    one: Compared, known: Known, names: Mapping[str, str], above: Keys, room: int
+) -> Iterator[Row]:
+    """The assembly's own lines in its own order, then those that only the server has.
+
+    room
+        so many rows may stand below them.
+    """
     states = _states(one.diff)
+    share = _share(room, one.resolved.entries)
     above = above | {one.resolved.assembly.key}
     for entry in one.resolved.entries:
         kind, silo, note = states.get(entry.part_number or "", (Kind.UNCHANGED, "", ""))
@@ -173,7 +195,7 @@ def _assembly_rows(one: Compared, known: Known, names: Mapping[str, str], above:
             note=note,
             document=one.resolved.assembly.doc_path,
             objects=entry.instances,
-            children=tuple(_below(entry, known, names, above)),
+            children=tuple(_below(entry, known, names, above, share)),
         )
     local = {entry.part_number for entry in one.resolved.entries}
     for kind, changes in ((Kind.UNREFERENCED, one.diff.removed), (Kind.MANUAL, one.diff.manual)):
@@ -184,13 +206,16 @@ def _assembly_rows(one: Compared, known: Known, names: Mapping[str, str], above:
                 yield Row(kind, number=number, name=name, silo=amount, note=_notes()[kind])
 
 
-def _below(
-    entry: BomEntry, known: Known, names: Mapping[str, str], above: Keys = frozenset()
-) -> Iterator[Row]:
+def _below(entry: BomEntry, known: Known, names: Mapping[str, str], above: Keys, room: int) -> Iterator[Row]:
     """The lines of a sub-assembly; none where it stands above itself (a loop is told as a finding)."""
     one = known.get(entry.key) if entry.is_assembly and entry.key not in above else None
-    if one is not None:
-        yield from _assembly_rows(one, known, names, above)
+    if one is None:
+        return
+    left = room - len(one.resolved.entries) - len(one.diff.removed) - len(one.diff.manual)
+    if left < 0:
+        yield Row(Kind.GROUP, name=translate("Silo", "… more rows than can be shown here"))
+    else:
+        yield from _assembly_rows(one, known, names, above, left)
 
 
 def _states(diff: BomDiff) -> dict[str, tuple[Kind, str, str]]:

@@ -10,12 +10,10 @@ from typing import Any
 from silo.bom.errors import SiloError
 from silo.workbench import widgets
 from silo.workbench.activity import Tone
-from silo.workbench.preview import Kind, Preview, Row, rows, summary
+from silo.workbench.preview import MOST_ROWS, Kind, Preview, Row, rows, summary
 from silo.workbench.qt import QtCore, QtGui, QtWidgets
 from silo.workbench.words import counted, plain, tip, translate
 
-# A tree of more rows helps nobody to decide; `silo-mod diff --json` has them all.
-MOST_ROWS = 3000
 # Of the sentences below the table, only the first are broken into lines.
 MOST_WRAPPED = 200
 
