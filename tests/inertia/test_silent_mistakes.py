@@ -92,6 +92,20 @@ def test_a_row_that_is_no_total_clears_the_others(
     assert codes(report, "nut") == []
 
 
+def test_a_sub_assembly_that_the_geometry_does_not_have(
+    assemble: Fixture, compute: Fixture, codes: Fixture
+) -> None:
+    """The STEP file was written flat: the motor's mass has nowhere to go, and its parts have none."""
+    asm = assemble(("l/rotor", cube("rotor")), ("l/case", cube("case", 0.02)))
+    flat = "Item,Quantity,Material,Mass,Name\n1,1,,0.090 kg,motor\n1.1,1,,,rotor\n1.2,1,,,case\n"
+    report = compute(asm, flat)
+    assert codes(report, "motor") == ["row_unused"]
+    assert codes(report, "rotor") == ["no_mass_no_material"]
+    # Where the parts have their own data, the row above them is not missed.
+    own = flat.replace("1,,,rotor", "1,steel,,rotor").replace("1,,,case", "1,steel,,case")
+    assert codes(compute(asm, own)) == []
+
+
 def in_modules(*parts: Any) -> list[Any]:
     """Two of each part in each of three modules."""
     return [

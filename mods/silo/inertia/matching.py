@@ -51,8 +51,17 @@ def match(
     claims = _Claims(table, read)
     by_part = _tiers(parts, _rows_for_parts(table), table, density, claims)
     by_group = _tiers(groups, table.rows, table, lambda row, product: None, claims)
-    unused = tuple(row for row in table.rows if not claims.used(row) and not row.has_children)
+    told_below = {id(above) for row in table.rows if _has_data(row) for above in table.ancestors(row)}
+    unused = tuple(
+        row
+        for row in table.rows
+        if not claims.used(row) and (not row.has_children or (_has_data(row) and id(row) not in told_below))
+    )
     return Matching(by_part, by_group, unused)
+
+
+def _has_data(row: BOMEntry) -> bool:
+    return row.has_mass or row.has_material
 
 
 class _Claims:
