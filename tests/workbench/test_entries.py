@@ -11,7 +11,7 @@ import pytest
 from silo.api.sse import ServerEvent
 from silo.bom.errors import InputError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
-from silo.workbench.activity import Do, Entry, entry_text
+from silo.workbench.activity import Activity, Do, Entry, entry_text
 from silo.workbench.entries import MOST_IN_CONSOLE, console_lines, of_event, of_sent
 from silo.workbench.jobs import Control
 from silo.workbench.sending import Sent
@@ -97,6 +97,14 @@ def test_a_page_of_another_server_is_not_offered() -> None:
     made = of_event(event, refuse)
     assert made is not None
     assert made.actions == ()
+
+
+def test_a_gap_is_told_once() -> None:
+    """A server that counts anew has forgotten what happened; the pane does not pretend to know."""
+    gaps = [of_event(ServerEvent(str(n), "reset", {"reason": "counts anew"}), page, now=n) for n in range(3)]
+    activity = Activity().extend(gap for gap in gaps if gap is not None)
+    (entry,) = activity.entries
+    assert entry.title == "Some activity may be missing"
 
 
 @pytest.mark.parametrize("kind", ["heartbeat", "server.state", "job.done"])

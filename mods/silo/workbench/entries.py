@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from datetime import datetime
 from typing import Any
 
-from silo.api.sse import MERGE, ServerEvent
+from silo.api.sse import MERGE, RESET, ServerEvent
 from silo.api.wire import MergeDiff, MergeEvent, MergeWarning
 from silo.bom.errors import SiloError
 from silo.bom.findings import Finding, FindingCode, Severity
@@ -217,6 +217,8 @@ def of_event(event: ServerEvent, page: Page, now: float | None = None) -> Entry 
     when = time.time() if now is None else now
     if event.merge is not None:
         return of_merge(event.merge, page, when, event.id)
+    if event.type == RESET:
+        return of_gap(when)
     data = event.data if isinstance(event.data, dict) else {}
     number = event.item or ""
     title, key = _event_words(event.type, number, data)
@@ -230,6 +232,20 @@ def of_event(event: ServerEvent, page: Page, now: float | None = None) -> Entry 
         lines=tuple(Line(text) for text in (_text(data, "comment", "description", "name"),) if text),
         actions=_view(f"/items/{number}", page),
         icon="silo-commit" if event.type == "revision.created" else "silo-register",
+    )
+
+
+def of_gap(when: float) -> Entry:
+    """The box for what was not heard: the server lost its log, or counts anew."""
+    text = translate(
+        "Silo", "The server cannot tell any more what happened since. Its own activity page shows what is so."
+    )
+    return Entry(
+        key="gap",
+        title=translate("Silo", "Some activity may be missing"),
+        when=when,
+        lines=(Line(text, Tone.QUIET),),
+        icon="silo-activity",
     )
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from silo.api.client import SiloClient
 from silo.api.config import resolve_server
-from silo.api.events import RESET, ConnectionState, EventListener, ServerEvent
+from silo.api.events import ConnectionState, EventListener, ServerEvent
 from silo.api.outbox import Outbox
 from silo.bom.errors import ConfigError
 from silo.folders import data_folder
@@ -117,8 +117,6 @@ class Online:
     def _heard(self, event: ServerEvent, url: str) -> None:
         if event.id is not None:
             self._last_ids.set(url, event.id)
-        if event.type == RESET:
-            return
         entry = entries.of_event(event, self.client.web_url)
         if entry is not None:
             self._entry(entry)

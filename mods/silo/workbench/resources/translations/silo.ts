@@ -408,6 +408,16 @@
         </message>
         <message>
             <location filename="../../entries.py" />
+            <source>The server cannot tell any more what happened since. Its own activity page shows what is so.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../entries.py" />
+            <source>Some activity may be missing</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../entries.py" />
             <source>Revision {n} of {number}</source>
             <translation type="unfinished" />
         </message>
@@ -655,6 +665,11 @@
         <message>
             <location filename="../../preview.py" />
             <source>Not counted, or counted with a remark</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview.py" />
+            <source>… more rows than can be shown here</source>
             <translation type="unfinished" />
         </message>
         <message>
