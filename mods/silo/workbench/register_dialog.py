@@ -47,6 +47,20 @@ class Wishes:
     ask_again: Callable[[bool], None]
 
 
+@dataclass(frozen=True)
+class _Look:
+    """How a row is drawn. Only rows that look different are drawn anew: there may be hundreds."""
+
+    texts: tuple[str, ...]
+    keys: tuple[str, ...]
+    tone: Tone
+    checked: bool
+    editable: bool
+    can_choose: bool
+    can_register: bool
+    can_keep: bool
+
+
 class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
     """Not modal: documents are opened and saved while it is there."""
 
@@ -55,6 +69,9 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self._wishes = wishes
         self._rows: list[EditedRow] = []
         self._offer = Offer((), {})
+        self._types = type_words()
+        self._categories: dict[str, str] = {}
+        self._drawn: dict[int, _Look] = {}
         self._filling = False
         self.setObjectName("SiloRegister")
         self.setWindowTitle(translate("Silo", "Register Components"))
@@ -95,8 +112,8 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         table.setEditTriggers(QtWidgets.QAbstractItemView.EditTrigger.AllEditTriggers)
         # A view does not own its delegates.
         self._delegates = {
-            TYPE: ChoiceDelegate(lambda row: type_words(), table),
-            CATEGORY: ChoiceDelegate(lambda row: self._categories(), table),
+            TYPE: ChoiceDelegate(lambda row: self._types, table),
+            CATEGORY: ChoiceDelegate(lambda row: self._categories, table),
             NUMBER: ChoiceDelegate(lambda row: self._rows[row].choices(), table),
         }
         for column, delegate in self._delegates.items():
@@ -133,6 +150,10 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
     def fill(self, offer: Offer) -> None:
         """Show what can be registered."""
         self._offer = offer
+        self._categories = {
+            code: f"{code} {plain(text, 60)}".strip() for code, text in offer.categories.items()
+        }
+        self._drawn.clear()
         self._rows = [EditedRow.of(candidate) for candidate in offer.candidates[:MOST_ROWS]]
         self._filling = True
         self.table.setRowCount(len(self._rows))
@@ -189,9 +210,6 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         )
         self._refresh()
 
-    def _categories(self) -> dict[str, str]:
-        return {code: f"{code} {plain(text, 60)}".strip() for code, text in self._offer.categories.items()}
-
     def _refresh(self) -> None:
         self._filling = True
         texts = number_texts(self._rows, self._offer.numbers)
@@ -202,26 +220,42 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self._enable()
 
     def _refresh_row(self, number: int, row: EditedRow, number_text: str) -> None:
+        look = self._look(row, number_text)
+        if self._drawn.get(number) != look:
+            self._drawn[number] = look
+            self._draw_row(number, look)
+
+    def _look(self, row: EditedRow, number_text: str) -> _Look:
         note, tone = row.note()
-        category = self._categories().get(row.category, row.category)
-        kind = type_words().get(row.item_type, row.item_type)
-        texts = (row.component(), row.name, kind, category, number_text, note)
-        keys = {TYPE: row.item_type, CATEGORY: row.category, NUMBER: row.number}
-        for column, text in enumerate(texts):
+        category = self._categories.get(row.category, row.category)
+        kind = self._types.get(row.item_type, row.item_type)
+        return _Look(
+            texts=(row.component(), row.name, kind, category, number_text, note),
+            keys=(row.item_type, row.category, row.number),
+            tone=tone,
+            checked=row.checked,
+            editable=row.editable,
+            can_choose=row.can_choose,
+            can_register=row.can_register,
+            can_keep=row.can_keep,
+        )
+
+    def _draw_row(self, number: int, look: _Look) -> None:
+        keys = dict(zip((TYPE, CATEGORY, NUMBER), look.keys, strict=True))
+        for column, text in enumerate(look.texts):
             item = self.table.item(number, column)
-            if item.text() != text:
-                item.setText(text)
+            item.setText(text)
             item.setData(KEY, keys.get(column))
-            item.setFlags(_flags(row, column))
-        state = QtCore.Qt.CheckState.Checked if row.checked else QtCore.Qt.CheckState.Unchecked
+            item.setFlags(_flags(look, column))
+        state = QtCore.Qt.CheckState.Checked if look.checked else QtCore.Qt.CheckState.Unchecked
         self.table.item(number, COMPONENT).setCheckState(state)
         remark = self.table.item(number, NOTE)
-        remark.setToolTip(tip(note))
-        shade = widgets.colour(tone, self.table)
+        remark.setToolTip(tip(look.texts[NOTE]))
+        shade = widgets.colour(look.tone, self.table)
         remark.setForeground(QtGui.QBrush(QtGui.QColor(shade)) if shade else QtGui.QBrush())
         button = self.table.cellWidget(number, BUTTON)
-        button.setText(translate("Silo", "Keep") if row.can_keep else translate("Silo", "Register"))
-        button.setEnabled(row.can_register or row.can_keep)
+        button.setText(translate("Silo", "Keep") if look.can_keep else translate("Silo", "Register"))
+        button.setEnabled(look.can_register or look.can_keep)
 
     def _heading(self) -> str:
         more = len(self._offer.candidates) - len(self._rows)
@@ -316,7 +350,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self._wishes.register([row.order() for row in ready])
 
 
-def _flags(row: EditedRow, column: int) -> Any:
+def _flags(row: _Look, column: int) -> Any:
     """What a person can do with a cell."""
     flag = QtCore.Qt.ItemFlag
     flags = flag.ItemIsEnabled | flag.ItemIsSelectable

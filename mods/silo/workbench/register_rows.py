@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from silo.bom.naming import proposed_category
 from silo.registration import Registration
@@ -100,6 +101,10 @@ class EditedRow:
 
     def component(self) -> str:
         """Which component this is."""
+        return self._component
+
+    @cached_property
+    def _component(self) -> str:
         entry = self.candidate.entry
         file = os.path.basename(entry.doc_path)
         return plain(f"{file} · {entry.label}" if self.candidate.shares_file else file, 80)
