@@ -188,3 +188,48 @@ def test_an_unregistered_sub_assembly_can_be_opened_too(story: GearboxStory) -> 
 
 def _without_identity(entry: BomEntry) -> BomEntry:
     return replace(entry, silo_uuid=None)
+
+
+def nested(depth: int) -> Extraction:
+    """Each level holds the two assemblies below it: 2 ** depth lines when written out."""
+    below: tuple[BomEntry, ...] = ()
+    for level in range(depth):
+        below = tuple(
+            BomEntry(
+                f"/v/{side}{level}.FCStd", None, label=f"{side}{level}", is_assembly=True, children=below
+            )
+            for side in "AB"
+        )
+    return Extraction(BomEntry("/v/Top.FCStd", label="Top", is_assembly=True, level=0), below)
+
+
+def size(table: Iterable[Row]) -> int:
+    return sum(1 + size(row.children) for row in table)
+
+
+def test_a_tree_that_nobody_could_read_is_cut(story: GearboxStory) -> None:
+    """Thirty levels of two assemblies are a billion lines; the own lines of the top are all there."""
+    extraction = nested(30)
+    uuids = {name: str(uuid.uuid4()) for name in ("A", "B")}
+    for name, identity in uuids.items():
+        story.client.create_item("kindred-rd", "A01", name, item_type="assembly", idempotency_key=identity)
+    table = rows(preview_of(story, _known(extraction, uuids)))
+    assert size(table) < 5000
+    assert [row.name for row in table[:2]] == ["A", "B"]
+    assert "more" in _last(table[0]).name
+
+
+def _known(extraction: Extraction, uuids: dict[str, str]) -> Extraction:
+    done: dict[int, BomEntry] = {}
+
+    def known(entry: BomEntry) -> BomEntry:
+        if id(entry) not in done:
+            children = tuple(known(child) for child in entry.children)
+            done[id(entry)] = replace(entry, silo_uuid=uuids[entry.label[0]], children=children)
+        return done[id(entry)]
+
+    return replace(extraction, entries=tuple(known(entry) for entry in extraction.entries))
+
+
+def _last(row: Row) -> Row:
+    return _last(row.children[-1]) if row.children else row
