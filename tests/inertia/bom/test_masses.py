@@ -72,6 +72,9 @@ def test_the_four_empty_forms(text: str) -> None:
         "无值",
         "n/a",
         "—",
+        "<not specified>",
+        "Material <not specified>",
+        "<none>",
     ],
 )
 def test_localised_empty_forms(text: str) -> None:

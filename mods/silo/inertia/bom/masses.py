@@ -42,7 +42,8 @@ MASS_UNITS: dict[str, float] = {
 # What Onshape and others write for "nothing" in the languages whose headers we know.
 _EMPTY = {
     "", "-", "--", "---", "–", "—", "?", "n/a", "na", "n.a.", "none", "no value", "null", "nan", "unknown",
-    "not set", "unset", "keine", "keiner", "keines", "kein wert", "ohne", "nicht zugewiesen", "aucun",
+    "not set", "unset", "unspecified", "not specified", "material <not specified>", "nicht spezifiziert",
+    "material <nicht festgelegt>", "nicht festgelegt", "keine", "keiner", "keines", "kein wert", "ohne", "nicht zugewiesen", "aucun",
     "aucune", "aucune valeur", "sans valeur", "ninguno", "ninguna", "sin valor", "nessuno", "nessuna",
     "nessun valore", "なし", "値なし", "無し", "无", "无值", "無", "没有值",
 }  # fmt: skip
@@ -51,7 +52,7 @@ _EMPTY = {
 def is_empty(cell: str) -> bool:
     """True where a cell says "nothing": empty, "No value", "- None -", and their translations."""
     text = unicodedata.normalize("NFKC", cell).strip().casefold()
-    inner = re.fullmatch(r"[-–—]\s*(.*?)\s*[-–—]", text)
+    inner = re.fullmatch(r"[-–—<]\s*(.*?)\s*[-–—>]", text)
     return text in _EMPTY or (inner is not None and inner[1] in _EMPTY)
 
 
