@@ -197,8 +197,9 @@ CASES: dict[int, Case] = {
     ),
     41: Case("URDF, SDF, MJCF read back", "made", (OUTPUT + "test_case_41_snippets_read_back",)),
     42: Case(
-        "MuJoCo", "made",
-        (OUTPUT + "test_case_42_mujoco_loads_every_link", OUTPUT + "test_case_42_mujoco_loads_our_urdf"),
+        "MuJoCo", "made, and every real file",
+        (OUTPUT + "test_case_42_mujoco_loads_every_link", OUTPUT + "test_case_42_mujoco_loads_our_urdf",
+         "test_real_files.py::test_case_42_mujoco_loads_every_link"),
     ),
     43: Case(
         "report: schema, order, codes", "made",

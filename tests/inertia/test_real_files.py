@@ -15,6 +15,8 @@ from silo.inertia.calculator import read_geometry
 from silo.inertia.codes import Source
 from silo.inertia.geometry import ReadOptions
 from silo.inertia.model import Assembly, GeometryCode
+from silo.inertia.output.snippets import snippets
+from silo.inertia.output.values import writable
 from silo.inertia.products import leaf_products
 
 Fixture = Callable[..., Any]
@@ -80,6 +82,23 @@ def test_by_material_the_volume_counts(read: Callable[[str], Assembly], compute:
     assert report.total.mass == pytest.approx(7850 * volume, rel=1e-9)
     empty = {p.name for p in assembly.prototypes.values() if not p.volume_m3}
     assert {w.part_name for w in report.warnings if w.code == "no_volume"} == empty
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_case_42_mujoco_loads_every_link(
+    read: Callable[[str], Assembly], compute: Fixture, name: str
+) -> None:
+    """Each link of each file, all of steel, on a joint of its own, with the mass that the report says."""
+    mujoco = pytest.importorskip("mujoco")
+    assembly = read(name)
+    text, _ = bom_of(assembly, lambda number: 0.0)
+    report = compute(assembly, text.replace("- None -,0.000000 kg", "Steel,No value"))
+    links = writable(report.links.values())
+    assert set(links) == {link.name for link in report.links.values() if link.props.mass > 0}
+    bodies = snippets(links, "mjcf").replace("<inertial", "<freejoint/><inertial")
+    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{bodies}</worldbody></mujoco>")
+    masses = {model.body(i).name: model.body_mass[i] for i in range(1, model.nbody)}
+    assert masses == pytest.approx({link: props.mass for link, props in links.items()}, rel=1e-12)
 
 
 @pytest.mark.parametrize("name", FILES)

@@ -43,9 +43,9 @@ MASS_UNITS: dict[str, float] = {
 _EMPTY = {
     "", "-", "--", "---", "–", "—", "?", "n/a", "na", "n.a.", "none", "no value", "null", "nan", "unknown",
     "not set", "unset", "unspecified", "not specified", "material <not specified>", "nicht spezifiziert",
-    "material <nicht festgelegt>", "nicht festgelegt", "keine", "keiner", "keines", "kein wert", "ohne", "nicht zugewiesen", "aucun",
-    "aucune", "aucune valeur", "sans valeur", "ninguno", "ninguna", "sin valor", "nessuno", "nessuna",
-    "nessun valore", "なし", "値なし", "無し", "无", "无值", "無", "没有值",
+    "material <nicht festgelegt>", "nicht festgelegt", "keine", "keiner", "keines", "kein wert", "ohne",
+    "nicht zugewiesen", "aucun", "aucune", "aucune valeur", "sans valeur", "ninguno", "ninguna", "sin valor",
+    "nessuno", "nessuna", "nessun valore", "なし", "値なし", "無し", "无", "无值", "無", "没有值",
 }  # fmt: skip
 
 
