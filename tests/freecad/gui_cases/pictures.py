@@ -115,12 +115,17 @@ def photograph_window(name: str) -> None:
 
 
 def save(image: Any, name: str) -> None:
-    """Save with the 256 commonest colours: for a window they are enough, and the file is a fifth."""
+    """Save with 256 colours: for a window they are enough, and the file is a fifth."""
     image = image.convertToFormat(QtGui.QImage.Format.Format_RGB32)
     width, height = image.width(), image.height()
     pixels = memoryview(bytes(image.constBits())[: 4 * width * height]).cast("I")
     found = Counter(pixels)
-    table = [colour for colour, _count in found.most_common(256)]
+    # The commonest, and those of each further shade, so that many greys do not push out the one red.
+    common = [colour for colour, _count in found.most_common()]
+    shades: dict[int, int] = {}
+    for colour in common:
+        shades.setdefault(colour & 0xF0F0F0, colour)
+    table = list(dict.fromkeys((*common[:96], *shades.values())))[:256]
     places = {colour: place for place, colour in enumerate(table)}
     for colour in found:
         if colour not in places:
