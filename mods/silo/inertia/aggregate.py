@@ -22,7 +22,7 @@ from silo.inertia.masses import Placed
 from silo.inertia.matching import Matching
 from silo.inertia.model import Assembly
 from silo.inertia.names import plain
-from silo.inertia.products import companions, leaf_products, sub_assemblies
+from silo.inertia.products import Product
 from silo.inertia.report import InertiaReport, LinkResult, PartResult, PartWarning, SubAssemblyResult
 
 _TENSOR_WORDS = {
@@ -206,9 +206,11 @@ def tell_bom(report: InertiaReport, table: BomTable) -> None:
         report.add_warning("", warning.name, f"BOM {warning}", warning.code)
 
 
-def tell_rows(report: InertiaReport, assembly: Assembly, matching: Matching) -> None:
+def tell_rows(
+    report: InertiaReport, leaves: Sequence[Product], groups: Sequence[Product], matching: Matching
+) -> None:
     """BOM rows that no part uses, and rows whose quantity is not the number of parts."""
-    names = {plain(product.name) for product in (*leaf_products(assembly), *sub_assemblies(assembly))}
+    names = {plain(product.name) for product in (*leaves, *groups)}
     for row in matching.unused:
         quantity = f", quantity {row.quantity:g}" if row.quantity is not None else ""
         why = "no part in the geometry has this name"
@@ -220,11 +222,10 @@ def tell_rows(report: InertiaReport, assembly: Assembly, matching: Matching) -> 
             f"BOM line {row.line}{quantity}: {why}; its mass is not counted",
             MassCode.ROW_UNUSED,
         )
-    beside = companions(assembly)
     counted: dict[int, int] = {}
     products = [
-        *((p, matching.parts.get(p.key)) for p in leaf_products(assembly) if p.key not in beside),
-        *((p, matching.groups.get(p.key)) for p in sub_assemblies(assembly)),
+        *((product, matching.parts.get(product.key)) for product in leaves),
+        *((product, matching.groups.get(product.key)) for product in groups),
     ]
     for product, match in products:
         if match is not None:

@@ -69,7 +69,8 @@ def _run(
         found = rule.density_of(row.material)
         return found if found is not None else getattr(product, "density", None)
 
-    matching = match(leaf_products(assembly), sub_assemblies(assembly), rows, density)
+    leaves, groups = leaf_products(assembly), sub_assemblies(assembly)
+    matching = match(leaves, groups, rows, density)
     placed = place_all(assembly, rule, matching)
     report.assembly, report.source = assembly.name, assembly.source
     report.bom = rows.source
@@ -81,7 +82,7 @@ def _run(
     if task.simulated:
         tell_tensors(report)
     tell_claims(report, assembly, claims)
-    tell_rows(report, assembly, matching)
+    tell_rows(report, leaves, groups, matching)
     return report
 
 
