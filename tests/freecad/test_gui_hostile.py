@@ -78,7 +78,10 @@ def test_with_consent_it_is_synced(hostile: Told) -> None:
 
 
 def test_show_selects_what_it_counts(hostile: Told) -> None:
-    """The instances of the first line."""
+    """In the pane the links to a missing file, in the preview the instances of a line."""
+    shown = hostile.said["shown"]
+    assert "L17" in shown
+    assert len(shown) > 20
     assert hostile.said["selected"] > 20
 
 

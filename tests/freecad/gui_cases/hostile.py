@@ -23,6 +23,7 @@ from inside import (
     boxes,
     dialog,
     labels,
+    press,
     run,
     settled,
     tell,
@@ -114,7 +115,9 @@ def commit(one: Any) -> None:
 
 
 def preview(one: Any) -> None:
-    Gui.runCommand("Silo_BOM")
+    press(one.dock, "Show")
+    tell(shown=[obj.Name for obj in Gui.Selection.getSelection()])
+    press(one.dock, "Show all…")
     window = wait(lambda: next(iter(one.previews._open.values()), None))
     wait(lambda: window._preview is not None)
     tell(preview=look(window, "preview"))

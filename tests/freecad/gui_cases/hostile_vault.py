@@ -29,8 +29,8 @@ LABELS = {
 }
 FILES = ('<i>Bolt<br> & "co"\'s', "\u202etxt.tloB", "two\nlines", "w" * 200)
 MANY, DEEP = 150, 14
-# Those that are items of the server: the many, and the two copies of one.
-REGISTERED = MANY + 1
+# Those that are items of the server: the many, the two copies of one, and the deep assembly.
+REGISTERED = MANY + 2
 
 
 WRONG: tuple[dict[str, Any], ...] = (
@@ -51,7 +51,8 @@ def write(folder: Path, client: SiloClient, links: int) -> None:
         category = "A01" if kind == "assembly" else "M01"
         return str(client.create_item("kindred-rd", category, name, item_type=kind).id)
 
-    targets = [*_strange(folder), *_wrong(folder), *_broken(folder), *_rings(folder), _deep(folder)]
+    deep = [item(f"<i>Deep</i> {level}", "assembly") for level in range(DEEP)]
+    targets = [*_strange(folder), *_wrong(folder), *_broken(folder), *_rings(folder), _deep(folder, deep)]
     one_identity = item("Copied")
     for name in ("Copied", "Copied2"):
         targets.append(_save(part(name, uuid=one_identity), folder / f"{name}.FCStd"))
@@ -107,11 +108,11 @@ def _rings(folder: Path) -> list[Target]:
     return [("RingA.FCStd", "Assembly")]
 
 
-def _deep(folder: Path) -> Target:
+def _deep(folder: Path, ids: list[str]) -> Target:
     """Each level holds the next one twice: few files, very many occurrences."""
     below = _save(part("Leaf"), folder / "Leaf.FCStd")
-    for level in range(DEEP):
-        doc = _assembly(f"<i>Deep</i> {level}", [below, below], hidden=True)
+    for level, identity in enumerate(ids):
+        doc = _assembly(f"<i>Deep</i> {level}", [below, below], uuid=identity, hidden=True)
         below = _save(doc, folder / f"Deep{level}.FCStd")
     return below
 
