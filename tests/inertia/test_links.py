@@ -112,6 +112,16 @@ def test_map_claims_in_order_and_tells_overlaps(assemble: Fixture, compute: Fixt
     }
 
 
+def test_an_overlap_of_many_parts_is_told_once(assemble: Fixture, compute: Fixture) -> None:
+    """A thousand bolts that two links want are one warning, not a thousand."""
+    asm = assemble(*((f"arm/b{i}", PART) for i in range(1000)))
+    report = compute(
+        asm, "Name,Material,Mass\np,steel,\n", links=link_map({"links": {"a": ["arm"], "b": ["arm"]}})
+    )
+    (told,) = [w for w in report.warnings if w.code == "claimed_twice"]
+    assert told.message.startswith("arm/b0 and 999 more of it: a has them")
+
+
 def test_map_from_yaml(tmp_path: Path, assemble: Fixture, compute: Fixture) -> None:
     """The documented form, with frames."""
     path = tmp_path / "links.yaml"

@@ -17,6 +17,8 @@ from silo.inertia.names import Suggester, bare, could_be, plain
         ("Pe\u0327a", "Pe\u0327a"),
         ("é", "e\u0301"),
         ("ＡＢＣ", "abc"),
+        ("Base\u00a0plate", "Base plate"),
+        ("\ufeffarm\u200b", "arm"),
     ],
 )
 def test_same_but_for_writing(left: str, right: str) -> None:

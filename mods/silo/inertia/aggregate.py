@@ -188,14 +188,15 @@ def tell_claims(report: InertiaReport, assembly: Assembly, claims: Claims) -> No
             f"no link claims it ({many}{part.total_mass:.6g} kg, {part.paths[0]}); it is in no link's mass",
             MassCode.UNCLAIMED,
         )
+    twice: dict[tuple[str, str, str], list[str]] = {}
     for owner, other, index in claims.twice:
-        path = assembly.instances[index].name
-        report.add_warning(
-            other,
-            assembly.prototypes[assembly.instances[index].prototype].name,
-            f"{path} belongs to {owner} by the link map, and {other} claims it as well; {owner} has it",
-            MassCode.CLAIMED_TWICE,
-        )
+        instance = assembly.instances[index]
+        name = assembly.prototypes[instance.prototype].name
+        twice.setdefault((owner, other, name), []).append(instance.name)
+    for (owner, other, name), paths in twice.items():
+        pieces = f"{paths[0]} and {len(paths) - 1} more of it" if len(paths) > 1 else paths[0]
+        words = f"{pieces}: {owner} has them by the link map, and {other} claims them as well"
+        report.add_warning(other, name, words, MassCode.CLAIMED_TWICE)
     for link, pattern in claims.unused:
         report.add_warning(link, "", f"the pattern “{pattern}” matches nothing", MassCode.PATTERN_UNUSED)
 

@@ -23,9 +23,12 @@ _OCCURRENCE = re.compile(r"(?:\s*<\d+>|\s+\(\d+\)|:\d+)$")
 _LOST_RUN = re.compile(rf"[?{LOST}]+")
 
 
+_INVISIBLE = dict.fromkeys(map(ord, "\u00ad\u200b\u200c\u200d\u2060\ufeff"))
+
+
 def plain(name: str) -> str:
-    """NFKC, case-folded; underscores, hyphens and runs of spaces are one space."""
-    return _separated(unicodedata.normalize("NFKC", name).casefold())
+    """NFKC, case-folded, without unseen characters; underscores, hyphens, runs of spaces are one space."""
+    return _separated(unicodedata.normalize("NFKC", name.translate(_INVISIBLE)).casefold())
 
 
 def bare(name: str) -> str:
