@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from silo.bom.identity import walk_entries
 from silo.bom.model import BomEntry
 
+_MOST_READ = 2000
 _SUFFIX = re.compile(r"\.fcstd$", re.IGNORECASE)
 _WORD = re.compile(r"[^\W\d_]{3,}")
 # BasePlate is two words.
@@ -40,7 +41,8 @@ class Proposal:
 
 def clean_name(text: str) -> str:
     """A label as a name for people: no file suffix, no control characters, single spaces."""
-    text = _SUFFIX.sub("", unicodedata.normalize("NFC", text))
+    # A label may be megabytes long, and no more than the beginning of it is used.
+    text = _SUFFIX.sub("", unicodedata.normalize("NFC", text[:_MOST_READ]))
     printable = "".join(" " if unicodedata.category(c) in ("Cc", "Cf", "Zl", "Zp") else c for c in text)
     return " ".join(printable.replace("_", " ").split())[:200]
 
