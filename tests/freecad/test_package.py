@@ -82,13 +82,8 @@ def test_a_clone_in_mod_works(version: str, tmp_path: Path) -> None:
         )
         said = freecad.run("clone.py")
     assert said["from"].startswith(str(clone))
-    assert said["commands"] == [
-        "Origin_Commit",
-        "Silo_Activity",
-        "Silo_BOM",
-        "Silo_RegisterParts",
-        "Silo_Settings",
-    ]
-    assert said["toolbar"] == ["Origin_Commit", "Silo_BOM", "Silo_RegisterParts", "Silo_Activity"]
+    wanted = ["Origin_Commit", "Silo_BOM", "Silo_RegisterParts", "Silo_Activity"]
+    assert {*wanted, "Silo_Settings"} <= set(said["commands"])
+    assert [name for name in said["toolbar"] if name in wanted] == wanted
     assert said["without_icon"] == said["without_tip"] == []
     assert said["report"] == []
