@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from step_writer import trsf_of
 
 from silo.inertia.core import combine_arrays
 from silo.inertia.geometry import occt
+from silo.inertia.model import GeometryCode
 
 Fixture = Callable[..., Any]
 PARTS, MODULES, EACH = 20, 100, 100
@@ -63,6 +65,38 @@ def test_case_20_ten_thousand_instances_of_twenty_parts(
     np.testing.assert_allclose(report.total.com, wanted.com, rtol=1e-9)
     np.testing.assert_allclose(report.total.inertia, wanted.inertia, atol=1e-9 * wanted.inertia.max())
     assert codes(report) == []
+
+
+@pytest.mark.parametrize(
+    ("stated", "size"), [("SI_UNIT(.KILO.,.METRE.)", "1e+04 m"), ("SI_UNIT(.MICRO.,.METRE.)", "1e-05 m")]
+)
+def test_case_18_a_unit_that_cannot_be_meant_is_told(
+    step: Fixture, tmp_path: Path, pipeline: Fixture, codes: Fixture, stated: str, size: str
+) -> None:
+    """A bracket of 10 mm in a file that says kilometres weighs a mountain: asked, and the size is named."""
+    document = step()
+    document.part(BRepPrimAPI_MakeBox(10, 10, 10).Shape(), "cube")
+    path = document.write(tmp_path / "cube.step")
+    text = path.read_text("ascii")
+    assert "SI_UNIT(.MILLI.,.METRE.)" in text
+    path.write_text(text.replace("SI_UNIT(.MILLI.,.METRE.)", stated), "ascii")
+    report = pipeline(path, "Name,Material,Mass\ncube,steel,\n")
+    assert codes(report) == [GeometryCode.UNITS]
+    assert f"measures {size}: was another unit meant?" in report.warnings[0].message
+
+
+def test_case_18_a_file_without_a_unit_is_told(
+    step: Fixture, tmp_path: Path, pipeline: Fixture, codes: Fixture
+) -> None:
+    """The kernel takes it for mm in silence."""
+    document = step()
+    document.part(BRepPrimAPI_MakeBox(10, 10, 10).Shape(), "cube")
+    path = document.write(tmp_path / "cube.step")
+    context = re.compile(r"GLOBAL_UNIT_ASSIGNED_CONTEXT\s*\(\(#\d+,")
+    path.write_text(context.sub("GLOBAL_UNIT_ASSIGNED_CONTEXT((", path.read_text("ascii")), "ascii")
+    report = pipeline(path, "Name,Material,Mass\ncube,steel,\n")
+    assert report.total.mass == pytest.approx(7850e-6)
+    assert codes(report) == [GeometryCode.UNITS]
 
 
 @pytest.mark.parametrize(("unit", "metres"), [("M", 1.0), ("INCH", 0.0254), ("MM", 1e-3)])

@@ -10,7 +10,7 @@ import numpy as np
 
 from silo.inertia.core import rigid_mask
 from silo.inertia.geometry.graph import bottom_up
-from silo.inertia.geometry.mesh import Floats
+from silo.inertia.geometry.mesh import Floats, Mesh
 from silo.inertia.geometry.names import has_lost_characters
 from silo.inertia.model import GeometryCode, GeometryProblem, Instance, Prototype
 from silo.inertia.wording import counted
@@ -21,6 +21,24 @@ if TYPE_CHECKING:
 
 STATED_TOLERANCE = 1e-3
 """Files state volumes from their own integrations, 2.6e-5 off in one published by the format's authors."""
+
+
+LARGE_M, SMALL_M = 20.0, 5e-4
+"""A part whose largest extent [m] is outside of this was probably meant in another unit."""
+
+
+def implausible_size(prototypes: Mapping[str, Prototype], unit: str) -> list[GeometryProblem]:
+    """Parts of 30 km or of a grain of dust: the file's unit is not the one that its numbers are in."""
+    extents = [float(p.mesh.extents.max()) for p in prototypes.values() if isinstance(p.mesh, Mesh)]
+    extents = extents or [p.volume_m3 ** (1 / 3) for p in prototypes.values() if p.volume_m3 > 0]
+    if not extents or SMALL_M <= max(extents) <= LARGE_M:
+        return []
+    return [
+        GeometryProblem(
+            GeometryCode.UNITS,
+            f"read in {unit}, the largest part measures {max(extents):.3g} m: was another unit meant?",
+        )
+    ]
 
 
 def against_stated(volume: float, com: Floats, stated: Stated) -> list[GeometryProblem]:

@@ -16,15 +16,12 @@ import numpy as np
 
 from silo.bom.errors import ConfigError, DocumentError
 from silo.inertia.core import combine_arrays
-from silo.inertia.geometry.checks import name_problems, scaled_problems
+from silo.inertia.geometry.checks import implausible_size, name_problems, scaled_problems
 from silo.inertia.geometry.detect import Kind
 from silo.inertia.geometry.graph import MAX_DEPTH, Child, Floats, Node, unfold
 from silo.inertia.geometry.mesh import Indices, Mesh, components, is_inside, mesh_solid
 from silo.inertia.geometry.options import MESH_UNITS, Reading, ReadOptions, Report
 from silo.inertia.model import Assembly, GeometryCode, GeometryProblem, Prototype, SolidProps
-
-LARGE_M, SMALL_M = 20.0, 5e-4
-"""A part whose largest extent [m] is outside of this was probably meant in another unit."""
 
 MAX_COMPONENTS = 500
 """Meshes in more pieces than this are measured as a whole: scans come in thousands of crumbs."""
@@ -61,7 +58,7 @@ def read_mesh(path: Path, kind: Kind, options: ReadOptions, report: Report) -> R
         for key, node in scene.nodes.items()
     }
     unfolded = unfold(nodes, roots, options.max_instances)
-    problems += _implausible(prototypes, unit_name)
+    problems += implausible_size(prototypes, unit_name)
     problems += scaled_problems(unfolded.instances)
     used = dict.fromkeys(instance.prototype for instance in unfolded.instances)
     assembly = Assembly(
@@ -165,18 +162,6 @@ def _unit(scene: MeshScene, options: ReadOptions) -> tuple[float, str, list[Geom
         "the format states no unit of length; read as mm. Name the unit where it is another",
     )
     return MESH_UNITS["mm"], "mm", [problem]
-
-
-def _implausible(prototypes: Mapping[str, Prototype], unit: str) -> list[GeometryProblem]:
-    extents = [float(p.mesh.extents.max()) for p in prototypes.values() if isinstance(p.mesh, Mesh)]
-    if not extents or SMALL_M <= max(extents) <= LARGE_M:
-        return []
-    return [
-        GeometryProblem(
-            GeometryCode.UNITS,
-            f"read in {unit}, the largest part measures {max(extents):.3g} m: was another unit meant?",
-        )
-    ]
 
 
 def _in_metres(matrix: Floats, unit: float) -> Floats:

@@ -8,6 +8,7 @@ from pathlib import Path
 from silo.bom.errors import DocumentError, InputError
 from silo.inertia.geometry.checks import (
     against_stated,
+    implausible_size,
     lost_stretches,
     name_problems,
     scaled_problems,
@@ -40,6 +41,10 @@ def read_step(path: Path, options: ReadOptions, report: Report) -> Reading:
         prototypes[key] = _prototype(step, key, options, siblings.problems.get(key))
     problems = [*split_problems(siblings), *stated_totals(step, prototypes)]
     problems += [*lost_stretches(step), *scaled_problems(unfolded.instances)]
+    problems += implausible_size(prototypes, step.unit or "mm")
+    if not step.unit and any(prototype.volume_m3 for prototype in prototypes.values()):
+        words = "the file states no unit of length that is understood; it was read as mm"
+        problems.append(GeometryProblem(GeometryCode.UNITS, words))
     single = len(step.roots) == 1
     assembly = Assembly(
         name=step.nodes[step.roots[0].product].name if single else path.stem,
