@@ -220,6 +220,14 @@ class AddOn:
         if doc is not None:
             self.registrations.start(doc)
 
+    def mass(self) -> None:
+        """Show the masses of the active assembly."""
+        doc = host.active_document()
+        if doc is not None:
+            from silo.workbench.mass_flow import MassFlow
+
+            MassFlow().start(doc)
+
     def register_path(self, path: str) -> None:
         """Give part numbers to the components of this document, where it is open."""
         doc = host.find_document(path)

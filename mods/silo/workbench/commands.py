@@ -14,6 +14,7 @@ COMMIT = "Origin_Commit"
 OWN_COMMIT = "Silo_Commit"
 BOM = "Silo_BOM"
 REGISTER = "Silo_RegisterParts"
+MASS = "Silo_Mass"
 ACTIVITY = "Silo_Activity"
 SETTINGS = "Silo_Settings"
 
@@ -71,6 +72,15 @@ def commands(addon: Any) -> dict[str, Command]:
             tip=translate("Silo", "Give part numbers to the components of this assembly that have none"),
             icon="silo-register",
             run=addon.register,
+            active=addon.has_document,
+        ),
+        MASS: Command(
+            text=translate("Silo", "Mass of the Assembly…"),
+            tip=translate(
+                "Silo", "Mass and centre of mass from the parts' shapes and materials, with what is missing"
+            ),
+            icon="silo-mass",
+            run=addon.mass,
             active=addon.has_document,
         ),
         ACTIVITY: Command(

@@ -14,7 +14,17 @@ from typing import Any
 
 from silo.workbench import dependencies, host, qt, words
 from silo.workbench.addon import AddOn
-from silo.workbench.commands import ACTIVITY, BOM, COMMIT, OWN_COMMIT, REGISTER, SETTINGS, Command, commands
+from silo.workbench.commands import (
+    ACTIVITY,
+    BOM,
+    COMMIT,
+    MASS,
+    OWN_COMMIT,
+    REGISTER,
+    SETTINGS,
+    Command,
+    commands,
+)
 from silo.workbench.placement import place
 
 RESOURCES = Path(__file__).parent / "resources"
@@ -34,7 +44,7 @@ def start() -> None:
         return
     addon = AddOn()
     known = commands(addon)
-    for name in (BOM, REGISTER, ACTIVITY, SETTINGS):
+    for name in (BOM, REGISTER, MASS, ACTIVITY, SETTINGS):
         host.add_command(name, known[name])
     host.add_workbench(silo_workbench())
     host.add_preference_page(addon.preference_page(), PREFERENCE_GROUP)
@@ -75,7 +85,7 @@ def silo_workbench() -> Any:
 
         def Initialize(self) -> None:
             self.appendToolbar("Silo", [COMMIT, BOM, REGISTER, ACTIVITY])
-            self.appendMenu("&Silo", [COMMIT, BOM, REGISTER, ACTIVITY, SETTINGS])
+            self.appendMenu("&Silo", [COMMIT, BOM, REGISTER, MASS, ACTIVITY, SETTINGS])
 
         def GetClassName(self) -> str:
             return "Gui::PythonWorkbench"

@@ -170,6 +170,16 @@
         </message>
         <message>
             <location filename="../../commands.py" />
+            <source>Mass of the Assembly…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Mass and centre of mass from the parts' shapes and materials, with what is missing</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
             <location filename="../../dock.py" />
             <source>Database Activity</source>
             <translation type="unfinished" />
@@ -435,6 +445,130 @@
             <location filename="../../entries.py" />
             <location filename="../../preview_dialog.py" />
             <source>View in Silo →</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass_dialog.py" />
+            <source>Mass of {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass_dialog.py" />
+            <location filename="../../register_rows.py" />
+            <source>Part</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass_dialog.py" />
+            <source>Quantity</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass_dialog.py" />
+            <source>Mass of one</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass_dialog.py" />
+            <source>Mass</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass_dialog.py" />
+            <source>Volume of one, cm³</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass_dialog.py" />
+            <source>Material</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass_dialog.py" />
+            <location filename="../../register_dialog.py" />
+            <source>Remarks</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass_dialog.py" />
+            <source>Copy</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass_dialog.py" />
+            <source>Copy the table, for a spreadsheet</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass_dialog.py" />
+            <location filename="../../preview_dialog.py" />
+            <location filename="../../register_dialog.py" />
+            <source>Close</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass_flow.py" />
+            <source>Mass of the assembly</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass_flow.py" />
+            <source>This FreeCAD's Python has no numpy, which masses need.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass_flow.py" />
+            <source>Measuring {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass_flow.py" />
+            <source>Reading the assembly…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass_flow.py" />
+            <source>Part {n} of {total}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass_flow.py" />
+            <source>face {n} of {total}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass_rows.py" />
+            <source>1 part has no mass; it is missing from the sum.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass_rows.py" />
+            <source>{n} parts have no mass; they are missing from the sum.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass_rows.py" />
+            <source>No part of this assembly has a material with a density.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass_rows.py" />
+            <source>{mass} in {pieces}, centre of mass at {x}, {y}, {z} mm</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass_rows.py" />
+            <source>1 piece</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass_rows.py" />
+            <source>{n} pieces</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../mass_rows.py" />
+            <source>no material with a density</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -792,12 +926,6 @@
         </message>
         <message>
             <location filename="../../preview_dialog.py" />
-            <location filename="../../register_dialog.py" />
-            <source>Close</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview_dialog.py" />
             <source>Sync the {n} sub-assembly that differs too, before this one</source>
             <translation type="unfinished" />
         </message>
@@ -865,11 +993,6 @@
         <message>
             <location filename="../../register_dialog.py" />
             <source>Category</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register_dialog.py" />
-            <source>Remarks</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -945,11 +1068,6 @@
         <message>
             <location filename="../../register_flow.py" />
             <source>Registered</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register_rows.py" />
-            <source>Part</source>
             <translation type="unfinished" />
         </message>
         <message>
