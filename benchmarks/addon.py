@@ -4,7 +4,7 @@
     python benchmarks/addon.py [start] [commit] [hostile] [--freecad 1.1] [--pairs 15] [--links 1000]
 
 start     FreeCAD's start with the add-on and without it, in turn, each a process of its own; the median of
-          the differences. Goal: under 50 ms.
+          the differences, and the difference of the least. Goal: under 50 ms.
 commit    an assembly of single links to part files is committed to a server on this machine, six times. A
           timer of 1 ms in the GUI thread finds every moment in which the window could not react. The times
           that FreeCAD needed for the save itself, and ours for the snapshot, are measured apart and taken
@@ -83,7 +83,12 @@ def start(version: str, folder: Path, args: argparse.Namespace) -> None:
     with_it = median(one for one, _ in pairs)
     without = median(other for _, other in pairs)
     cost = median({kind: one[kind] - other[kind] for kind in one} for one, other in pairs)
-    tell(version, "start", {"with": with_it, "without": without, "the add-on": cost})
+    # What disturbs only ever adds, so the least of each side is the truest where the machine has other work.
+    least = {
+        kind: min(one[kind] for one, _ in pairs) - min(other[kind] for _, other in pairs) for kind in cost
+    }
+    found = {"with": with_it, "without": without, "the add-on": cost, "by the least of each": least}
+    tell(version, "start", found)
 
 
 def measure(freecad: Window) -> dict[str, float]:
