@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Inside FreeCAD: the pane in a light and in a dark theme; how well each text in it can be read."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections import Counter
+from typing import Any
+
+sys.path.insert(0, os.environ["SILO_TEST_CASES"])
+
+from inside import (
+    App,
+    Gui,
+    QtCore,
+    QtGui,
+    QtWidgets,
+    addon,
+    assembly,
+    boxes,
+    part,
+    register,
+    run,
+    settled,
+    tell,
+    wait,
+)
+
+# As FreeCAD's dark themes do it: by a style sheet, the palette stays light.
+DARK = """
+QWidget { background-color: #333333; color: #f0f0f0; }
+QPushButton { background-color: #1a1a1a; border: 1px solid #000000; min-width: 80px; padding: 4px; }
+"""
+
+
+def story() -> None:
+    one = addon()
+    one.preferences.set("AskRegister", False)
+    one.preferences.set("AskComment", False)
+    wait(lambda: one.session.shown.connection == "online")
+    bolt, plate = part("Bolt"), part("Plate")
+    top = assembly("Top", ("B1", bolt, 0), ("B2", bolt, 3), ("P1", plate, 0))
+    register(bolt.Document, top.Document)
+    App.setActiveDocument(top.Document.Name)
+    Gui.runCommand("Origin_Commit")
+    wait(lambda: boxes("BOM Updated") and settled())
+    one.dock.show_and_raise()
+    one.dock.setFloating(True)
+    one.dock.resize(420, 900)
+    wait(one.dock.isVisible)
+    app = QtWidgets.QApplication.instance()
+    before = app.styleSheet()
+    for name, sheet in (("light", before), ("dark", DARK), ("light again", before)):
+        app.setStyleSheet(sheet)
+        still()
+        tell(**{name: contrasts(one.dock)})
+
+
+def still() -> None:
+    """Time for the pane to take the theme over."""
+    waited = QtCore.QElapsedTimer()
+    waited.start()
+    wait(lambda: waited.elapsed() > 300)
+
+
+def contrasts(dock: Any) -> dict[str, float]:
+    """Text → how it stands out from its ground: 1 not at all, 21 black on white (WCAG)."""
+    picture = dock.grab().toImage().convertToFormat(QtGui.QImage.Format.Format_RGB32)
+    # FreeCAD 0.20 draws with as many pixels as the screen's resolution asks for.
+    ratio = picture.width() / dock.width()
+    found: dict[str, float] = {}
+    for kind in (QtWidgets.QLabel, QtWidgets.QPushButton):
+        for widget in dock.widget().findChildren(kind):
+            area = QtCore.QRect(widget.mapTo(dock, QtCore.QPoint(0, 0)), widget.size())
+            # What is scrolled out in part shows something else.
+            whole = widget.visibleRegion().boundingRect() == widget.rect()
+            if widget.text() and whole and dock.rect().contains(area):
+                found[widget.text()] = round(contrast(picture.copy(scaled(area, ratio))), 2)
+    return found
+
+
+def scaled(area: Any, ratio: float) -> Any:
+    x, y, width, height = (round(side * ratio) for side in area.getRect())
+    return QtCore.QRect(x, y, width, height)
+
+
+def contrast(picture: Any) -> float:
+    colours = Counter(
+        picture.pixel(x, y) & 0xFFFFFF for y in range(picture.height()) for x in range(picture.width())
+    )
+    ground = luminance(colours.most_common(1)[0][0])
+    return max((max(ground, one) + 0.05) / (min(ground, one) + 0.05) for one in map(luminance, colours))
+
+
+def luminance(colour: int) -> float:
+    parts = [(colour >> shift & 255) / 255 for shift in (16, 8, 0)]
+    linear = [p / 12.92 if p <= 0.03928 else ((p + 0.055) / 1.055) ** 2.4 for p in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+run(story)
