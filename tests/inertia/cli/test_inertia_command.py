@@ -248,6 +248,24 @@ def test_a_urdf_of_another_robot_is_refused(run: Run, arm: Path) -> None:
     assert other.read_text("utf-8") == '<robot name="r"><link name="torso"/></robot>'
 
 
+def test_a_link_that_no_body_can_be_is_shown_and_refused(run: Run, step_files: Path, tmp_path: Path) -> None:
+    """A mass without geometry has no inertia: the report says why, the URDF stays as it was, exit 2."""
+    (tmp_path / "map.yaml").write_text("links: {holder: ['product:Wiring_holder*'], rest: ['**']}\n", "utf-8")
+    (tmp_path / "bom.csv").write_text("Name,Material,Mass\nWiring_holder v1,,0.0020 kg\n", "utf-8")
+    urdf = tmp_path / "robot.urdf"
+    urdf.write_text('<robot name="r"><link name="holder"/><link name="rest"/></robot>', "utf-8")
+    before = urdf.read_bytes()
+    ran = run(
+        "inertia", step_files / "so101_wrist_roll_pitch.step", "--bom", tmp_path / "bom.csv",
+        "--links", tmp_path / "map.yaml", "--urdf", urdf, "--json",
+    )  # fmt: skip
+    assert ran.code == 2
+    assert urdf.read_bytes() == before
+    assert "holder has no inertia (a point mass)" in ran.err
+    codes = {(w["link"], w["code"]) for w in ran.json()["warnings"]}
+    assert {("holder", "bad_tensor"), ("holder", "point_mass")} <= codes
+
+
 def test_links_of_the_urdf_that_get_nothing_are_named(run: Run, arm: Path) -> None:
     """A link that our assembly does not have keeps its old numbers: somebody should know."""
     text = (arm / "arm.urdf").read_text("utf-8")
