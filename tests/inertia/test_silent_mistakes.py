@@ -63,6 +63,16 @@ def test_a_mass_without_a_solid_has_no_density_to_doubt(
     assert codes(report, "b") == ["point_mass"]
 
 
+def test_running_numbers_are_no_part_numbers(assemble: Fixture, compute: Fixture, codes: Fixture) -> None:
+    """The file's product 2 and the BOM's part 2 have been counted by two programs."""
+    asm = assemble(("l/a", cube("bracket", part_number="2")))
+    head = "Part number,Quantity,Material,Mass,Name\n"
+    report = compute(asm, head + "1,1,,2.70 g,bracket A\n2,1,,7.80 g,motor\n")
+    assert "not_in_bom" in codes(report, "bracket")
+    real = assemble(("l/a", cube("bracket", part_number="F01-0002")))
+    assert codes(compute(real, head + "F01-0002,1,,2.70 g,bracket A\n")) == []
+
+
 def test_a_column_of_row_totals_makes_all_doubtful(
     assemble: Fixture, compute: Fixture, codes: Fixture
 ) -> None:

@@ -7,6 +7,7 @@ characters; the same part number. A row that an earlier tier used up is not offe
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -130,7 +131,7 @@ def _finders(rows: Sequence[BOMEntry]) -> Iterable[tuple[Rule, Finder]]:
 
     def number(product: Product) -> list[BOMEntry]:
         # A product may be named by its number, or carry a number that the BOM shows as the name.
-        keys = [plain(text) for text in (product.part_number, product.name) if text.strip()]
+        keys = [plain(text) for text in (product.part_number, product.name) if _tells_apart(text)]
         return list({id(row): row for key in keys for row in by_number.get(key, ())}.values())
 
     yield Rule.EXACT, lambda product: by_name.get(product.name, ())
@@ -138,6 +139,11 @@ def _finders(rows: Sequence[BOMEntry]) -> Iterable[tuple[Rule, Finder]]:
     yield Rule.NORMALISED, lambda product: by_bare.get(bare(product.name), ())
     yield Rule.WILDCARD, wildcard
     yield Rule.PART_NUMBER, number
+
+
+def _tells_apart(number: str) -> bool:
+    """Exporters number products 1, 2, 3, and so do BOMs; that both count says nothing about a part."""
+    return bool(number.strip()) and not re.fullmatch(r"\s*\d{1,3}\s*", number)
 
 
 def _index(
