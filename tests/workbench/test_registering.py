@@ -3,7 +3,11 @@
 
 from __future__ import annotations
 
+import hashlib
+import zipfile
 from pathlib import Path
+
+import pytest
 
 from silo.api.fake import FakeSilo
 from silo.bom.findings import Finding, FindingCode, Place, Severity
@@ -108,12 +112,46 @@ def test_a_copied_identity_is_offered_for_each_of_its_files(tmp_path: Path) -> N
     assert [c.similar for c in found.values()] == [(), ()]
 
 
+def fcstd(folder: Path, name: str, meta: str = "", saved: str = "2026-11-21T10:00:00Z") -> BomEntry:
+    """A part whose file says when it was saved, and what is in its Meta."""
+    entry = part(folder, name)
+    properties = f"""<Properties Count="2">
+        <Property name="LastModifiedDate" type="App::PropertyString"><String value="{saved}"/></Property>
+        <Property name="Meta" type="App::PropertyMap"><Map count="1">{meta}</Map></Property></Properties>"""
+    with zipfile.ZipFile(entry.doc_path, "w") as file:
+        file.writestr("Document.xml", f"<Document SchemaVersion='4'>{properties}</Document>")
+    return entry
+
+
+MARK = '<Item key="SiloUUID{}" value="0b5e7a8c-8a53-4b4c-9a56-9f1f3c1c1d11"/>'
+
+
+@pytest.mark.parametrize(
+    ("meta", "saved", "state"),
+    [
+        ("", "2026-11-21T10:00:00Z", State.READY),
+        ("", "2026-11-21T10:00:05Z", State.NEWER),
+        (MARK.format(""), "2026-11-21T10:00:00Z", State.NEWER),
+        (MARK.format("/Body"), "2026-11-21T10:00:00Z", State.NEWER),
+        (MARK.format("/Other"), "2026-11-21T10:00:00Z", State.READY),
+    ],
+)
+def test_a_file_that_changed_since_it_was_opened_is_not_overwritten(
+    tmp_path: Path, meta: str, saved: str, state: State
+) -> None:
+    """Saved by somebody else, or registered from the command line: the open document knows neither."""
+    entry = fcstd(tmp_path, "Part", meta, saved)
+    seen = {entry.doc_path: Seen(State.READY, "2026-11-21T10:00:00Z")}
+    silo = FakeSilo()
+    head = BomEntry(str(tmp_path / "Top.FCStd"), label="Top", is_assembly=True, level=0)
+    found = offer(Extraction(head, (entry,)), seen, silo, "kindred-rd", CONTROL)
+    assert found.candidates[0].state is state
+
+
 def _file(path: Path, content: bytes) -> Path:
     path.write_bytes(content)
     return path
 
 
 def _sha256(content: bytes) -> str:
-    import hashlib
-
     return hashlib.sha256(content).hexdigest()

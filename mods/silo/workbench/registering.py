@@ -7,9 +7,6 @@ identity is written into the document in the GUI thread, through a function that
 
 from __future__ import annotations
 
-import hashlib
-import re
-import zipfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
@@ -23,6 +20,7 @@ from silo.bom.model import BomEntry, Extraction
 from silo.bom.naming import Proposal, clean_name, crowded_files, propose
 from silo.registration import Journal, Registration, RegistrationApi, component_key, register
 from silo.workbench.jobs import Control
+from silo.workbench.on_disk import changed_since, sha256_or_nothing
 from silo.workbench.words import translate
 
 # Looking for look-alikes costs a request each; beyond this many nobody reads them.
@@ -38,7 +36,7 @@ class State(StrEnum):
     ELSEWHERE = "elsewhere"  # another FreeCAD has it open, and may overwrite what is saved here
     READ_ONLY = "read-only"
     PARTIAL = "partial"  # unsaved edits in a partly loaded document: FreeCAD cannot save them
-    NEWER = "newer"  # somebody else saved the file since it was opened here
+    NEWER = "newer"  # somebody else saved or registered the file since it was opened here
     MISSING = "missing"
     UNNAMED = "unnamed"  # never saved
     LOST = "lost"  # saving it in this FreeCAD would destroy its assemblies
@@ -59,7 +57,7 @@ def state_words() -> dict[State, str]:
         ),
         State.READ_ONLY: translate("Silo", "the file is read-only"),
         State.PARTIAL: translate("Silo", "has edits, but is loaded only in part: open the file itself first"),
-        State.NEWER: translate("Silo", "was saved by somebody else since you opened it: open it again first"),
+        State.NEWER: translate("Silo", "has changed on disk since you opened it: open it again first"),
         State.MISSING: translate("Silo", "the file is missing"),
         State.UNNAMED: translate("Silo", "has no file yet: save it first"),
         State.LOST: translate("Silo", "made by a newer FreeCAD: cannot be saved here"),
@@ -198,33 +196,11 @@ def _candidate(
     look = seen.get(entry.doc_path, Seen(State.MISSING))
     state, digest = look.state, ""
     if state.usable:
-        if look.saved_at and (in_file := saved_at(entry.doc_path)) and in_file != look.saved_at:
+        if look.saved_at and changed_since(entry, look.saved_at):
             state = State.NEWER
-        digest = _sha256(entry.doc_path)
+        digest = sha256_or_nothing(entry.doc_path)
     proposal = propose(entry, categories, shares_file=shares)
     return Candidate(proposal, state, shares, same_as=same_as, sha256=digest)
-
-
-_SAVED_AT = re.compile(rb'name="LastModifiedDate"[^>]*>\s*<String value="([^"]{0,40})"')
-
-
-def saved_at(path: str) -> str:
-    """The time stamp that FreeCAD wrote into a file at its last save; "" where it cannot be read."""
-    try:
-        with zipfile.ZipFile(path) as file, file.open("Document.xml") as xml:
-            # The document's own properties come first, and a hostile file may never end.
-            found = _SAVED_AT.search(xml.read(1 << 18))
-    except (OSError, KeyError, zipfile.BadZipFile, NotImplementedError, EOFError, RuntimeError):
-        return ""
-    return found[1].decode("ascii", "replace") if found else ""
-
-
-def _sha256(path: str) -> str:
-    try:
-        with open(path, "rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError:
-        return ""
 
 
 def _with_look_alikes(

@@ -1177,7 +1177,7 @@
         </message>
         <message>
             <location filename="../../registering.py" />
-            <source>was saved by somebody else since you opened it: open it again first</source>
+            <source>has changed on disk since you opened it: open it again first</source>
             <translation type="unfinished" />
         </message>
         <message>
