@@ -60,7 +60,7 @@ class CommitHook:
     def watch(self, name: str) -> None:
         """Take notice of this command's end from now on."""
         if not self._names:
-            self._host.add_document_observer(_SaveObserver(self._saved))
+            self._host.add_document_observer(_Observer(self._saved, self._activated))
         if name not in self._names:
             self._names.append(name)
 
@@ -83,6 +83,10 @@ class CommitHook:
         same = bool(doc.FileName) and os.path.realpath(filename) == os.path.realpath(doc.FileName)
         if same:
             self.note(doc, committed=False)
+
+    def _activated(self) -> None:
+        # The document is not the active one yet while FreeCAD tells it.
+        self._later(0, self._wrap_origin)
 
     def _wrap_origin(self) -> None:
         doc = self._host.active_document()
@@ -119,11 +123,15 @@ class CommitHook:
                 self._ended(doc)
 
 
-class _SaveObserver:
+class _Observer:
     """FreeCAD's document observer; an exception in it would only be printed."""
 
-    def __init__(self, saved: Callable[[Any, str], None]) -> None:
-        self._saved = saved
+    def __init__(self, saved: Callable[[Any, str], None], activated: Callable[[], None]) -> None:
+        self._saved, self._activated = saved, activated
+
+    def slotActivateDocument(self, _doc: Any) -> None:
+        """A person works in another document."""
+        self._activated()
 
     def slotFinishSaveDocument(self, doc: Any, filename: str) -> None:
         """A document is whole on disk."""
