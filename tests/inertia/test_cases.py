@@ -32,6 +32,7 @@ REAL = "geometry/test_real_step.py::"
 STAND_IN = "cases/test_stand_ins.py::"
 SPLIT = "cases/test_split_files.py::"
 MATCHING = "test_matching_cases.py::"
+NAMES = "test_name_cases.py::"
 OUTPUT = "output/test_output_cases.py::"
 LAWS = "property/test_core_laws.py::"
 
@@ -53,7 +54,7 @@ CASES: dict[int, Case] = {
         "inches, SOLID and wire COMPOUND leaves", "stand-in for as1_pe_203",
         (STAND_IN + "test_case_04_solid_and_wire_leaves_in_inches",
          PRODUCTS + "test_solid_and_wire_of_one_product_are_one_product",
-         MATCHING + "test_a_wire_beside_its_solid_is_one_part"),
+         "test_source_cases.py::test_a_wire_beside_its_solid_is_one_part"),
     ),
     5: Case(
         "instance names differ from the product", "stand-in for openplm_test2",
@@ -164,15 +165,15 @@ CASES: dict[int, Case] = {
         (MATCHING + "test_case_32_row_total_instead_of_unit_mass",
          "test_silent_mistakes.py::test_a_column_of_row_totals_makes_all_doubtful"),
     ),
-    33: Case("odd names", "made", (MATCHING + "test_case_33_names",)),
+    33: Case("odd names", "made", (NAMES + "test_case_33_names",)),
     34: Case(
         "names inside names", "made",
-        (MATCHING + "test_case_34_never_by_substring",
-         MATCHING + "test_case_34_bracket_and_bracket_2_side_by_side"),
+        (NAMES + "test_case_34_never_by_substring",
+         NAMES + "test_case_34_bracket_and_bracket_2_side_by_side"),
     ),
     35: Case(
         "material texts, FreeCAD's 1 kg/m³", "made",
-        (MATCHING + "test_case_35_materials_in_a_report",
+        (NAMES + "test_case_35_materials_in_a_report",
          "materials/test_table.py::test_texts_that_name_a_material",
          "materials/test_table.py::test_texts_that_only_look_like_one", "materials/test_cards.py"),
     ),

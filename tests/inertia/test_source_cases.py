@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Where a mass comes from when there is no solid, no BOM, no row, or a density in the file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from silo.inertia.bodies import box, shape_only
+from silo.inertia.codes import Source
+
+HEAD = "Item,Quantity,Part number,Material,Mass,Name\n"
+V = 1e-6  # of a cube of 1 cm
+Fixture = Callable[..., Any]
+
+
+def cube(name: str, size: float = 0.01, **more: Any) -> Any:
+    """A cube of ``size``; the key may be given, for different products of one name."""
+    return box(name, size, size, size, **more)
+
+
+def _options(density: float, **more: Any) -> Any:
+    from silo.inertia.massrule import Options
+
+    return Options(density, **more)
+
+
+def test_several_solids_share_their_rows_mass(assemble: Fixture, compute: Fixture, part: Fixture) -> None:
+    """One row, one product, two bodies: the mass is spread by volume, the centre is that of both."""
+    from silo.inertia.model import Prototype, SolidProps
+
+    unit = np.eye(3)
+    product = Prototype(
+        "p",
+        "p",
+        (SolidProps(1e-6, [0, 0, 0], unit * 1e-11), SolidProps(3e-6, [0.04, 0, 0], unit * 1e-10)),
+        4e-6,
+        np.array([0.03, 0, 0]),
+        unit * 2e-9,
+    )
+    report = compute(assemble(("l/p", product)), HEAD + "1,1,,,0.400 kg,p\n")
+    assert report.links["l"].props.com == pytest.approx([0.03, 0, 0])
+    assert report.links["l"].props.inertia == pytest.approx(unit * 2e-9 * 1e5)
+
+
+def test_no_solid_with_a_mass_is_a_point(
+    assemble: Fixture, compute: Fixture, codes: Fixture, at: Fixture
+) -> None:
+    """Case 13: the geometry is missing, the BOM has the mass: a point, flagged twice over."""
+    asm = assemble(("l/x", shape_only("x"), at(1, 2, 3)))
+    report = compute(asm, HEAD + "1,1,,,0.400 kg,x\n")
+    assert report.links["l"].props.mass == pytest.approx(0.4)
+    assert report.links["l"].props.com == pytest.approx([1, 2, 3])
+    assert codes(report) == ["point_mass", "bad_tensor"]
+
+
+def test_no_solid_with_a_material_is_zero(assemble: Fixture, compute: Fixture, codes: Fixture) -> None:
+    """No volume to multiply with: zero, told, and the link without mass as well."""
+    report = compute(assemble(("l/x", shape_only("x"))), HEAD + "1,1,,steel,,x\n")
+    assert codes(report) == ["no_volume", "zero_mass_link"]
+
+
+def test_a_wire_beside_its_solid_is_one_part(assemble: Fixture, compute: Fixture, codes: Fixture) -> None:
+    """Case 4: a product written as a SOLID and a wire COMPOUND is one part of the BOM, not two."""
+    solid, wire = cube("plate", key="s"), shape_only("plate", key="w")
+    report = compute(
+        assemble(("l/1", solid, None, "l/plate"), ("l/2", wire, None, "l/plate")),
+        HEAD + "1,1,,,1.00 g,plate\n",
+    )
+    assert report.total.mass == pytest.approx(0.001)
+    assert codes(report) == []
+
+
+def test_step_density_is_compared_and_used_only_when_asked(
+    assemble: Fixture, compute: Fixture, part: Fixture, codes: Fixture
+) -> None:
+    """Never above the BOM; before the default where the user says so."""
+    product = cube("x", step_density=7850.0, step_material="Steel")
+    asm = assemble(("l/x", product))
+    assert codes(compute(asm, HEAD + "1,1,,PLA,,x\n")) == ["step_density_differs"]
+    assert codes(compute(asm, HEAD + "1,1,,steel,,x\n")) == []
+    plain = compute(asm, HEAD + "1,1,,steel,,other\n")
+    assert part(plain, "x").mass == pytest.approx(1000 * V)
+    assert "7850" in plain.warnings[0].message
+    asked = compute(asm, HEAD + "1,1,,steel,,other\n", options=_options(1000.0, step_density=True))
+    assert part(asked, "x").source is Source.STEP_DENSITY
+    assert part(asked, "x").mass == pytest.approx(7850 * V)
+    assert codes(asked, "x") == ["not_in_bom"]
+
+
+def test_a_named_material_of_the_file_gets_the_tables_density(
+    assemble: Fixture, compute: Fixture, part: Fixture, codes: Fixture
+) -> None:
+    """Without a BOM the file's material is what there is."""
+    asm = assemble(("l/x", cube("x", step_material="Brass")))
+    report = compute(asm, None, options=_options(1000.0, step_density=True))
+    assert part(report, "x").mass == pytest.approx(8500 * V)
+    assert codes(report) == []
+
+
+def test_without_a_bom(assemble: Fixture, compute: Fixture, codes: Fixture) -> None:
+    """Default density throughout, and each part says so."""
+    report = compute(assemble(("l/x", cube("x")), ("l/y", cube("y"))), None)
+    assert report.total.mass == pytest.approx(2000 * V)
+    assert codes(report) == ["no_bom", "no_bom"]
+
+
+def test_reader_problems_reach_the_report(assemble: Fixture, compute: Fixture) -> None:
+    """What the geometry reader noticed stands with link, part and code."""
+    from silo.inertia.model import GeometryCode, GeometryProblem
+
+    product = cube("x", problems=(GeometryProblem(GeometryCode.NEGATIVE_VOLUME, "was inside out"),))
+    asm = assemble(("l/x", product), problems=(GeometryProblem(GeometryCode.UNITS, "no unit stated"),))
+    report = compute(asm, HEAD + "1,1,,steel,,x\n")
+    assert [(w.link_name, w.part_name, str(w.code)) for w in report.warnings] == [
+        ("", "", "units"),
+        ("l", "x", "negative_volume"),
+    ]
+
+
+def test_scaled_placement_is_exact_and_told(assemble: Fixture, compute: Fixture, codes: Fixture) -> None:
+    """Case 14: by material the scaled volume counts; a mirror needs no word."""
+    asm = assemble(("l/x", cube("x"), np.diag([2.0, 2, 2, 1])), ("l/y", cube("y"), np.diag([-1.0, 1, 1, 1])))
+    report = compute(asm, HEAD + "1,1,,steel,,x\n2,1,,steel,,y\n")
+    assert report.total.mass == pytest.approx(9 * 7850 * V)
+    assert codes(report) == ["scaled"]
+
+
+def test_a_row_without_children_stands_for_what_is_listed_nowhere(
+    assemble: Fixture, compute: Fixture, part: Fixture, codes: Fixture
+) -> None:
+    """A bolt in the motor has a row of its own; the rest of the motor's mass is the rotor's."""
+    asm = assemble(("arm/motor/rotor", cube("rotor", 0.02)), ("arm/motor/bolt", cube("bolt")))
+    report = compute(asm, HEAD + "1,1,,,90.0 g,motor\n2,1,,,10.0 g,bolt\n")
+    assert part(report, "rotor").mass == pytest.approx(0.08)
+    assert part(report, "bolt").mass == pytest.approx(0.01)
+    assert codes(report, "rotor") == ["sub_assembly_mass_shared"]
+
+
+def test_a_mass_without_any_solid_is_spread_evenly_and_told(
+    assemble: Fixture, compute: Fixture, part: Fixture, at: Fixture
+) -> None:
+    """A bought unit of which the file has no solid at all."""
+    asm = assemble(("arm/unit/a", shape_only("a"), at(0, 0, 0)), ("arm/unit/b", shape_only("b"), at(1, 0, 0)))
+    report = compute(asm, HEAD + "1,1,,,0.800 kg,unit\n")
+    assert part(report, "a").mass == pytest.approx(0.4)
+    assert report.links["arm"].props.com == pytest.approx([0.5, 0, 0])
+    assert "as points" in report.warnings[0].message
+
+
+def test_the_order_of_sub_assemblies_does_not_matter(assemble: Fixture, compute: Fixture) -> None:
+    """The innermost row with a mass wins; the outer one is then compared."""
+    asm = assemble(("arm/unit/motor/rotor", cube("rotor")), ("arm/unit/case", cube("case")))
+    rows = "1,1,,,2.000 kg,unit\n1.1,1,,,0.900 kg,motor\n1.2,1,,,1.100 kg,case\n"
+    report = compute(asm, HEAD + rows)
+    assert report.total.mass == pytest.approx(2.0)
+
+
+def test_a_sub_assemblys_material_on_a_part_without_a_solid(
+    assemble: Fixture, compute: Fixture, part: Fixture, codes: Fixture
+) -> None:
+    """The row around it has a material, the part no volume: zero, and told."""
+    asm = assemble(("arm/print/a", cube("a")), ("arm/print/wires", shape_only("wires")))
+    report = compute(asm, HEAD + "1,1,,PLA,,print\n")
+    assert part(report, "wires").mass == 0
+    assert codes(report) == ["no_volume"]
