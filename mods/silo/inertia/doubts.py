@@ -117,11 +117,13 @@ def implausible(given: GivenMass, volume: float) -> Iterator[Note]:
     least, most = (given.kg - given.quantum) / volume, (given.kg + given.quantum) / volume
     if most >= LIGHTEST and least <= DENSEST:
         return
-    than = "denser than any metal" if least > DENSEST else "lighter than any solid"
+    dense = least > DENSEST
+    than, shape = ("denser than any metal", "shell") if dense else ("lighter than any solid", "envelope")
     yield Note(
         MassCode.IMPLAUSIBLE,
         f"the BOM's {given.kg:.6g} kg in {volume * 1e6:.4g} cm³ would be {given.kg / volume:.3g} kg/m³, "
-        f"{than}: the unit, the decimal mark or the part is wrong. The BOM's mass was used",
+        f"{than}: is the unit, the decimal mark or the row wrong, or the shape a mere {shape} of the part? "
+        "The BOM's mass was used",
     )
 
 
