@@ -124,10 +124,12 @@ class Activity:
 
     def add(self, entry: Entry) -> Activity:
         """With one more entry. One with the same key and a higher rank stays as it is."""
-        if any(e.rank > entry.rank and entry.key in (e.key, e.also) for e in self.entries):
-            return self
         mine = {entry.key, entry.also} - {""}
-        rest = tuple(e for e in self.entries if e.key not in mine)
+        # Events may come by the thousand, and hardly one has to do with another.
+        related = [e for e in self.entries if e.key in mine or e.also == entry.key]
+        if any(e.rank > entry.rank and entry.key in (e.key, e.also) for e in related):
+            return self
+        rest = tuple(e for e in self.entries if e.key not in mine) if related else self.entries
         place = next((i for i, e in enumerate(rest) if e.when <= entry.when), len(rest))
         return replace(self, entries=(*rest[:place], entry, *rest[place:])[: self.most])
 
