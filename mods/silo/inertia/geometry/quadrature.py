@@ -33,6 +33,9 @@ CHUNK = 100_000
 """Points of a surface that are evaluated at once: some ten MB."""
 
 
+THIN = 1e-7
+"""Share of its box that a solid fills at least, for the tolerance: a metre of thread is above that."""
+
 FLAT = 1e-13
 """Relative: an edge that climbs less than this in v goes along it."""
 
@@ -109,7 +112,8 @@ def integrate(faces: Iterable[Face], *, centre: Floats, size: float, volume: flo
     volume
         a rough one, not 0; ``eps`` is relative to it.
     """
-    tolerance = eps * abs(volume) / size**3
+    # A shell without any volume would be refined for ever; below this, rounding is larger than the tolerance.
+    tolerance = eps * max(abs(volume) / size**3, THIN)
     total, error = np.zeros(10), 0.0
     for face in faces:
         flux, doubt = _Flux(face, centre, size, tolerance).run()
