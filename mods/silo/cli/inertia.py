@@ -105,7 +105,12 @@ def _task(args: argparse.Namespace) -> Task:
     if args.urdf:
         data = read_urdf(args.urdf)
         link_names(data, args.urdf)  # a file that cannot be filled is told before anything else is read
-        frames = urdf_frames(data, args.urdf) if frame is FrameChoice.URDF else None
+        try:
+            frames = urdf_frames(data, args.urdf)
+        except InputError:
+            # A xacro that is not expanded has no frames; who named another one does without the comparison.
+            if frame is FrameChoice.URDF:
+                raise
     return Task(
         shared.material_table(args),
         Options(args.default_density, args.density_from_step),

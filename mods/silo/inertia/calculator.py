@@ -3,15 +3,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from silo.inertia.aggregate import fill_links, tell_bom, tell_claims, tell_rows, tell_tensors
+from silo.inertia.aggregate import chosen_frame, fill_links, tell_bom, tell_claims, tell_rows, tell_tensors
 from silo.inertia.bom import BOMEntry, BOMParser, BomTable, as_table
+from silo.inertia.codes import MassCode
 from silo.inertia.core import Floats
-from silo.inertia.frames import FrameChoice, LinkFrame
+from silo.inertia.frames import FrameChoice, LinkFrame, apart
 from silo.inertia.links import Claims, LinkMap, claim, read_link_map
 from silo.inertia.masses import place_all
 from silo.inertia.massrule import MassRule, Options
@@ -34,7 +36,8 @@ class Task:
     frame
         which frame the links' numbers are given in; a link map's own word wins.
     urdf_frames
-        link → (4, 4) placement in the assembly's frame, where ``frame`` is URDF.
+        link → (4, 4) placement in the assembly's frame, where a URDF is to be filled; used where ``frame``
+        is URDF, else compared with.
     loose_link
         a link that takes what no other claims; None: such parts are listed as unclaimed.
     simulated
@@ -54,7 +57,29 @@ def calculate(assembly: Assembly, table: BomTable | None, task: Task | None = No
     """Mass properties of every link of an assembly. Pure: nothing is read or written."""
     task = task or Task()
     claims = _framed(_gathered(claim(assembly, task.links), task.loose_link), task)
-    return _run(assembly, table, task, claims, InertiaReport())
+    report = InertiaReport()
+    _tell_frames(report, claims, task)
+    return _run(assembly, table, task, claims, report)
+
+
+def _tell_frames(report: InertiaReport, claims: Claims, task: Task) -> None:
+    """A link map's frame wins, and so does --frame; a URDF would get numbers of another frame in silence."""
+    known = task.urdf_frames or {}
+    for name in claims.members:
+        if name not in known:
+            continue
+        frame = chosen_frame(name, claims, task.frame)
+        distance, angle = apart(frame.placement, known[name])
+        if distance > FRAME_DISTANCE or angle > FRAME_ANGLE:
+            words = (
+                f"the numbers are in another frame ({frame.description}) than the link has by the URDF's "
+                f"joints, {distance * 1e3:.4g} mm and {math.degrees(angle):.3g}° away from it"
+            )
+            report.add_warning(name, "", words, MassCode.FRAME_DIFFERS)
+
+
+FRAME_DISTANCE, FRAME_ANGLE = 1e-5, 1e-3
+"""[m], [rad] up to which two frames are one; URDFs print few digits."""
 
 
 def _run(

@@ -37,6 +37,7 @@ class MassCode(StrEnum):
     UNCLAIMED = "unclaimed"
     CLAIMED_TWICE = "claimed_twice"
     PATTERN_UNUSED = "pattern_unused"
+    FRAME_DIFFERS = "frame_differs"  # the numbers' frame is not that of the URDF's link
     ZERO_MASS_LINK = "zero_mass_link"
     BAD_TENSOR = "bad_tensor"
 

@@ -41,6 +41,13 @@ class LinkFrame:
         return result
 
 
+def apart(left: Floats, right: Floats) -> tuple[float, float]:
+    """Distance of two placements' origins [m] and the angle between their axes [rad]."""
+    turn = left[:3, :3].T @ right[:3, :3]
+    cosine = np.clip((np.trace(turn) - 1) / 2, -1.0, 1.0)
+    return float(np.linalg.norm(left[:3, 3] - right[:3, 3])), float(np.arccos(cosine))
+
+
 ASSEMBLY_FRAME = LinkFrame(np.eye(4), "assembly frame")
 
 

@@ -122,6 +122,45 @@ def test_frames(run: Run, arm: Path) -> None:
     assert "URDF" in found["urdf"]["frame"]["description"]
 
 
+def test_a_frame_that_is_not_the_urdfs_is_told(run: Run, arm: Path) -> None:
+    """A link map's frame wins; where the URDF's joints put the link elsewhere, its numbers would be wrong."""
+    frames = {}
+    for text in ("0.42", "0.12"):
+        links = f"links: {{forearm: {{parts: [forearm], origin: {{xyz: [0, 0, {text}]}}}}}}\n"
+        (arm / "map.yaml").write_text(links, "utf-8")
+        data = run(
+            "inertia", arm / "arm.step", "--bom", arm / "bom.csv", "--links", arm / "map.yaml",
+            "--urdf", arm / "arm.urdf", "--urdf-out", arm / "out.urdf", "--json",
+        ).json()  # fmt: skip
+        frames[text] = [w["message"] for w in data["warnings"] if w["code"] == "frame_differs"]
+    assert frames["0.42"] == []
+    assert len(frames["0.12"]) == 1
+    assert "300 mm and 0° away" in frames["0.12"][0]
+
+
+def test_numbers_of_the_assembly_in_a_urdf_are_told(run: Run, arm: Path) -> None:
+    """``--frame assembly`` with ``--urdf`` is right for the root link only; the others are named."""
+    command = ["inertia", arm / "arm.step", "--bom", arm / "bom.csv", "--urdf", arm / "arm.urdf", "--json"]
+    data = run(*command, "--urdf-out", arm / "out.urdf", "--frame", "assembly").json()
+    told = {w["link"] for w in data["warnings"] if w["code"] == "frame_differs"}
+    assert told == {"upper_arm", "forearm", "gripper"}
+    own = run(*command, "--urdf-out", arm / "out.urdf", "--frame", "own").json()
+    assert not [w for w in own["warnings"] if w["code"] == "frame_differs"]
+
+
+def test_a_xacro_takes_numbers_in_a_named_frame_only(run: Run, arm: Path) -> None:
+    """Its joints hold no numbers yet: by default that is an error, with --frame own it is filled."""
+    xacro = arm / "arm.xacro"
+    xacro.write_text(
+        '<robot name="r"><link name="base_link"/><link name="forearm"/><joint name="j">'
+        '<origin xyz="${x} 0 0"/><parent link="base_link"/><child link="forearm"/></joint></robot>', "utf-8",
+    )  # fmt: skip
+    command = ["inertia", arm / "arm.step", "--bom", arm / "bom.csv", "--urdf", xacro]
+    assert run(*command).code == 2
+    assert run(*command, "--frame", "own").code == 0
+    assert xacro.read_text("utf-8").count("<inertial>") == 2
+
+
 def test_link_map_and_loose_parts(run: Run, arm: Path) -> None:
     """Two links by patterns, the rest given to a third."""
     (arm / "map.yaml").write_text("links:\n  arm: [upper_arm, forearm]\n  hand: ['gripper/**']\n", "utf-8")
