@@ -186,3 +186,16 @@ def test_the_same_part_is_kept_and_not_asked_for_again(said: dict[str, Any]) -> 
     assert said["notes"] == ["stays as it is"] * 2
     assert said["button"] == "Close"
     assert said["left_to_ask"] == []
+
+
+def test_a_partly_loaded_document_with_edits_has_its_own_row_state(said: dict[str, Any]) -> None:
+    """FreeCAD could not save it; the edit is still there afterwards."""
+    assert said["partial"] == [True, True]
+    assert said["half"] == [False, "has edits, but is loaded only in part: open the file itself first"]
+    assert said["half_edit"] == 44.0
+
+
+def test_a_partly_loaded_document_without_edits_is_opened_whole_and_registered(said: dict[str, Any]) -> None:
+    """Saving it as it was would have written nothing, or thrown half of it away."""
+    assert said["quiet"] == "registered"
+    assert said["objects"] == ["Box", "Unused"]

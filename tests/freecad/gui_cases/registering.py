@@ -86,6 +86,7 @@ def story() -> None:
     again.close()
     wait(lambda: not one.registrations._open)
     same_part(one)
+    partly_loaded(one)
 
 
 def same_part(one: Any) -> None:
@@ -136,6 +137,38 @@ def same_part(one: Any) -> None:
     empty = wait(lambda: next(iter(one.registrations._open.values()), None))
     wait(lambda: "have their Silo part number" in " ".join(labels(empty)))
     tell(left_to_ask=[row.component() for row in empty.rows])
+    empty.close()
+    wait(lambda: not one.registrations._open)
+
+
+def partly_loaded(one: Any) -> None:
+    """FreeCAD loads of these two files only what is linked; one of them has an edit that it cannot save."""
+    close_all()
+    boxes_of = {name: part(name) for name in ("Half", "Quiet")}
+    for box in boxes_of.values():
+        box.Document.addObject("Part::Cylinder", "Unused")
+        box.Document.recompute()
+        box.Document.save()
+        unmark(box.Document)
+    top = assembly("Whole", *((name, box, 0) for name, box in boxes_of.items())).Document.FileName
+    close_all()
+    App.openDocument(top)
+    App.getDocument("Half").getObject("Box").Length = 44
+    partial = [bool(App.getDocument(name).Partial) for name in boxes_of]
+    App.setActiveDocument("Whole")
+    Gui.runCommand("Silo_RegisterParts")
+    dialog = wait(lambda: next(iter(one.registrations._open.values()), None))
+    wait(lambda: dialog.rows)
+    tell(partial=partial, half=[(row := dialog.rows[row_of(dialog, "Half.FCStd")]).checked, row.note()[0]])
+    quiet = row_of(dialog, "Quiet.FCStd")
+    dialog.table.cellWidget(quiet, BUTTON).click()
+    wait(lambda: (dialog.rows[quiet].result is not None) and settled())
+    tell(
+        quiet=dialog.rows[quiet].note()[0],
+        objects=sorted(obj.Name for obj in App.getDocument("Quiet").Objects if obj.Name in ("Box", "Unused")),
+        half_edit=float(App.getDocument("Half").getObject("Box").Length),
+    )
+    dialog.close()
 
 
 def two_parts() -> Any:
