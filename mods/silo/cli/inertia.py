@@ -145,9 +145,13 @@ def _write_urdf(args: argparse.Namespace, report: InertiaReport) -> None:
 
 
 def _print_snippet(kind: str, report: InertiaReport) -> None:
+    from silo.cli.show import plain
     from silo.inertia.output.snippets import snippets
     from silo.inertia.output.values import writable
 
     text = snippets(writable(report.links.values()), kind)
     encoding = sys.stdout.encoding or "ascii"
     sys.stdout.write(text.encode(encoding, "xmlcharrefreplace").decode(encoding))
+    # The elements do not say it themselves, and in another frame than the link's they are wrong.
+    for name, link in report.links.items():
+        print(f"{plain(name)}: frame of the numbers: {plain(link.frame.description)}", file=sys.stderr)

@@ -197,6 +197,7 @@ def test_snippets(run: Run, arm: Path, kind: str, words: str) -> None:
     ran = run("inertia", arm / "arm.step", "--bom", arm / "bom.csv", "--snippet", kind)
     assert ran.out.count(words) == 4
     assert ran.out.startswith("<")
+    assert "forearm: frame of the numbers: assembly frame" in ran.err
 
 
 def test_the_picture_of_a_report_is_found_whatever_it_is_called(run: Run, arm: Path) -> None:
