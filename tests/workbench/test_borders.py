@@ -113,6 +113,7 @@ def test_the_start_loads_next_to_nothing() -> None:
         "commands",
         "dependencies",
         "dock",
+        "garbage",
         "host",
         "placement",
         "preferences",

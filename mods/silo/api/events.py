@@ -12,6 +12,7 @@ import logging
 import random
 import threading
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol, TypeVar
@@ -112,6 +113,8 @@ class EventListener:
         where to begin; None means with what is new.
     wait
         ``wait(event, seconds)`` sleeps until the event is set; for tests.
+    around
+        a context for all that the listener's thread does but waiting for the server's next event.
 
     Both callbacks run in the listener's thread, one at a time, none after :meth:`stop` has returned. An error
     in a callback is logged and costs only that call. Where events may have been missed (the server lost its
@@ -128,9 +131,11 @@ class EventListener:
         backoff: Backoff | None = None,
         chance: Callable[[], float] = random.random,
         wait: Callable[[threading.Event, float], object] = threading.Event.wait,
+        around: Callable[[], AbstractContextManager[object]] = nullcontext,
     ) -> None:
         self._api, self._on_event, self._on_state = api, on_event, on_state
         self._backoff, self._chance, self._wait = backoff or Backoff(), chance, wait
+        self._around = around
         self._last_id = last_event_id
         self._stop, self._wake = threading.Event(), threading.Event()
         self._stream: EventStream | None = None
@@ -203,16 +208,19 @@ class EventListener:
         return None
 
     def _listen(self, stop: threading.Event, heard: _Heard) -> None:
-        stream = self._api.open_events(self._last_id)
+        with self._around():
+            stream = self._api.open_events(self._last_id)
         with self._lock:
             self._stream = stream
         try:
             if stop.is_set():
                 return
-            self._tell(stop, ConnectionState(self._mode()))
+            with self._around():
+                self._tell(stop, ConnectionState(self._mode()))
             for event in stream:
                 heard.anything = True
-                self._take(stop, event)
+                with self._around():
+                    self._take(stop, event)
                 if stop.is_set():
                     return
         finally:

@@ -26,6 +26,8 @@ BEGIN_AFTER_MS = 1500
 TICK_MS = 20_000
 # Events may come by the hundred: the pane is drawn at most this often.
 DRAW_MS = 60
+# What a commit needs and that a worker may import.
+WITHOUT_WIDGETS = ("live", "commit", "decisions", "spool")
 
 
 class AddOn:
@@ -51,11 +53,12 @@ class AddOn:
 
     def _begin(self) -> None:
         self.session.begin(live=self.preferences.flag("LiveActivity"))
-        # The first commit is to be as quick as the others: what it needs is imported while nobody waits.
+        # The first commit is to be as quick as the others: what it needs is imported while nobody waits. Only
+        # what has no widgets comes from the worker, for the classes of those are made in the GUI thread.
         self.session.aside(
             "Getting ready",
-            lambda _control: import_module("silo.workbench.commit_flow"),
-            done=lambda _module: None,
+            lambda _control: [import_module(f"silo.workbench.{name}") for name in WITHOUT_WIDGETS],
+            done=self._ready,
             failed=self._bug,
         )
         self._timer = qt.QtCore.QTimer()
@@ -63,6 +66,9 @@ class AddOn:
         self._timer.start(TICK_MS)
         qt.QtCore.QCoreApplication.instance().aboutToQuit.connect(self.session.close)
         self._find_foreign_commit()
+
+    def _ready(self, _modules: object) -> None:
+        import_module("silo.workbench.commit_flow")
 
     @property
     def session(self) -> Session:

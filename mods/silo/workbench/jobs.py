@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from silo.bom.errors import CancelledError, SiloError
+from silo.workbench.garbage import kept_out
 
 Deliver = Callable[[Callable[[], None]], None]
 
@@ -146,7 +147,8 @@ class Worker:
                 self._waiting.remove(queued)
                 self._current = queued
             self._tell(queued, "", None)
-            end = self._finish(queued)
+            with kept_out():
+                end = self._finish(queued)
             with self._lock:
                 self._current = None
                 left = len(self._waiting)

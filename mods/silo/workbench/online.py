@@ -17,6 +17,7 @@ from silo.bom.errors import ConfigError
 from silo.folders import data_folder
 from silo.workbench import entries
 from silo.workbench.activity import Entry
+from silo.workbench.garbage import kept_out
 from silo.workbench.sending import Sending, Sent
 from silo.workbench.settings import Known, Server, TokenStore, choose_server
 from silo.workbench.spool import Spool
@@ -106,6 +107,7 @@ class Online:
             on_event=lambda event: self._heard(event, url),
             on_state=self._heard_state,
             last_event_id=self._last_ids.get(url),
+            around=kept_out,
         )
         self._listener.start()
 

@@ -14,6 +14,8 @@ from typing import Any
 
 from PySide import QtCore, QtGui
 
+from silo.workbench.garbage import collect_due
+
 try:
     from PySide import QtWidgets
 except ImportError:
@@ -57,6 +59,8 @@ class Relay(QtCore.QObject):  # type: ignore[misc]  # PySide has no types
         except Exception as error:  # noqa: BLE001  # an exception may not pass through Qt's event loop
             if self._on_error is not None:
                 self._on_error(error)
+        # Long work tells its progress through here, so garbage does not pile up while it goes on.
+        collect_due()
 
 
 def in_gui_thread() -> bool:
