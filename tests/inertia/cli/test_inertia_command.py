@@ -363,6 +363,16 @@ def test_a_snippet_comes_with_the_reports(run: Run, arm: Path) -> None:
     assert json.loads((arm / "r.json").read_text("utf-8"))["format"] == "silo-inertia/1"
 
 
+def reader_of(pid: int) -> int:
+    """The child that reads for a process, once it loads the kernel: the reading itself comes later."""
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline:
+        for found in Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
+            if "/OCP" in Path(f"/proc/{found}/maps").read_text():
+                return int(found)
+    raise AssertionError(f"{pid} started no process that loads the geometry kernel")
+
+
 def test_ctrl_c_is_a_plain_sentence(arm: Path) -> None:
     """Cancelled while reading: exit 130, one line, no trace, no child left behind."""
     # A terminal of its own makes the progress bar appear: it says when the reading has begun.
@@ -374,6 +384,9 @@ def test_ctrl_c_is_a_plain_sentence(arm: Path) -> None:
         start_new_session=True,
     )
     os.close(child)
+    # Its reader is halted early, so that the reading cannot be done before the signal comes.
+    reader = reader_of(process.pid)
+    os.kill(reader, signal.SIGSTOP)
     seen = b""
     deadline = time.monotonic() + 60
     while b"arm.step" not in seen and time.monotonic() < deadline:
@@ -391,3 +404,5 @@ def test_ctrl_c_is_a_plain_sentence(arm: Path) -> None:
     assert out == b""
     assert b"Cancelled." in rest
     assert b"Traceback" not in seen + rest
+    with pytest.raises(ProcessLookupError):
+        os.kill(reader, 0)
