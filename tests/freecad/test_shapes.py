@@ -23,7 +23,8 @@ pytestmark = [pytest.mark.freecad, pytest.mark.slow]
 
 PLACES = REPOSITORY / "tests" / "inertia" / "geometry" / "freecad_shapes.py"
 MATERIALS = Path(__file__).with_name("shape_cases") / "materials.py"
-PUBLIC = REPOSITORY.parent / "shared" / "data" / "assemblies"
+# Resolved, for FreeCAD names a file that a link leads to by its own place.
+PUBLIC = (REPOSITORY.parent / "shared").resolve() / "data" / "assemblies"
 
 VOLUME = 1e-7
 """Relative: how well both engines agree on real parts whose edges meet."""

@@ -58,8 +58,10 @@ class MassFlow:
         with Waiting(plain(doc.Label, 60)) as waiting:
             # FreeCAD's own volume stands witness here; meshes are for pictures, and cost as much again.
             assembly = shapes.read_live(doc, ReadOptions(mesh_check=False), waiting.report)
-        options = Options(step_density=True, unknown_is_zero=True)
-        whole = LinkMap((Link(assembly.name or "assembly", ("**",)),))
+        options = Options(step_density=True, unknown_is_zero=True, own_bom=True)
+        # Without anything placed there is nothing for a pattern to match, which would be told as a fault.
+        everything = Link(assembly.name or "assembly", ("**",))
+        whole = LinkMap((everything,)) if assembly.instances else None
         task = Task(load_materials(freecad=False), options, whole, simulated=False)
         return shown(calculate(assembly, None, task))
 
