@@ -112,6 +112,20 @@ def test_a_copied_identity_is_offered_for_each_of_its_files(tmp_path: Path) -> N
     assert [c.similar for c in found.values()] == [(), ()]
 
 
+@pytest.mark.parametrize(("name", "asked"), [("PlateLong", True), ("plate", False)])
+def test_a_document_whose_item_has_a_file_of_another_name_is_asked_about(
+    tmp_path: Path, name: str, asked: bool
+) -> None:
+    """Opened alone, a copy by Save As has no other file beside it that would give it away."""
+    silo = FakeSilo()
+    item = silo.create_item("kindred-rd", "M01", "Plate")
+    silo.upload_file(item.part_number, _file(tmp_path / "Plate.FCStd", b"short"))
+    top = part(tmp_path, name, uuid=item.id)
+    seen = {top.doc_path: Seen(State.READY)}
+    found = offer(Extraction(top, ()), seen, silo, "kindred-rd", CONTROL)
+    assert [c.same_as for c in found.candidates] == ([item.part_number] if asked else [])
+
+
 def fcstd(folder: Path, name: str, meta: str = "", saved: str = "2026-11-21T10:00:00Z") -> BomEntry:
     """A part whose file says when it was saved, and what is in its Meta."""
     entry = part(folder, name)

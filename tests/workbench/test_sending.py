@@ -17,6 +17,7 @@ from silo.bom.errors import (
 )
 from silo.bom_sync import Status
 from silo.workbench.jobs import Control
+from silo.workbench.spool import Commit, new_key
 
 if TYPE_CHECKING:
     from conftest import Vault
@@ -282,3 +283,52 @@ def test_what_waits_is_told_in_words(vault: Vault) -> None:
     vault.commit(vault.snapshot(vault.part("Bolt", 1)))
     (waiting,) = vault.sending.waiting()
     assert (waiting.title, waiting.what, waiting.since) == ("Top", "file and BOM", 1001.0)
+
+
+def renamed(vault: Vault, content: bytes) -> None:
+    """Commit the assembly from a file of another name, as after FreeCAD's Save As."""
+    from silo.workbench.snapshot import Snapshot
+
+    path = vault.folder / "TopLong.FCStd"
+    path.write_bytes(content)
+    vault.clock += 1
+    taken = Snapshot(str(path), "TopLong", vault.ids["Top"])
+    vault.sending.spool.add(Commit(new_key(), taken, vault.clock, file=path))
+
+
+def test_a_file_of_another_name_is_not_sent_unasked(vault: Vault, control: Control) -> None:
+    """Save As copies the identity along: the copy must not become a revision of the part it was made from."""
+    vault.commit(vault.snapshot())
+    vault.sending.run(vault.silo, control)
+    renamed(vault, b"a longer one")
+    vault.commit(vault.snapshot(), content=b"the original goes on")
+    vault.sending.run(vault.silo, control, force=True)
+    assert vault.files() == [b"top file", b"the original goes on"]
+    (waiting,) = vault.sending.waiting()
+    assert waiting.rejected
+    for word in ("TopLong.FCStd", vault.number, "whose file in Silo is Top.FCStd", "Retry", "Discard"):
+        assert word in waiting.reason
+
+
+def test_retry_says_that_it_is_the_same_part(vault: Vault, control: Control) -> None:
+    """Then it is sent, and the new name is the item's from now on."""
+    vault.commit(vault.snapshot())
+    vault.sending.run(vault.silo, control)
+    renamed(vault, b"a longer one")
+    vault.sending.run(vault.silo, control)
+    vault.sending.retry(vault.sending.waiting()[0].id)
+    vault.sending.run(vault.silo, control)
+    renamed(vault, b"longer still")
+    vault.sending.run(vault.silo, control)
+    assert vault.files() == [b"top file", b"a longer one", b"longer still"]
+    assert vault.sending.waiting() == ()
+
+
+def test_a_renamed_file_without_a_change_is_no_question(vault: Vault, control: Control) -> None:
+    """The server has this very content."""
+    vault.commit(vault.snapshot())
+    vault.sending.run(vault.silo, control)
+    renamed(vault, b"top file")
+    vault.sending.run(vault.silo, control)
+    assert vault.files() == [b"top file"]
+    assert vault.sending.waiting() == ()

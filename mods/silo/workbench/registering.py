@@ -13,12 +13,13 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any
 
-from silo.bom.errors import SiloError, UnreachableError
+from silo.bom.errors import NotFoundError, SiloError, UnreachableError
 from silo.bom.findings import FindingCode
 from silo.bom.identity import walk_entries
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.naming import Proposal, clean_name, crowded_files, propose
 from silo.registration import Journal, Registration, RegistrationApi, component_key, register
+from silo.workbench.filenames import other_name
 from silo.workbench.jobs import Control
 from silo.workbench.on_disk import changed_since, sha256_or_nothing
 from silo.workbench.words import translate
@@ -172,12 +173,24 @@ def offer(
     ]
     candidates += [
         _candidate(entry, categories, crowded, seen, same_as=numbers[(entry.silo_uuid or "").lower()])
-        for entry in copied(extraction)
+        for entry in _perhaps_copies(extraction, numbers, api)
         if (entry.silo_uuid or "").lower() in numbers
     ]
     control.check()
     looked = _with_look_alikes(candidates, api, control, begun or {})
     return Offer(_with_twins(looked), categories, _next_numbers(looked, api, schema))
+
+
+def _perhaps_copies(extraction: Extraction, numbers: Mapping[str, str], api: Any) -> tuple[BomEntry, ...]:
+    """The copied ones, and the document itself where its item's file has another name."""
+    found, top = copied(extraction), extraction.assembly
+    number = numbers.get((top.silo_uuid or "").lower())
+    if number is None or any(entry.key == top.key for entry in found):
+        return found
+    try:
+        return (*found, top) if other_name(top.doc_path, api.revisions(number)) else found
+    except NotFoundError:
+        return found
 
 
 def _numbers_by_identity(resolved: Any) -> dict[str, str]:

@@ -23,6 +23,7 @@ from silo.bom.errors import (
     AuthError,
     CancelledError,
     ConfigError,
+    ConflictError,
     ForbiddenError,
     NotFoundError,
     ReadOnlyError,
@@ -33,6 +34,7 @@ from silo.bom.errors import (
 )
 from silo.bom.merge import MergePlan
 from silo.bom_sync import Resolved, Status, blocking, compare, merge_request, resolve
+from silo.workbench.filenames import other_name
 from silo.workbench.jobs import Control
 from silo.workbench.spool import Commit, Spool
 from silo.workbench.words import translate
@@ -103,6 +105,9 @@ class Sending:
     tell: Callable[[Sent], None] = lambda _sent: None
     _open: dict[str, _Open] = field(default_factory=dict)
     _refused: dict[str, str] = field(default_factory=dict)
+    # Commits whose file has another name than the item's: a person was asked, and said "the same part".
+    _asked: set[str] = field(default_factory=set)
+    _renamed: set[str] = field(default_factory=set)
 
     def run(self, client: SendApi, control: Control, *, force: bool = False) -> SendReport:
         """Send what waits, oldest first; what could not be sent is still there afterwards.
@@ -161,10 +166,15 @@ class Sending:
         return tuple(sorted((*commits, *entries), key=lambda waiting: waiting.since))
 
     def retry(self, waiting_id: str) -> None:
-        """Let something rejected go again with the next :meth:`run`."""
+        """Let something rejected go again with the next :meth:`run`.
+
+        For a file with another name than the item's this is a person's word that it is the same part.
+        """
         kind, _, key = waiting_id.partition(":")
         if kind == "commit":
             self._refused.pop(key, None)
+            if key in self._asked:
+                self._renamed.add(key)
         else:
             self.outbox.retry(int(key))
 
@@ -229,7 +239,30 @@ class Sending:
             return True
         newest = max(known, key=lambda revision: revision.revision_number, default=None)
         stored = (newest.file_checksum or "").lower().removeprefix("sha256:") if newest is not None else ""
-        return stored != commit.sha256
+        if stored == commit.sha256:
+            return False
+        self._check_name(commit, sent, known)
+        return True
+
+    def _check_name(self, commit: Commit, sent: Sent, known: Sequence[Revision]) -> None:
+        """Refuse a file that has another name than the item's: "Save As" copies the identity along.
+
+        Sent unasked, the copy would become the newest revision of the part that it was made from.
+        """
+        before = other_name(commit.snapshot.path, known)
+        if not before or commit.key in self._renamed:
+            return
+        text = translate(
+            "Silo",
+            "{name} carries the identity of {number}, whose file in Silo is {before}. Is it the same part "
+            "under a new name? Press Retry. Is it a copy that became a new part? Press Discard, then "
+            "choose Register Parts and in it: new part",
+        )
+        name = os.path.basename(commit.snapshot.path)
+        for key, value in (("name", name), ("number", sent.part_number), ("before", before)):
+            text = text.replace(f"{{{key}}}", value)
+        self._asked.add(commit.key)
+        raise ConflictError(text)
 
     def _is_there(self, sent: Sent) -> bool:
         """True where an interrupted run had put this commit into the outbox already."""

@@ -1197,6 +1197,11 @@
         </message>
         <message>
             <location filename="../../sending.py" />
+            <source>{name} carries the identity of {number}, whose file in Silo is {before}. Is it the same part under a new name? Press Retry. Is it a copy that became a new part? Press Discard, then choose Register Parts and in it: new part</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../sending.py" />
             <source>{file} → {number}</source>
             <translation type="unfinished" />
         </message>
