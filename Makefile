@@ -31,6 +31,7 @@ $(SERVER): pyproject.toml | $(VENV)/bin/python
 
 $(DEV): pyproject.toml | $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet --editable '.[dev]'
+	@scripts/kernel-libraries.sh $(BIN)/python
 	@touch $(SERVER) $@
 
 demo: $(SERVER)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,27 @@ from silo.inertia.calculator import Task, calculate
 from silo.inertia.materials import load_materials
 from silo.inertia.model import Assembly, Instance, Prototype
 from silo.inertia.report import InertiaReport
+
+try:
+    import OCP.BRep  # noqa: F401
+except ImportError as error:
+    if os.environ.get("SILO_REQUIRE_KERNEL"):
+        raise
+    NO_KERNEL = f"the geometry kernel cannot be loaded: {error}"
+    collect_ignore = ["geometry", "cases"]
+else:
+    NO_KERNEL = ""
+
+NEED_KERNEL = ("cli", "test_calculator.py", "test_docs.py")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Without the kernel what reads geometry is skipped, loudly."""
+    here = Path(__file__).parent
+    for item in items if NO_KERNEL else ():
+        if any(item.path.is_relative_to(here / name) for name in NEED_KERNEL):
+            item.add_marker(pytest.mark.skip(reason=NO_KERNEL))
+
 
 STEP_FILES = Path(__file__).parents[2] / "../shared/data/step"
 

@@ -20,7 +20,16 @@ except ModuleNotFoundError as error:  # pragma: no cover - the development envir
         'pip install "silo-mod[inertia]"'
     ) from error
 
-from OCP.BRep import BRep_Tool
+try:
+    from OCP.BRep import BRep_Tool
+except ImportError as error:  # pragma: no cover - a machine without a desktop's libraries
+    if "cannot open shared object file" not in str(error):
+        raise
+    raise ConfigError(
+        f"the geometry kernel lacks a library of the system ({error}). "
+        "On Debian and Ubuntu: apt-get install libgl1"
+    ) from error
+
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.GeomAbs import (
     GeomAbs_Cone,
