@@ -12,10 +12,10 @@ from typing import BinaryIO
 
 
 @contextmanager
-def replacing(path: Path | str) -> Iterator[BinaryIO]:
+def replacing(path: Path | str, *, mode: int | None = None) -> Iterator[BinaryIO]:
     """Write the new content of a file: at any moment ``path`` has all of the old content or all of the new.
 
-    The new file can be read by its owner only. Where writing fails or the block raises, the old content stays
+    The new file can be read by its owner only, unless ``mode`` says otherwise. Where writing fails or the block raises, the old content stays
     and nothing lies beside it. Raises OSError.
     """
     target = Path(path)
@@ -26,6 +26,8 @@ def replacing(path: Path | str) -> Iterator[BinaryIO]:
             yield file
             file.flush()
             os.fsync(file.fileno())
+        if mode is not None:
+            os.chmod(temporary, mode)
         os.replace(temporary, target)
     except BaseException:
         Path(temporary).unlink(missing_ok=True)

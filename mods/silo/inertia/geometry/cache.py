@@ -12,13 +12,13 @@ import hashlib
 import importlib.metadata
 import json
 import os
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from silo.bom.errors import InputError
+from silo.durable import replacing
 from silo.folders import cache_folder
 from silo.inertia.geometry import store
 from silo.inertia.geometry.folder import step_files
@@ -84,10 +84,8 @@ class Cache:
         target = self._path(key)
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
-            handle, name = tempfile.mkstemp(dir=target.parent, suffix=".tmp")
-            with os.fdopen(handle, "wb") as stream:
+            with replacing(target) as stream:
                 stream.write(stored.read_bytes())
-            os.replace(name, target)
         except OSError:
             return
 

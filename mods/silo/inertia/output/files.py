@@ -4,10 +4,10 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from pathlib import Path
 
 from silo.bom.errors import InputError
+from silo.durable import replacing
 
 
 def write_whole(path: Path | str, data: bytes, *, like: Path | str | None = None) -> None:
@@ -22,23 +22,10 @@ def write_whole(path: Path | str, data: bytes, *, like: Path | str | None = None
             # A pipe or a device cannot be replaced, and need not be: nobody reads it twice.
             target.write_bytes(data)
             return
-        _replace(target, data, _mode(target if like is None else Path(like)))
+        with replacing(target, mode=_mode(target if like is None else Path(like))) as file:
+            file.write(data)
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
-
-
-def _replace(target: Path, data: bytes, mode: int) -> None:
-    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.chmod(temporary, mode)
-        os.replace(temporary, target)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
 
 
 def _mode(path: Path) -> int:
