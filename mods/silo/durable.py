@@ -15,8 +15,8 @@ from typing import BinaryIO
 def replacing(path: Path | str, *, mode: int | None = None) -> Iterator[BinaryIO]:
     """Write the new content of a file: at any moment ``path`` has all of the old content or all of the new.
 
-    The new file can be read by its owner only, unless ``mode`` says otherwise. Where writing fails or the block raises, the old content stays
-    and nothing lies beside it. Raises OSError.
+    The new file can be read by its owner only, unless ``mode`` says otherwise. Where writing fails or the
+    block raises, the old content stays and nothing lies beside it. Raises OSError.
     """
     target = Path(path)
     # Beside the target, so that the rename at the end stays within one file system.
