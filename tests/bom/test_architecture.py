@@ -13,14 +13,15 @@ import pytest
 
 import silo.bom
 
-MODULES = sorted(f"silo.bom.{module.name}" for module in pkgutil.iter_modules(silo.bom.__path__))
-SOURCES = sorted(Path(next(iter(silo.bom.__path__))).glob("*.py"))
+MODULES = sorted(module.name for module in pkgutil.walk_packages(silo.bom.__path__, "silo.bom."))
+ROOT = Path(next(iter(silo.bom.__path__)))
+SOURCES = sorted(ROOT.rglob("*.py"))
 
 
 def test_importing_the_core_loads_the_standard_library_only() -> None:
     """In a fresh interpreter without the site's packages; nothing else of ours, no network, no database."""
     program = (
-        f"import sys; before = set(sys.modules); sys.path.insert(0, {str(SOURCES[0].parents[2])!r})\n"
+        f"import sys; before = set(sys.modules); sys.path.insert(0, {str(ROOT.parents[1])!r})\n"
         f"import {', '.join(MODULES)}\n"
         "print(*sorted({name.split('.')[0] if not name.startswith('silo') else name\n"
         "               for name in set(sys.modules) - before}))"
@@ -35,13 +36,13 @@ def test_importing_the_core_loads_the_standard_library_only() -> None:
     assert not loaded & {"socket", "ssl", "http", "sqlite3", "subprocess", "threading", "asyncio", "tempfile"}
 
 
-@pytest.mark.parametrize("source", SOURCES, ids=lambda path: path.name)
+@pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_modules_fit_on_some_screens(source: Path) -> None:
     """About 300 lines, 400 at most."""
     assert len(source.read_text(encoding="utf-8").splitlines()) <= 400
 
 
-@pytest.mark.parametrize("source", SOURCES, ids=lambda path: path.name)
+@pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_the_core_opens_nothing_and_asks_no_clock(source: Path) -> None:
     """No files, no time, no chance: the same values in give the same values out."""
     text = source.read_text(encoding="utf-8")

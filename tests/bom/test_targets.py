@@ -12,7 +12,7 @@ from silo.bom import FindingCode, Severity, extract
 from silo.bom.document import LinkProblem
 from silo.bom.findings import Finding
 from silo.bom.paths import located, split_sub_name
-from silo.bom.targets import resolve_target
+from silo.bom.walk.targets import resolve_target
 
 
 @pytest.fixture

@@ -8,8 +8,8 @@ The rules of this module:
 * an assembly inside itself is cut where it closes the ring, and told as a cycle;
 * whatever is not counted has a finding.
 
-What one assembly holds is read by :mod:`silo.bom.contents`, each once; this module puts the levels together.
-It walks live FreeCAD objects, objects read from FCStd files and the tests' fakes alike.
+What one assembly holds is read by :mod:`silo.bom.walk.contents`, each once; this module puts the levels
+together. It walks live FreeCAD objects, objects read from FCStd files and the tests' fakes alike.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from silo.bom.contents import Count, Key, Reader
 from silo.bom.document import NAMELESS, label_of, object_name
 from silo.bom.findings import Finding, FindingCode, Place
 from silo.bom.identity import identity_findings, identity_of
-from silo.bom.kinds import is_container, is_named_assembly
 from silo.bom.model import BomEntry, Extraction
-from silo.bom.notes import Notes
-from silo.bom.rings import Rings
 from silo.bom.roots import links_beside
-from silo.bom.targets import Inspect, is_array, resolve_target
+from silo.bom.walk.contents import Count, Key, Reader
+from silo.bom.walk.kinds import is_container, is_named_assembly
+from silo.bom.walk.notes import Notes
+from silo.bom.walk.rings import Rings
+from silo.bom.walk.targets import Inspect, is_array, resolve_target
 
 # Real assemblies are some ten levels deep; deeper is an attack or a loop that no other guard saw.
 MAX_LEVELS = 64

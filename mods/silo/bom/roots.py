@@ -13,8 +13,8 @@ from typing import Any
 
 from silo.bom.document import derived, label_of, object_name, own, same_document
 from silo.bom.errors import InputError
-from silo.bom.kinds import COMPONENTS, INLINE, Kind, flattened, is_assembly3, kind_of, no_component
-from silo.bom.targets import Inspect, first_of, is_assembly_link, is_excluded, is_link, resolve_target
+from silo.bom.walk.kinds import COMPONENTS, INLINE, Kind, flattened, is_assembly3, kind_of, no_component
+from silo.bom.walk.targets import Inspect, first_of, is_assembly_link, is_excluded, is_link, resolve_target
 
 # What to do where a document holds several assemblies. The window says it in words of its own.
 NAME_ONE = "Name the one that is meant (--assembly NAME)."

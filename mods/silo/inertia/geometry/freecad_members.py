@@ -8,8 +8,8 @@ from typing import Any
 
 from silo.bom.document import derived, label_of, object_name, own
 from silo.bom.errors import DocumentError, InputError
-from silo.bom.kinds import Kind, kind_of, members
 from silo.bom.roots import DocumentRoot, choose_assembly
+from silo.bom.walk.kinds import Kind, kind_of, members
 from silo.inertia.geometry.freecad_facts import Facts
 from silo.inertia.wording import listed
 

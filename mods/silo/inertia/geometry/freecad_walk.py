@@ -22,10 +22,10 @@ from typing import Any
 import numpy as np
 
 from silo.bom.document import derived, label_of, object_name, own, same_document
-from silo.bom.kinds import Kind, is_container, is_named_assembly, kind_of
 from silo.bom.model import BomEntry
 from silo.bom.naming import display_name
-from silo.bom.targets import is_assembly_link, is_link
+from silo.bom.walk.kinds import Kind, is_container, is_named_assembly, kind_of
+from silo.bom.walk.targets import is_assembly_link, is_link
 from silo.inertia.geometry.freecad_facts import Facts, element_places, file_of, link_placement, scale
 from silo.inertia.geometry.freecad_materials import NOTHING, Material
 from silo.inertia.geometry.freecad_members import child_named, counted, steps_of

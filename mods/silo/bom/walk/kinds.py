@@ -12,7 +12,7 @@ from enum import Enum, auto
 from typing import Any, TypeVar
 
 from silo.bom.document import derived, object_name, own
-from silo.bom.targets import is_assembly_link, is_link
+from silo.bom.walk.targets import is_assembly_link, is_link
 
 T = TypeVar("T", bound=Hashable)
 

@@ -20,12 +20,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from silo.bom.copies import stale_copies
 from silo.bom.document import derived, own, same_document
 from silo.bom.errors import DocumentError
-from silo.bom.kinds import COMPONENTS, INLINE, Kind, flattened, is_container, kind_of, no_component
-from silo.bom.notes import Notes
-from silo.bom.targets import (
+from silo.bom.walk.copies import stale_copies
+from silo.bom.walk.kinds import COMPONENTS, INLINE, Kind, flattened, is_container, kind_of, no_component
+from silo.bom.walk.notes import Notes
+from silo.bom.walk.targets import (
     Inspect,
     Target,
     first_of,

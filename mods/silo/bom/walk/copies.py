@@ -12,8 +12,8 @@ from collections.abc import Callable, Hashable, Iterable
 from typing import Any
 
 from silo.bom.document import label_of
-from silo.bom.kinds import COMPONENTS, kind_of
-from silo.bom.targets import array_count, first_of, is_array, is_assembly_link, is_link, resolve_target
+from silo.bom.walk.kinds import COMPONENTS, kind_of
+from silo.bom.walk.targets import array_count, first_of, is_array, is_assembly_link, is_link, resolve_target
 
 
 def stale_copies(link: Any, assembly: Any, key: Callable[[Any], Hashable]) -> tuple[list[str], list[str]]:
