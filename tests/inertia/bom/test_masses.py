@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from silo.bom.numbers import Mark, parse_number
 from silo.inertia.bom.masses import column_mark, is_empty, parse_mass
-from silo.inertia.bom.numbers import Mark, parse_number
 
 LB = 0.45359237
 
@@ -166,3 +166,17 @@ def test_no_text_raises(text: str) -> None:
     assert (cell.kg is None) or (0 <= cell.kg < float("inf"))
     if cell.kg is None and cell.problem is None:
         assert is_empty(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "kg"), [("½ kg", 0.5), ("1½ lb", 1.5 * LB), ("1_000 g", 1.0), ("５ ｋｇ", 5.0)]
+)
+def test_masses_follow_the_rules_of_numbers(text: str, kg: float) -> None:
+    """One parser: what a quantity may look like, a mass may as well."""
+    assert parse_mass(text).kg == pytest.approx(kg, rel=1e-14)
+
+
+def test_a_square_is_no_digit() -> None:
+    """Compatibility forms made "5² kg" 52 kg."""
+    assert parse_mass("5² kg").kg is None
+    assert parse_mass("5² kg").problem

@@ -13,7 +13,7 @@ import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from silo.inertia.bom.numbers import Mark, Number, parse_number
+from silo.bom.numbers import Mark, Number, common_mark, parse_number, plain_text
 
 HEAVIEST = 1e12
 """[kg] no part weighs that much; sums of such numbers would lose everything else."""
@@ -84,7 +84,7 @@ class MassCell:
 
 
 _CELL = re.compile(
-    r"(?P<number>[+\-−]?\s*[\d.,](?:[\d.,\s'’]*[\d.,])?(?:[eE][+\-−]?\d+)?)"
+    r"(?P<number>[+\-−]?\s*[\d.,¼-¾⅐-⅞](?:[\d.,\s'’_]*[\d.,¼-¾⅐-⅞])?(?:[eE][+\-−]?\d+)?)"
     r"\s*(?P<unit>[^\d*]*?)(?P<star>\*?)"
 )
 
@@ -93,7 +93,7 @@ def parse_mass(text: str, *, mark: Mark | None = None, unit: str | None = None) 
     """One cell as a mass. ``mark``: the column's decimal mark, ``unit``: its header's; None: unknown."""
     if is_empty(text):
         return MassCell()
-    cell = re.sub(r"^\((.*)\)$", r"\1", unicodedata.normalize("NFKC", text).strip()).lstrip("≈~ ").strip()
+    cell = re.sub(r"^\((.*)\)$", r"\1", plain_text(text)).lstrip("≈~ ").strip()
     found = _CELL.fullmatch(cell)
     if found is None:
         return MassCell(problem="is no mass")
@@ -133,5 +133,4 @@ def unit_factor(unit: str) -> float | None:
 
 def column_mark(cells: Iterable[str]) -> Mark | None:
     """The decimal mark that a column's unambiguous cells agree on; None where they show none, or both."""
-    marks = {cell.mark for cell in map(parse_mass, cells) if cell.mark is not None}
-    return marks.pop() if len(marks) == 1 else None
+    return common_mark(cell.mark for cell in map(parse_mass, cells))

@@ -9,10 +9,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from silo.bom.errors import InputError
+from silo.bom.numbers import LARGEST_QUANTITY, Mark, read_count
 from silo.inertia.bom.columns import Role
 from silo.inertia.bom.masscolumn import MassReader
 from silo.inertia.bom.masses import is_empty, unit_factor
-from silo.inertia.bom.numbers import Mark, parse_number
 from silo.inertia.bom.rows import BomCode, BOMEntry, BomTable, BomWarning
 from silo.inertia.bom.sheet import Row, Sheet, read_sheet
 from silo.inertia.bom.structure import with_structure
@@ -123,18 +123,13 @@ def _entry(
 def _quantity(text: str, line: int, name: str, warnings: list[BomWarning]) -> float | None:
     if is_empty(text):
         return None
-    found = re.fullmatch(
-        r"(?P<number>[\d.,\s'’]+)\s*(?:x|×|pcs?|pieces?|ea|each|stk|st|stück|個|个|件)?\.?", text.casefold()
-    )
-    number = parse_number(found["number"].strip(), None) if found else None
-    if number is None or number.ambiguous or number.value < 0:
-        warnings.append(
-            BomWarning(
-                BomCode.UNREADABLE_QUANTITY, f"the quantity “{text}” cannot be read; not used", line, name
-            )
-        )
-        return None
-    return number.value
+    reading = read_count(text)
+    if reading.value is not None and 0 <= reading.value <= LARGEST_QUANTITY:
+        return float(reading.value)
+    problem = reading.problem or "wanted a number of pieces"
+    words = f"the quantity “{text}” cannot be read and is not used: {problem}"
+    warnings.append(BomWarning(BomCode.UNREADABLE_QUANTITY, words, line, name))
+    return None
 
 
 def _item_role(sheet: Sheet) -> Role:

@@ -7,8 +7,8 @@ import math
 import re
 import unicodedata
 
+from silo.bom.numbers import Mark, parse_number
 from silo.inertia.bom.masses import MASS_UNITS
-from silo.inertia.bom.numbers import Mark, parse_number
 
 LOWEST_SOLID = 5.0
 """[kg/m^3] below this a card is no engineering material: FreeCAD's "Default" has 1, "None" 0, air 1.2."""
