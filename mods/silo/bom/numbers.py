@@ -209,7 +209,8 @@ def exact_product(values: Iterable[float | int | Decimal]) -> Decimal:
 
 def plain(value: float | int | Decimal) -> int | float:
     """``value`` as JSON and people should see it: a count as a count (12, not 12.0)."""
-    return int(value) if value == value // 1 and abs(value) < 1e16 else float(value)
+    exact = as_decimal(value)
+    return int(exact) if exact == exact.to_integral_value() and abs(exact) < 10**16 else float(exact)
 
 
 class _Split(NamedTuple):
