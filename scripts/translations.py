@@ -60,7 +60,7 @@ def collect(folder: Path = SOURCES) -> dict[str, list[str]]:
     """Text → the files that use it, in the order of files and lines. All mistakes at once."""
     found: dict[str, list[str]] = {}
     mistakes = []
-    for path in sorted(folder.glob("*.py")):
+    for path in sorted(folder.rglob("*.py")):
         # words.py defines `translate`; its own call there passes variables on.
         if path.name == "words.py":
             continue
@@ -71,8 +71,9 @@ def collect(folder: Path = SOURCES) -> dict[str, list[str]]:
             continue
         for text in texts:
             files = found.setdefault(text, [])
-            if path.name not in files:
-                files.append(path.name)
+            name = path.relative_to(folder).as_posix()
+            if name not in files:
+                files.append(name)
     if mistakes:
         raise NotLiteral("\n".join(mistakes))
     return found

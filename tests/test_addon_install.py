@@ -70,7 +70,7 @@ def test_a_copy_is_complete_and_is_renewed(tmp_path: Path) -> None:
     install_folder(place(tmp_path), copy=True)
     inside = {path.name for path in place(tmp_path).mod.iterdir()}
     assert inside == {"Init.py", "InitGui.py", "package.xml", "LICENSE", "README.md", "mods"}
-    assert (place(tmp_path).mod / "mods" / "silo" / "workbench" / "host.py").is_file()
+    assert (place(tmp_path).mod / "mods" / "silo" / "workbench" / "freecad" / "host.py").is_file()
 
 
 def test_a_strangers_folder_is_left_alone(tmp_path: Path) -> None:

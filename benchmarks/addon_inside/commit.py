@@ -21,7 +21,7 @@ COMMITS = 6
 
 def commits(one: Any, doc: Any) -> None:
     """The first commit imports modules, which is done once per FreeCAD; it is told apart."""
-    from silo.workbench import commit_flow
+    from silo.workbench.commit import flow as commit_flow
 
     pulse = Pulse()
     saves: list[Times] = []
@@ -54,7 +54,7 @@ def commits(one: Any, doc: Any) -> None:
 
 def drawing(one: Any) -> None:
     """A commit with 10 000 findings, and 2000 events in one burst."""
-    from silo.workbench.activity import Entry, Line, Tone
+    from silo.workbench.pane.activity import Entry, Line, Tone
 
     lines = tuple(Line(f"<b>finding</b> {number}", Tone.ERROR) for number in range(10_000))
 

@@ -25,9 +25,9 @@ def fills(dialog: Any, pulse: Pulse) -> list[Times]:
 
 
 def story() -> None:
-    from silo.workbench import commit_flow
-    from silo.workbench.preview_dialog import PreviewDialog
-    from silo.workbench.register_dialog import RegisterDialog
+    from silo.workbench.commit import flow as commit_flow
+    from silo.workbench.preview.dialog import PreviewDialog
+    from silo.workbench.register.dialog import RegisterDialog
 
     one = addon()
     one.preferences.set("AskComment", False)

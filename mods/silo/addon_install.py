@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from silo.bom.errors import ConfigError, InputError
-from silo.freecad_run import find_freecadcmd
+from silo.freecadcmd.run import find_freecadcmd
 
 # As package.xml declares them to the Addon Manager.
 PACKAGES = ("requests>=2.31", "sseclient-py>=1.8", "pydantic>=2.7")

@@ -25,7 +25,7 @@ from silo.bom.links import extract
 from silo.bom.model import Extraction
 from silo.bom.roots import choose_assembly
 from silo.fcstd import Library
-from silo.freecad_run import run_freecad
+from silo.freecadcmd.run import run_freecad
 
 RESAVE = Path(__file__).parent / "freecad_cases" / "resave.py"
 pytestmark = [pytest.mark.freecad, pytest.mark.slow]

@@ -15,7 +15,7 @@ from freecad_cases.machines import REPOSITORY, WANTED, FreeCAD
 
 from silo.bom.errors import CancelledError, DocumentError, SiloError
 from silo.cli.main import main
-from silo.freecad_mass import read_in_freecad
+from silo.freecadcmd.mass import read_in_freecad
 from silo.inertia.geometry import Progress, ReadOptions, read
 from silo.inertia.model import Assembly, GeometryCode
 

@@ -12,10 +12,10 @@ from silo.api.fake import FakeSilo
 from silo.api.outbox import Outbox
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.model import BomEntry, Extraction
-from silo.workbench.jobs import Control
-from silo.workbench.sending import Sending, Sent
-from silo.workbench.snapshot import Snapshot
-from silo.workbench.spool import Commit, Spool, new_key
+from silo.workbench.commit.snapshot import Snapshot
+from silo.workbench.session.jobs import Control
+from silo.workbench.session.sending import Sending, Sent
+from silo.workbench.session.spool import Commit, Spool, new_key
 
 
 @dataclass

@@ -16,19 +16,19 @@ MODS = Path(__file__).resolve().parents[2] / "mods"
 WORKBENCH = MODS / "silo" / "workbench"
 # What runs in a worker thread, where no document and no widget may be touched.
 WORKERS = (
-    "activity",
-    "banner",
-    "entries",
-    "jobs",
-    "online",
-    "prefs_work",
-    "preview",
-    "registering",
-    "sending",
-    "session",
-    "settings",
-    "spool",
-    "tokens",
+    "pane/activity",
+    "pane/banner",
+    "pane/entries",
+    "preview/rows",
+    "register/registering",
+    "session/jobs",
+    "session/online",
+    "session/sending",
+    "session/session",
+    "session/spool",
+    "settings/page_work",
+    "settings/server",
+    "settings/tokens",
 )
 
 
@@ -45,8 +45,8 @@ def imports(path: Path) -> Iterator[str]:
 @pytest.mark.parametrize(
     ("outside", "entry"),
     [
-        (("FreeCAD", "FreeCADGui"), "host.py"),
-        (("PySide", "PySide2", "PySide6", "PyQt5"), "qt.py"),
+        (("FreeCAD", "FreeCADGui"), "freecad/host.py"),
+        (("PySide", "PySide2", "PySide6", "PyQt5"), "gui/qt.py"),
     ],
 )
 def test_each_enters_through_one_file(outside: tuple[str, ...], entry: str) -> None:
@@ -62,7 +62,12 @@ def test_each_enters_through_one_file(outside: tuple[str, ...], entry: str) -> N
 @pytest.mark.parametrize("name", WORKERS)
 def test_workers_know_neither_documents_nor_widgets(name: str) -> None:
     """They are given values, and hand values back."""
-    forbidden = {"silo.workbench.host", "silo.workbench.qt", "silo.workbench.saving", "silo.workbench.live"}
+    forbidden = {
+        "silo.workbench.freecad.host",
+        "silo.workbench.gui.qt",
+        "silo.workbench.freecad.saving",
+        "silo.workbench.freecad.live",
+    }
     assert not forbidden & set(imports(WORKBENCH / f"{name}.py"))
 
 
@@ -107,17 +112,22 @@ def test_the_start_loads_next_to_nothing() -> None:
     heavy = {"requests", "pydantic", "sseclient", "urllib3", "sqlite3", "socket", "ssl", "asyncio", "json"}
     assert not heavy & loaded
     assert {name for name in loaded if name.startswith("silo.") and "workbench" not in name} == set()
-    ours = {name.rsplit(".", 1)[1] for name in loaded if name.startswith("silo.workbench.")}
+    ours = {name.removeprefix("silo.workbench.") for name in loaded if name.startswith("silo.workbench.")}
     assert ours == {
         "addon",
         "commands",
         "dependencies",
-        "dock",
-        "garbage",
-        "host",
-        "placement",
-        "preferences",
-        "qt",
+        "freecad",
+        "freecad.host",
+        "freecad.placement",
+        "gui",
+        "gui.qt",
+        "pane",
+        "pane.dock",
+        "session",
+        "session.gui_thread_gc",
+        "settings",
+        "settings.preferences",
         "start",
         "words",
     }

@@ -184,7 +184,7 @@ def read(path: str, args: argparse.Namespace, *, via: str = "files", **more: Any
 
     reader: Callable[[str, ReadOptions], Assembly]
     if via == "freecad":
-        from silo.freecad_mass import read_in_freecad as reader
+        from silo.freecadcmd.mass import read_in_freecad as reader
     else:
         from silo.inertia.calculator import read_geometry as reader
 

@@ -87,9 +87,9 @@ def run(args: argparse.Namespace) -> int:
 
 def _extractions(args: argparse.Namespace, tops: list[str]) -> Iterator[tuple[str, Extraction | SiloError]]:
     if args.via == "freecad":
-        from silo.cli.via_freecad import extract_with_freecad
+        from silo.freecadcmd.run import run_freecad
 
-        yield from extract_with_freecad(tops, args.assembly)
+        yield from run_freecad(tops, args.assembly)
         return
     for top in tops:
         try:

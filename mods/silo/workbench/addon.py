@@ -6,19 +6,20 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from silo.workbench import host, qt
-from silo.workbench.dock import ActivityDock
-from silo.workbench.preferences import GROUP, Preferences
+from silo.workbench.freecad import host
+from silo.workbench.gui import qt
+from silo.workbench.pane.dock import ActivityDock
+from silo.workbench.settings.preferences import GROUP, Preferences
 from silo.workbench.words import plain, translate
 
 if TYPE_CHECKING:
-    from silo.workbench.activity import Action
-    from silo.workbench.commit_flow import CommitFlow
-    from silo.workbench.hooks import CommitHook
-    from silo.workbench.preview_flow import PreviewFlow
-    from silo.workbench.register_flow import RegisterFlow
-    from silo.workbench.sending import Sent
-    from silo.workbench.session import Session, Shown
+    from silo.workbench.commit.flow import CommitFlow
+    from silo.workbench.freecad.hooks import CommitHook
+    from silo.workbench.pane.activity import Action
+    from silo.workbench.preview.flow import PreviewFlow
+    from silo.workbench.register.flow import RegisterFlow
+    from silo.workbench.session.sending import Sent
+    from silo.workbench.session.session import Session, Shown
 
 # FreeCAD's window comes first; a server is not talked to before it stands.
 BEGIN_AFTER_MS = 1500
@@ -27,7 +28,7 @@ TICK_MS = 20_000
 # Events may come by the hundred: the pane is drawn at most this often.
 DRAW_MS = 60
 # What a commit needs and that a worker may import.
-WITHOUT_WIDGETS = ("live", "commit", "decisions", "spool")
+WITHOUT_WIDGETS = ("freecad.live", "commit.plan", "commit.decisions", "session.spool")
 
 
 class AddOn:
@@ -68,21 +69,21 @@ class AddOn:
         self._find_foreign_commit()
 
     def _ready(self, _modules: object) -> None:
-        import_module("silo.workbench.commit_flow")
+        import_module("silo.workbench.commit.flow")
 
     @property
     def session(self) -> Session:
         """The session; made when first needed."""
         if self._session is None:
-            from silo.workbench.session import Session, Told
-            from silo.workbench.settings import read_known
-            from silo.workbench.tokens import Keyring
+            from silo.workbench.session.session import Listener, Session
+            from silo.workbench.settings.server import read_known
+            from silo.workbench.settings.tokens import Keyring
 
             self._session = Session(
                 self.relay.post,
                 read_known(self.preferences),
                 Keyring(),
-                told=Told(shown=self._shown, console=host.warning, sent=self._sent, bug=self._bug),
+                listener=Listener(shown=self._shown, console=host.warning, sent=self._sent, bug=self._bug),
             )
         return self._session
 
@@ -90,7 +91,7 @@ class AddOn:
     def commits(self) -> CommitFlow:
         """The commit flow; made when first needed."""
         if self._commits is None:
-            from silo.workbench.commit_flow import CommitFlow
+            from silo.workbench.commit.flow import CommitFlow
 
             self._commits = CommitFlow(self.session, self.preferences)
         return self._commits
@@ -99,7 +100,7 @@ class AddOn:
     def previews(self) -> PreviewFlow:
         """The previews; made when first needed."""
         if self._previews is None:
-            from silo.workbench.preview_flow import PreviewFlow
+            from silo.workbench.preview.flow import PreviewFlow
 
             self._previews = PreviewFlow(
                 self.session,
@@ -114,14 +115,14 @@ class AddOn:
     def registrations(self) -> RegisterFlow:
         """The registering dialogs; made when first needed."""
         if self._registrations is None:
-            from silo.workbench.register_flow import RegisterFlow
+            from silo.workbench.register.flow import RegisterFlow
 
             self._registrations = RegisterFlow(self.session, self.preferences, self.commits)
         return self._registrations
 
     def settings_changed(self) -> None:
         """The preference page was saved."""
-        from silo.workbench.settings import read_known
+        from silo.workbench.settings.server import read_known
 
         host.save_parameters()
         self.session.settings_changed(
@@ -172,7 +173,7 @@ class AddOn:
 
         class Page:
             def __new__(cls, _parent: object = None) -> Any:
-                from silo.workbench.prefs import PreferencePage
+                from silo.workbench.settings.page import PreferencePage
 
                 return PreferencePage(addon.preferences, addon.session, addon.settings_changed)
 
@@ -181,8 +182,8 @@ class AddOn:
     def hook_commit(self, name: str) -> None:
         """Sync the BOM after this command, which is not ours."""
         if self._hook is None:
-            from silo.workbench.commit_flow import has_identity
-            from silo.workbench.hooks import CommitHook
+            from silo.workbench.commit.flow import has_identity
+            from silo.workbench.freecad.hooks import CommitHook
 
             self._hook = CommitHook(
                 host,
@@ -196,7 +197,7 @@ class AddOn:
     def _find_foreign_commit(self) -> None:
         """The Kindred workbench has further commands that upload a revision; connect to what is there."""
         from silo.workbench.commands import COMMIT, commands
-        from silo.workbench.hooks import FOREIGN
+        from silo.workbench.freecad.hooks import FOREIGN
 
         ours = commands(self)[COMMIT].text
         for name in FOREIGN:
@@ -230,7 +231,7 @@ class AddOn:
         """Show the masses of the active assembly."""
         doc = host.active_document()
         if doc is not None:
-            from silo.workbench.mass_flow import MassFlow
+            from silo.workbench.mass.flow import MassFlow
 
             MassFlow().start(doc)
 
@@ -262,7 +263,7 @@ class AddOn:
 
     def act(self, action: Action) -> None:
         """Do what a button of the pane asks for."""
-        from silo.workbench.activity import Do
+        from silo.workbench.pane.activity import Do
 
         if action.do is Do.VIEW:
             self.open_page(action.target)

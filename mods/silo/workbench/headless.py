@@ -98,14 +98,14 @@ def main(env: Mapping[str, str] = os.environ) -> int:
 
 
 def _tell(error: Exception, code: int) -> int:
-    from silo.workbench import host
+    from silo.workbench.freecad import host
 
     host.error(f"Silo: {error}")
     return code
 
 
 def _extractions(tops: list[str], assembly: str | None) -> Iterator[tuple[str, Extraction | SiloError]]:
-    from silo.workbench import host, live
+    from silo.workbench.freecad import host, live
 
     for top in tops:
         found: Extraction | SiloError
@@ -155,7 +155,7 @@ def _sync(job: Job) -> int:
     except ImportError as error:
         return _without_server(job, error)
     from silo.batch import Options, exit_code, sync_top
-    from silo.workbench import host
+    from silo.workbench.freecad import host
 
     tops = documents_in(job.tops)
     options = Options(

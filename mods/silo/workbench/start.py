@@ -12,7 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from silo.workbench import dependencies, host, qt, words
+from silo.workbench import dependencies, words
 from silo.workbench.addon import AddOn
 from silo.workbench.commands import (
     ACTIVITY,
@@ -25,7 +25,9 @@ from silo.workbench.commands import (
     Command,
     commands,
 )
-from silo.workbench.placement import place
+from silo.workbench.freecad import host
+from silo.workbench.freecad.placement import place
+from silo.workbench.gui import qt
 
 RESOURCES = Path(__file__).parent / "resources"
 PREFERENCE_GROUP = "Silo"

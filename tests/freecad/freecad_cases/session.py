@@ -19,7 +19,7 @@ import FreeCAD as App  # noqa: E402
 
 from silo.bom.errors import SiloError  # noqa: E402
 from silo.bom.model import Extraction  # noqa: E402
-from silo.workbench import host, live, saving  # noqa: E402
+from silo.workbench.freecad import host, live, saving  # noqa: E402
 
 CASES = Path(os.environ["SILO_CASES"]) / "asm4"
 

@@ -12,7 +12,7 @@ from inside import Gui, QtCore, QtWidgets, tell
 
 
 def look() -> None:
-    from silo.workbench import host
+    from silo.workbench.freecad import host
 
     texts = [w.toPlainText() for w in Gui.getMainWindow().findChildren(QtWidgets.QTextEdit)]
     tell(

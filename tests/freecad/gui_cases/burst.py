@@ -62,7 +62,7 @@ def told() -> list[str]:
 
 def page(one: Any) -> None:
     """Without a browser the address is on the clipboard; another server's page is not opened at all."""
-    from silo.workbench import qt
+    from silo.workbench.gui import qt
 
     asked: list[str] = []
 

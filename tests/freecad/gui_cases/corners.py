@@ -69,9 +69,9 @@ def partly_loaded(one: Any) -> None:
 def unnamed(one: Any) -> None:
     """A document that has no file: FreeCAD asks for a name; cancelled, nothing happens."""
     doc = App.newDocument("Nameless")
-    from silo.workbench.commit import plan
-    from silo.workbench.commit_dialog import refusal
-    from silo.workbench.commit_flow import LiveDocuments
+    from silo.workbench.commit.dialog import refusal
+    from silo.workbench.commit.flow import LiveDocuments
+    from silo.workbench.commit.plan import plan
 
     tell(unnamed=refusal(plan(doc, LiveDocuments())))
     close_all()

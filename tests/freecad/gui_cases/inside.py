@@ -123,7 +123,7 @@ def settled() -> bool:
 
 def pane() -> list[str]:
     """The boxes of the pane as text, newest first."""
-    from silo.workbench.activity import entry_text
+    from silo.workbench.pane.activity import entry_text
 
     return [entry_text(entry) for entry in addon().session.shown.activity.entries]
 

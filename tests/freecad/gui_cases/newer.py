@@ -18,7 +18,7 @@ def story() -> None:
     before = path.read_bytes()
     doc = App.openDocument(str(path))
     doc.addObject("Part::Box", "Edit")
-    from silo.workbench import widgets
+    from silo.workbench.gui import widgets
 
     told: list[str] = []
     widgets.warn = lambda _parent, _title, text: told.append(text)

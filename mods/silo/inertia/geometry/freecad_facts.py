@@ -27,7 +27,7 @@ MAX_ELEMENTS = 1_000_000
 
 
 class Facts(Protocol):
-    """One source of the facts: :class:`StoredFacts`, or FreeCAD itself (``silo.workbench.shapes``)."""
+    """One source of the facts: :class:`StoredFacts`, or FreeCAD itself (``silo.workbench.mass.shapes``)."""
 
     def placement(self, obj: Any, name: str = "Placement") -> Floats:
         """(4, 4) of an object's own placement; the identity where it has none."""

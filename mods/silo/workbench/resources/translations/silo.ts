@@ -4,16 +4,6 @@
     <context>
         <name>Silo</name>
         <message>
-            <location filename="../../activity.py" />
-            <source>… and {n} more line</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../activity.py" />
-            <source>… and {n} more lines; the preview shows all</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
             <location filename="../../addon.py" />
             <source>[Silo] This document is not open: </source>
             <translation type="unfinished" />
@@ -44,99 +34,9 @@
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../banner.py" />
-            <source>Settings…</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../banner.py" />
-            <source>Try again</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../banner.py" />
-            <source>No Silo server is set up yet.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../banner.py" />
-            <source>Connected to {host}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../banner.py" />
-            <source>{host} is read-only now. Commits wait here until it takes changes again.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../banner.py" />
-            <source>{host} works only in part. What cannot be sent waits here.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../banner.py" />
-            <source>No connection to {host}. Commits wait here and are sent later.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../banner.py" />
-            <source>{host} does not accept the token.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../banner.py" />
-            <source>Connecting to {host}…</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../banner.py" />
-            <source>{host} sends no live events; what you commit is shown all the same.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../banner.py" />
-            <source>{host} (live events are off)</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../boxes.py" />
-            <source>Stop</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../boxes.py" />
-            <source>{n} thing waits to be sent</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../boxes.py" />
-            <source>{n} things wait to be sent</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../boxes.py" />
-            <source>… and {n} more</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../boxes.py" />
-            <source>Send now</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../boxes.py" />
-            <source>Discard</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../boxes.py" />
-            <source>Retry</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
             <location filename="../../commands.py" />
-            <location filename="../../commit_dialog.py" />
-            <location filename="../../commit_flow.py" />
+            <location filename="../../commit/dialog.py" />
+            <location filename="../../commit/flow.py" />
             <source>Commit to Silo</source>
             <translation type="unfinished" />
         </message>
@@ -157,9 +57,9 @@
         </message>
         <message>
             <location filename="../../commands.py" />
-            <location filename="../../commit_flow.py" />
-            <location filename="../../entries.py" />
-            <location filename="../../preview_dialog.py" />
+            <location filename="../../commit/flow.py" />
+            <location filename="../../pane/entries.py" />
+            <location filename="../../preview/dialog.py" />
             <source>Register Parts…</source>
             <translation type="unfinished" />
         </message>
@@ -180,7 +80,7 @@
         </message>
         <message>
             <location filename="../../commands.py" />
-            <location filename="../../dock.py" />
+            <location filename="../../pane/dock.py" />
             <source>Database Activity</source>
             <translation type="unfinished" />
         </message>
@@ -200,109 +100,119 @@
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../commit.py" />
-            <source>unsaved edits: will be saved</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../commit.py" />
-            <source>saved already</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../commit.py" />
-            <source>has no file yet: save it under a name first</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../commit.py" />
-            <source>FreeCAD has loaded it only in part and cannot save these edits: open the file itself and make them there</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../commit.py" />
-            <source>the file is read-only: these edits are not saved</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../commit.py" />
-            <source>made by a newer FreeCAD: saving it here would destroy its assemblies, so it is not saved</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../commit_dialog.py" />
+            <location filename="../../commit/dialog.py" />
             <source>What changed?</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../commit_dialog.py" />
+            <location filename="../../commit/dialog.py" />
             <source>A comment for this revision (may stay empty)</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../commit_dialog.py" />
+            <location filename="../../commit/dialog.py" />
             <source>This file is committed:</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../commit_dialog.py" />
+            <location filename="../../commit/dialog.py" />
             <source>This file is committed, and {n} file below it that has unsaved edits, that one first:</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../commit_dialog.py" />
+            <location filename="../../commit/dialog.py" />
             <source>This file is committed, and {n} files below it that have unsaved edits, the lowest first:</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../commit_dialog.py" />
+            <location filename="../../commit/dialog.py" />
             <source>File</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../commit_dialog.py" />
+            <location filename="../../commit/dialog.py" />
             <source>State</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../commit_dialog.py" />
-            <location filename="../../prefs.py" />
+            <location filename="../../commit/dialog.py" />
+            <location filename="../../settings/page.py" />
             <source>Commit</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../commit_dialog.py" />
+            <location filename="../../commit/dialog.py" />
             <source>Cancel</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../commit_dialog.py" />
+            <location filename="../../commit/dialog.py" />
             <source>{name} has no file yet. Save it under a name first.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../commit_flow.py" />
+            <location filename="../../commit/flow.py" />
             <source>Not committed: {name}</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../commit_flow.py" />
+            <location filename="../../commit/flow.py" />
             <source>No Silo server is set up: the files are saved, and wait to be sent.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../commit_flow.py" />
+            <location filename="../../commit/flow.py" />
             <source>There is no connection now: the files are saved, and sent later.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../commit_flow.py" />
+            <location filename="../../commit/flow.py" />
             <source>It has no Silo part number yet, so it was not sent.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../commit_flow.py" />
+            <location filename="../../commit/flow.py" />
             <source>Saved, but not in Silo: {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/plan.py" />
+            <source>unsaved edits: will be saved</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/plan.py" />
+            <source>saved already</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/plan.py" />
+            <source>has no file yet: save it under a name first</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/plan.py" />
+            <source>FreeCAD has loaded it only in part and cannot save these edits: open the file itself and make them there</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/plan.py" />
+            <source>the file is read-only: these edits are not saved</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/plan.py" />
+            <source>made by a newer FreeCAD: saving it here would destroy its assemblies, so it is not saved</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/snapshot.py" />
+            <source>Make the one that is meant active: double-click it in the tree.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/snapshot.py" />
+            <source>{name} holds {n} registered parts, so its file is no single item's and stays here.</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -311,948 +221,1038 @@
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../entries.py" />
-            <source>BOM Updated: {number}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../entries.py" />
-            <source>BOM not synced: {number}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../entries.py" />
-            <source>Committed: {number}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../entries.py" />
-            <source>BOM unchanged</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../entries.py" />
-            <source>+{n} added</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../entries.py" />
-            <source>~{n} qty changed</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../entries.py" />
-            <source>⚠{n} unreferenced</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../entries.py" />
-            <source>⚡{n} in conflict</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../entries.py" />
-            <source>no changes</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../entries.py" />
-            <source>Revision {n} uploaded</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../entries.py" />
-            <source>The file is in Silo already</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../entries.py" />
-            <source>{n} item in the Silo BOM is not referenced by components in this assembly.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../entries.py" />
-            <source>{n} items in the Silo BOM are not referenced by components in this assembly.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../entries.py" />
-            <source>The file is in Silo. The BOM waits until these are mended:</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../entries.py" />
-            <source>Show all…</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../entries.py" />
-            <source>Same or new part…</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../entries.py" />
-            <location filename="../../preview_dialog.py" />
-            <source>Show</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../entries.py" />
-            <source>{number}: the assembly has {cad}, a manual line in Silo says {silo}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../entries.py" />
-            <source>{n} component has no Silo part number</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../entries.py" />
-            <source>{n} components have no Silo part number</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../entries.py" />
-            <source>[Silo BOM] … and {n} more of these; the preview lists them all.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../entries.py" />
-            <source>The server cannot tell any more what happened since. Its own activity page shows what is so.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../entries.py" />
-            <source>Some activity may be missing</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../entries.py" />
-            <source>Revision {n} of {number}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../entries.py" />
-            <source>New item: {number}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../entries.py" />
-            <source>Archived: {number}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../entries.py" />
-            <location filename="../../preview_dialog.py" />
-            <source>View in Silo →</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../mass_dialog.py" />
+            <location filename="../../mass/dialog.py" />
             <source>Mass of {name}</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../mass_dialog.py" />
-            <location filename="../../register_rows.py" />
+            <location filename="../../mass/dialog.py" />
+            <location filename="../../register/rows.py" />
             <source>Part</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../mass_dialog.py" />
+            <location filename="../../mass/dialog.py" />
             <source>Quantity</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../mass_dialog.py" />
+            <location filename="../../mass/dialog.py" />
             <source>Mass of one</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../mass_dialog.py" />
+            <location filename="../../mass/dialog.py" />
             <source>Mass</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../mass_dialog.py" />
+            <location filename="../../mass/dialog.py" />
             <source>Volume of one, cm³</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../mass_dialog.py" />
+            <location filename="../../mass/dialog.py" />
             <source>Material</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../mass_dialog.py" />
-            <location filename="../../register_dialog.py" />
+            <location filename="../../mass/dialog.py" />
+            <location filename="../../register/dialog.py" />
             <source>Remarks</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../mass_dialog.py" />
+            <location filename="../../mass/dialog.py" />
             <source>Copy</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../mass_dialog.py" />
+            <location filename="../../mass/dialog.py" />
             <source>Copy the table, for a spreadsheet</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../mass_dialog.py" />
-            <location filename="../../preview_dialog.py" />
-            <location filename="../../register_dialog.py" />
+            <location filename="../../mass/dialog.py" />
+            <location filename="../../preview/dialog.py" />
+            <location filename="../../register/dialog.py" />
             <source>Close</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../mass_flow.py" />
+            <location filename="../../mass/flow.py" />
             <source>Mass of the assembly</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../mass_flow.py" />
+            <location filename="../../mass/flow.py" />
             <source>This FreeCAD's Python has no numpy, which masses need.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../mass_flow.py" />
+            <location filename="../../mass/flow.py" />
             <source>Measuring {name}</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../mass_flow.py" />
+            <location filename="../../mass/flow.py" />
             <source>Reading the assembly…</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../mass_flow.py" />
+            <location filename="../../mass/flow.py" />
             <source>Part {n} of {total}</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../mass_flow.py" />
+            <location filename="../../mass/flow.py" />
             <source>face {n} of {total}</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../mass_rows.py" />
+            <location filename="../../mass/rows.py" />
             <source>1 part has no mass; it is missing from the sum.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../mass_rows.py" />
+            <location filename="../../mass/rows.py" />
             <source>{n} parts have no mass; they are missing from the sum.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../mass_rows.py" />
+            <location filename="../../mass/rows.py" />
             <source>No part of this assembly has a material with a density.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../mass_rows.py" />
+            <location filename="../../mass/rows.py" />
             <source>{mass} in {pieces}, centre of mass at {x}, {y}, {z} mm</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../mass_rows.py" />
+            <location filename="../../mass/rows.py" />
             <source>1 piece</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../mass_rows.py" />
+            <location filename="../../mass/rows.py" />
             <source>{n} pieces</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../mass_rows.py" />
+            <location filename="../../mass/rows.py" />
             <source>no material with a density</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../online.py" />
-            <source>No Silo server is set up yet. Enter its address in the Silo preferences.</source>
+            <location filename="../../pane/activity.py" />
+            <source>… and {n} more line</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane.py" />
+            <location filename="../../pane/activity.py" />
+            <source>… and {n} more lines; the preview shows all</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/banner.py" />
+            <source>Settings…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/banner.py" />
+            <source>Try again</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/banner.py" />
+            <source>No Silo server is set up yet.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/banner.py" />
+            <source>Connected to {host}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/banner.py" />
+            <source>{host} is read-only now. Commits wait here until it takes changes again.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/banner.py" />
+            <source>{host} works only in part. What cannot be sent waits here.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/banner.py" />
+            <source>No connection to {host}. Commits wait here and are sent later.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/banner.py" />
+            <source>{host} does not accept the token.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/banner.py" />
+            <source>Connecting to {host}…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/banner.py" />
+            <source>{host} sends no live events; what you commit is shown all the same.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/banner.py" />
+            <source>{host} (live events are off)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/boxes.py" />
+            <source>Stop</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/boxes.py" />
+            <source>{n} thing waits to be sent</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/boxes.py" />
+            <source>{n} things wait to be sent</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/boxes.py" />
+            <source>… and {n} more</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/boxes.py" />
+            <source>Send now</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/boxes.py" />
+            <source>Discard</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/boxes.py" />
+            <source>Retry</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/content.py" />
             <source>Nothing has happened yet. Commit an assembly with File → Commit to Silo, and what becomes of it is shown here.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../pane.py" />
+            <location filename="../../pane/content.py" />
             <source>Show older…</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../prefs.py" />
-            <source>Silo</source>
+            <location filename="../../pane/entries.py" />
+            <source>BOM Updated: {number}</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../prefs.py" />
-            <source>Server</source>
+            <location filename="../../pane/entries.py" />
+            <source>BOM not synced: {number}</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../prefs.py" />
-            <source>Address</source>
+            <location filename="../../pane/entries.py" />
+            <source>Committed: {number}</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../prefs.py" />
-            <source>API token</source>
+            <location filename="../../pane/entries.py" />
+            <source>BOM unchanged</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../prefs.py" />
-            <source>FreeCAD's preferences (a plain file)</source>
+            <location filename="../../pane/entries.py" />
+            <source>+{n} added</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../prefs.py" />
-            <source>Keep the token in</source>
+            <location filename="../../pane/entries.py" />
+            <source>~{n} qty changed</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../prefs.py" />
-            <source>Check the server's certificate</source>
+            <location filename="../../pane/entries.py" />
+            <source>⚠{n} unreferenced</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../prefs.py" />
-            <source>the system's own, unless a file is given</source>
+            <location filename="../../pane/entries.py" />
+            <source>⚡{n} in conflict</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../prefs.py" />
-            <source>Certificate authorities</source>
+            <location filename="../../pane/entries.py" />
+            <source>no changes</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../prefs.py" />
-            <source>Test the connection</source>
+            <location filename="../../pane/entries.py" />
+            <source>Revision {n} uploaded</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../prefs.py" />
-            <source>Ask for a comment</source>
+            <location filename="../../pane/entries.py" />
+            <source>The file is in Silo already</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../prefs.py" />
-            <source>Sync the BOM of an assembly after its file is committed</source>
+            <location filename="../../pane/entries.py" />
+            <source>{n} item in the Silo BOM is not referenced by components in this assembly.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../prefs.py" />
-            <source>Then ask about components without a part number</source>
+            <location filename="../../pane/entries.py" />
+            <source>{n} items in the Silo BOM are not referenced by components in this assembly.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../prefs.py" />
-            <source>hold the BOM back until they are mended</source>
+            <location filename="../../pane/entries.py" />
+            <source>The file is in Silo. The BOM waits until these are mended:</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../prefs.py" />
-            <source>sync without them (they become unreferenced)</source>
+            <location filename="../../pane/entries.py" />
+            <source>Show all…</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../prefs.py" />
-            <source>Where links are broken</source>
+            <location filename="../../pane/entries.py" />
+            <source>Same or new part…</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../prefs.py" />
-            <source>Part number schema</source>
+            <location filename="../../pane/entries.py" />
+            <location filename="../../preview/dialog.py" />
+            <source>Show</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../prefs.py" />
-            <source>Window</source>
+            <location filename="../../pane/entries.py" />
+            <source>{number}: the assembly has {cad}, a manual line in Silo says {silo}</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../prefs.py" />
-            <source>Show what happens in Silo as it happens</source>
+            <location filename="../../pane/entries.py" />
+            <source>{n} component has no Silo part number</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../prefs.py" />
-            <source>Commit in the File menu of every workbench</source>
+            <location filename="../../pane/entries.py" />
+            <source>{n} components have no Silo part number</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../prefs.py" />
-            <source>Reading the settings</source>
+            <location filename="../../pane/entries.py" />
+            <source>[Silo BOM] … and {n} more of these; the preview lists them all.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../prefs.py" />
-            <source>the keyring of the system ({name})</source>
+            <location filename="../../pane/entries.py" />
+            <source>The server cannot tell any more what happened since. Its own activity page shows what is so.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../prefs.py" />
-            <source>unchanged; enter another one to replace it</source>
+            <location filename="../../pane/entries.py" />
+            <source>Some activity may be missing</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../prefs.py" />
-            <source>none yet: make one on the server's page</source>
+            <location filename="../../pane/entries.py" />
+            <source>Revision {n} of {number}</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../prefs.py" />
-            <source>Keeping the token</source>
+            <location filename="../../pane/entries.py" />
+            <source>New item: {number}</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../prefs.py" />
-            <source>Asking the server…</source>
+            <location filename="../../pane/entries.py" />
+            <source>Archived: {number}</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../prefs.py" />
-            <source>Testing the connection</source>
+            <location filename="../../pane/entries.py" />
+            <location filename="../../preview/dialog.py" />
+            <source>View in Silo →</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../prefs_work.py" />
-            <source>Enter the server's address too: a token belongs to its server.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../prefs_work.py" />
-            <source>Enter the address of the server first.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../prefs_work.py" />
-            <source>Connected as {user} ({role}); the server is in {mode} mode.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../prefs_work.py" />
-            <source>No server is set up. To try it out, run: silo-mod serve</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../prefs_work.py" />
-            <source>In use: {url} ({from}).</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../prefs_work.py" />
-            <source>SILO_SSL_VERIFY decides about the certificate.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../prefs_work.py" />
-            <source>from the environment variable SILO_API_URL</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../prefs_work.py" />
-            <source>from this page</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../prefs_work.py" />
-            <source>from the configuration file of silo-mod</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../prefs_work.py" />
-            <source>Token: from the environment variable SILO_API_TOKEN.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../prefs_work.py" />
-            <source>Token: from the system's keyring.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../prefs_work.py" />
-            <source>Token: from FreeCAD's preferences, a plain file.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../prefs_work.py" />
-            <source>Token: from the configuration file of silo-mod.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../prefs_work.py" />
-            <source>Token: none.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview.py" />
-            <source>Without a part number: left out until registered</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview.py" />
-            <source>Not counted, or counted with a remark</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview.py" />
-            <source>… more rows than can be shown here</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview.py" />
-            <source>new in the assembly: will be added</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview.py" />
-            <source>will take the assembly's quantity</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview.py" />
-            <source>manual line in Silo with another quantity: a person decides there</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview.py" />
-            <source>not in the assembly: kept, marked unreferenced</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview.py" />
-            <source>manual line: not touched</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview.py" />
-            <source>{n} to add</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview.py" />
-            <source>{n} with another quantity</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview.py" />
-            <source>{n} unreferenced</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview.py" />
-            <source>{n} in conflict</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview.py" />
-            <source>{n} without a part number</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview.py" />
-            <source>Nothing to sync: all {n} lines agree with Silo.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview_dialog.py" />
+            <location filename="../../preview/dialog.py" />
             <source>BOM in Silo: {name}</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../preview_dialog.py" />
+            <location filename="../../preview/dialog.py" />
             <source>Comparing with Silo…</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../preview_dialog.py" />
-            <location filename="../../register_dialog.py" />
+            <location filename="../../preview/dialog.py" />
+            <location filename="../../register/dialog.py" />
             <source>Part number</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../preview_dialog.py" />
-            <location filename="../../register_dialog.py" />
+            <location filename="../../preview/dialog.py" />
+            <location filename="../../register/dialog.py" />
             <source>Name</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../preview_dialog.py" />
-            <location filename="../../register_rows.py" />
+            <location filename="../../preview/dialog.py" />
+            <location filename="../../register/rows.py" />
             <source>Assembly</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../preview_dialog.py" />
+            <location filename="../../preview/dialog.py" />
             <source>In Silo</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../preview_dialog.py" />
+            <location filename="../../preview/dialog.py" />
             <source>What a sync does</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../preview_dialog.py" />
+            <location filename="../../preview/dialog.py" />
             <source>Show only lines that differ</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../preview_dialog.py" />
+            <location filename="../../preview/dialog.py" />
             <source>Sync although links are broken (what they stood for becomes unreferenced)</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../preview_dialog.py" />
+            <location filename="../../preview/dialog.py" />
             <source>Select the instances in the 3D view and the tree</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../preview_dialog.py" />
+            <location filename="../../preview/dialog.py" />
             <source>Compare again</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../preview_dialog.py" />
+            <location filename="../../preview/dialog.py" />
             <source>Sync</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../preview_dialog.py" />
+            <location filename="../../preview/dialog.py" />
             <source>Sync the {n} sub-assembly that differs too, before this one</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../preview_dialog.py" />
+            <location filename="../../preview/dialog.py" />
             <source>Sync the {n} sub-assemblies that differ too, before this one</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../preview_dialog.py" />
+            <location filename="../../preview/dialog.py" />
             <source>This assembly has no Silo part number yet. Register it to sync its BOM.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../preview_dialog.py" />
+            <location filename="../../preview/dialog.py" />
             <source>{n} broken link: the BOM is not synced until it is mended.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../preview_dialog.py" />
+            <location filename="../../preview/dialog.py" />
             <source>{n} broken links: the BOM is not synced until they are mended.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../preview_dialog.py" />
+            <location filename="../../preview/dialog.py" />
             <source>… and {n} more rows</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../preview_flow.py" />
+            <location filename="../../preview/flow.py" />
             <source>{name} holds no assembly, so it has no BOM.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../preview_flow.py" />
+            <location filename="../../preview/flow.py" />
             <source>BOM in Silo</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../preview_flow.py" />
+            <location filename="../../preview/flow.py" />
             <source>Comparing with Silo</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../register_dialog.py" />
-            <location filename="../../register_flow.py" />
+            <location filename="../../preview/rows.py" />
+            <source>Without a part number: left out until registered</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>Not counted, or counted with a remark</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>… more rows than can be shown here</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>new in the assembly: will be added</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>will take the assembly's quantity</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>manual line in Silo with another quantity: a person decides there</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>not in the assembly: kept, marked unreferenced</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>manual line: not touched</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>{n} to add</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>{n} with another quantity</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>{n} unreferenced</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>{n} in conflict</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>{n} without a part number</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>Nothing to sync: all {n} lines agree with Silo.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
+            <location filename="../../register/flow.py" />
             <source>Register Components</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../register_dialog.py" />
+            <location filename="../../register/dialog.py" />
             <source>Looking for components without a part number…</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../register_dialog.py" />
+            <location filename="../../register/dialog.py" />
             <source>Component</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../register_dialog.py" />
+            <location filename="../../register/dialog.py" />
             <source>Type</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../register_dialog.py" />
+            <location filename="../../register/dialog.py" />
             <source>Category</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../register_dialog.py" />
+            <location filename="../../register/dialog.py" />
             <source>Ask after each commit</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../register_dialog.py" />
+            <location filename="../../register/dialog.py" />
             <source>Register Selected</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../register_dialog.py" />
+            <location filename="../../register/dialog.py" />
             <source>Skip All</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../register_dialog.py" />
+            <location filename="../../register/dialog.py" />
             <source>Register</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../register_dialog.py" />
+            <location filename="../../register/dialog.py" />
             <source>Keep</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../register_dialog.py" />
+            <location filename="../../register/dialog.py" />
             <source>All components of {name} have their Silo part number.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../register_dialog.py" />
+            <location filename="../../register/dialog.py" />
             <source>All of these have their part number now.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../register_dialog.py" />
+            <location filename="../../register/dialog.py" />
             <source>Where files carry one identity, choose in the column Part number: the same part, or a new one?</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../register_dialog.py" />
+            <location filename="../../register/dialog.py" />
             <source>({n} more after these)</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../register_dialog.py" />
+            <location filename="../../register/dialog.py" />
             <source>The following component has no Silo part number and will be excluded from the BOM until registered:</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../register_dialog.py" />
+            <location filename="../../register/dialog.py" />
             <source>The following components have no Silo part number and will be excluded from the BOM until registered:</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../register_flow.py" />
+            <location filename="../../register/flow.py" />
             <source>Looking for components without a part number</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../register_flow.py" />
+            <location filename="../../register/flow.py" />
             <source>Asking for the next number</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../register_flow.py" />
+            <location filename="../../register/flow.py" />
             <source>Registering</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../register_flow.py" />
+            <location filename="../../register/flow.py" />
             <source>Registered</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../register_rows.py" />
-            <source>Consumable</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register_rows.py" />
-            <source>Tool</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register_rows.py" />
-            <source>{number} (kept)</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register_rows.py" />
-            <source>same or new part?</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register_rows.py" />
-            <source>new</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register_rows.py" />
-            <source>{number} or later</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register_rows.py" />
-            <source>{number} (new)</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register_rows.py" />
-            <source>same part: keep {number}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register_rows.py" />
-            <source>new part: a new number</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register_rows.py" />
-            <source>a new number</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register_rows.py" />
-            <source>stays as it is</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register_rows.py" />
-            <source>registered</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register_rows.py" />
-            <source>registering…</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register_rows.py" />
-            <source>carries the identity of {number}, as another file does</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register_rows.py" />
-            <source>the same content as {name}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register_rows.py" />
-            <source>Silo has this very file as {number}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register_rows.py" />
-            <source>Silo has {number} with the same name</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../registering.py" />
+            <location filename="../../register/registering.py" />
             <source>its unsaved edits are saved too</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../registering.py" />
+            <location filename="../../register/registering.py" />
             <source>open in another FreeCAD: close it there first, or saving there undoes this</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../registering.py" />
+            <location filename="../../register/registering.py" />
             <source>the file is read-only</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../registering.py" />
+            <location filename="../../register/registering.py" />
             <source>has edits, but is loaded only in part: open the file itself first</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../registering.py" />
+            <location filename="../../register/registering.py" />
             <source>has changed on disk since you opened it: open it again first</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../registering.py" />
+            <location filename="../../register/registering.py" />
             <source>the file is missing</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../registering.py" />
+            <location filename="../../register/registering.py" />
             <source>has no file yet: save it first</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../registering.py" />
+            <location filename="../../register/registering.py" />
             <source>made by a newer FreeCAD: cannot be saved here</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../sending.py" />
+            <location filename="../../register/rows.py" />
+            <source>Consumable</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Tool</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>{number} (kept)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>same or new part?</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>new</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>{number} or later</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>{number} (new)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>same part: keep {number}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>new part: a new number</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>a new number</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>stays as it is</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>registered</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>registering…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>carries the identity of {number}, as another file does</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>the same content as {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Silo has this very file as {number}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Silo has {number} with the same name</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../session/online.py" />
+            <source>No Silo server is set up yet. Enter its address in the Silo preferences.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../session/sending.py" />
             <source>{name} carries the identity of {number}, whose file in Silo is {before}. Is it the same part under a new name? Press Retry. Is it a copy that became a new part? Press Discard, then choose Register Parts and in it: new part</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../sending.py" />
+            <location filename="../../session/sending.py" />
             <source>{file} → {number}</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../sending.py" />
+            <location filename="../../session/sending.py" />
             <source>Silo does not know {name}; register it, or check that this is the right server</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../sending.py" />
+            <location filename="../../session/sending.py" />
             <source>BOM</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../sending.py" />
+            <location filename="../../session/sending.py" />
             <source>file and BOM</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../sending.py" />
+            <location filename="../../session/sending.py" />
             <source>file</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../session.py" />
+            <location filename="../../session/session.py" />
             <source>Connecting</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../session.py" />
+            <location filename="../../session/session.py" />
             <source>Keeping the commit</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../session.py" />
+            <location filename="../../session/session.py" />
             <source>Sending to Silo</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../session.py" />
+            <location filename="../../session/session.py" />
             <source>Outbox</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../snapshot.py" />
-            <source>Make the one that is meant active: double-click it in the tree.</source>
+            <location filename="../../settings/page.py" />
+            <source>Silo</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../snapshot.py" />
-            <source>{name} holds {n} registered parts, so its file is no single item's and stays here.</source>
+            <location filename="../../settings/page.py" />
+            <source>Server</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Address</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>API token</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>FreeCAD's preferences (a plain file)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Keep the token in</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Check the server's certificate</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>the system's own, unless a file is given</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Certificate authorities</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Test the connection</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Ask for a comment</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Sync the BOM of an assembly after its file is committed</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Then ask about components without a part number</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>hold the BOM back until they are mended</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>sync without them (they become unreferenced)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Where links are broken</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Part number schema</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Window</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Show what happens in Silo as it happens</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Commit in the File menu of every workbench</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Reading the settings</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>the keyring of the system ({name})</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>unchanged; enter another one to replace it</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>none yet: make one on the server's page</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Keeping the token</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Asking the server…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
+            <source>Testing the connection</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page_work.py" />
+            <source>Enter the server's address too: a token belongs to its server.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page_work.py" />
+            <source>Enter the address of the server first.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page_work.py" />
+            <source>Connected as {user} ({role}); the server is in {mode} mode.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page_work.py" />
+            <source>No server is set up. To try it out, run: silo-mod serve</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page_work.py" />
+            <source>In use: {url} ({from}).</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page_work.py" />
+            <source>SILO_SSL_VERIFY decides about the certificate.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page_work.py" />
+            <source>from the environment variable SILO_API_URL</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page_work.py" />
+            <source>from this page</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page_work.py" />
+            <source>from the configuration file of silo-mod</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page_work.py" />
+            <source>Token: from the environment variable SILO_API_TOKEN.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page_work.py" />
+            <source>Token: from the system's keyring.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page_work.py" />
+            <source>Token: from FreeCAD's preferences, a plain file.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page_work.py" />
+            <source>Token: from the configuration file of silo-mod.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page_work.py" />
+            <source>Token: none.</source>
             <translation type="unfinished" />
         </message>
     </context>

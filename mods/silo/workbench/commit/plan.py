@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What a commit saves, in which order, and what it leaves alone and why. GUI thread, but no widgets.
+
+A plan lists the document and everything below it that has unsaved edits, leaves before parents (spec,
+design decision 3). Nothing is lost: a document that FreeCAD cannot save whole is told, never written.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Any, Protocol
+
+from silo.bom.errors import SiloError
+from silo.workbench.commit.snapshot import Snapshot
+from silo.workbench.words import translate
+
+
+class Documents(Protocol):
+    """What a commit needs of FreeCAD; :mod:`silo.workbench.freecad.saving` has it."""
+
+    def linked(self, doc: Any, /) -> Iterable[Any]: ...
+
+    def is_partial(self, doc: Any, /) -> bool: ...
+
+    def is_modified(self, doc: Any, /) -> bool: ...
+
+    def is_writable(self, path: str, /) -> bool: ...
+
+    def lost_assemblies(self, doc: Any, /) -> list[str]: ...
+
+    def save(self, doc: Any, /) -> None: ...
+
+
+class State(StrEnum):
+    """How a document stands before a commit."""
+
+    CHANGED = "changed"  # has edits; will be saved
+    SAVED = "saved"  # nothing to save; the file is sent as it is
+    UNNAMED = "unnamed"  # never saved: it has no file yet
+    PARTIAL = "partial"  # has edits, but FreeCAD has loaded it only in part and cannot save it
+    READ_ONLY = "read-only"  # has edits, but the file may not be written
+    LOST = "lost"  # saving would destroy what this FreeCAD could not load
+
+
+@dataclass(frozen=True)
+class Row:
+    """A document of the plan. ``document`` is alive and belongs into the GUI thread."""
+
+    document: Any
+    path: str
+    label: str
+    state: State
+    is_top: bool = False
+
+    @property
+    def can_commit(self) -> bool:
+        """True where the file can be brought up to date and sent."""
+        return self.state in (State.CHANGED, State.SAVED)
+
+    @property
+    def note(self) -> str:
+        """The state in words."""
+        return _words()[self.state]
+
+
+def _words() -> dict[State, str]:
+    return {
+        State.CHANGED: translate("Silo", "unsaved edits: will be saved"),
+        State.SAVED: translate("Silo", "saved already"),
+        State.UNNAMED: translate("Silo", "has no file yet: save it under a name first"),
+        State.PARTIAL: translate(
+            "Silo",
+            "FreeCAD has loaded it only in part and cannot save these edits: open the file itself and "
+            "make them there",
+        ),
+        State.READ_ONLY: translate("Silo", "the file is read-only: these edits are not saved"),
+        State.LOST: translate(
+            "Silo", "made by a newer FreeCAD: saving it here would destroy its assemblies, so it is not saved"
+        ),
+    }
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The documents of a commit, leaves first, the one that was asked for last."""
+
+    rows: tuple[Row, ...]
+
+    @property
+    def top(self) -> Row:
+        """The document that the person works in."""
+        return self.rows[-1]
+
+    @property
+    def is_simple(self) -> bool:
+        """True where there is nothing to ask: one document that can be committed."""
+        return len(self.rows) == 1 and self.top.can_commit
+
+
+def plan(top: Any, documents: Documents) -> Plan:
+    """Plan the commit of a document."""
+    changed = {doc.Name for doc in documents.linked(top) if documents.is_modified(doc)} - {top.Name}
+    rows = []
+    # The order is asked for only where there is one to find.
+    for doc in leaves_first(top) if changed else (top,):
+        is_top = doc is top or doc == top
+        if is_top or doc.Name in changed:
+            path = os.path.realpath(doc.FileName) if doc.FileName else ""
+            rows.append(Row(doc, path, str(doc.Label), _state(doc, documents), is_top))
+    return Plan(tuple(rows))
+
+
+def leaves_first(top: Any) -> Iterable[Any]:
+    """A document and all that it links to, each once, linked ones before those that link to them.
+
+    Documents that link to each other in a ring come in the order in which they are found.
+    """
+    sort = getattr(top, "getDependentDocuments", None)
+    if sort is None:
+        return _walked(top)
+    try:
+        # One look at all links; ``OutList`` takes one for each document: seconds in large assemblies.
+        return list(sort(True))
+    except RuntimeError:
+        return _walked(top)
+
+
+def _walked(top: Any) -> Iterator[Any]:
+    seen: set[str] = set()
+    stack: list[tuple[Any, Iterator[Any]]] = []
+
+    def enter(doc: Any) -> None:
+        seen.add(doc.Name)
+        stack.append((doc, iter(tuple(getattr(doc, "OutList", ()) or ()))))
+
+    enter(top)
+    while stack:
+        doc, below = stack[-1]
+        following = next((d for d in below if d.Name not in seen), None)
+        if following is not None:
+            enter(following)
+        else:
+            stack.pop()
+            yield doc
+
+
+def _state(doc: Any, documents: Documents) -> State:
+    if not doc.FileName:
+        return State.UNNAMED
+    if not documents.is_modified(doc):
+        return State.SAVED
+    if documents.is_partial(doc):
+        return State.PARTIAL
+    if documents.lost_assemblies(doc):
+        return State.LOST
+    return State.CHANGED if documents.is_writable(doc.FileName) else State.READ_ONLY
+
+
+@dataclass(frozen=True)
+class Taken:
+    """One document of a commit is done, as far as the GUI thread is concerned.
+
+    held
+        the saved file's content under a second name; None where that is not possible.
+    error
+        why there is nothing to send.
+    """
+
+    row: Row
+    snapshot: Snapshot | None = None
+    key: str = ""
+    held: Path | None = None
+    error: SiloError | None = None
+
+
+@dataclass(frozen=True)
+class Taker:
+    """Saves documents and takes their snapshots.
+
+    take
+        snapshot of a document.
+    hold
+        keeps a file's content under a second name: (path, key).
+    new_key
+        names a commit.
+    """
+
+    documents: Documents
+    take: Callable[[Any], Snapshot]
+    hold: Callable[[str, str], Path | None]
+    new_key: Callable[[], str]
+
+    def each(self, rows: Iterable[Row]) -> Iterator[Taken]:
+        """One document after another; a failure does not stop the others. GUI thread."""
+        for row in rows:
+            try:
+                yield self._one(row)
+            except SiloError as error:
+                yield Taken(row, error=error)
+
+    def _one(self, row: Row) -> Taken:
+        if row.state is State.CHANGED:
+            self.documents.save(row.document)
+        snapshot = self.take(row.document)
+        key = self.new_key()
+        held = self.hold(row.path, key) if snapshot.identity else None
+        return Taken(row, snapshot, key, held)

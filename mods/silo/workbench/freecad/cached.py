@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Live documents through a cache: each fact is asked of FreeCAD once, and what an object lacks costs nothing.
+
+A walk asks some forty attributes of each link. Most are ones that a link has not, and FreeCAD then looks for
+them at the link's target and fails with an exception: 1000 links took 0.5 s that way, all of it in the GUI
+thread. Here an object's own ``PropertiesList`` is read once and answers for what is not there; so a link's
+attributes are never its target's either (facts §1.1). One :class:`FactCache` serves one walk only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+# Attributes of an object that are no properties, and that a walk may ask for.
+_PLAIN = frozenset(("State", "ID", "dumpPropertyContent", "getLinkedObject", "isValid"))
+
+
+class FactCache:
+    """Makes the views of one walk; the same object always has the same view.
+
+    is_object
+        True for a FreeCAD document object.
+    """
+
+    def __init__(self, is_object: Callable[[Any], bool]) -> None:
+        self._is_object = is_object
+        self._objects: dict[Any, CachedObject] = {}
+        self._documents: dict[str, CachedDocument] = {}
+        # FreeCAD's answer depends on the type alone.
+        self.derived: dict[tuple[str, str], bool] = {}
+
+    def object(self, real: Any) -> CachedObject:
+        """The view of an object."""
+        known = self._objects.get(real)
+        if known is None:
+            known = self._objects[real] = CachedObject(real, self)
+        return known
+
+    def document(self, real: Any) -> CachedDocument:
+        """The view of a document."""
+        name = real.Name
+        known = self._documents.get(name)
+        if known is None:
+            known = self._documents[name] = CachedDocument(real, self)
+        return known
+
+    def value(self, value: Any) -> Any:
+        """A value with views in the place of objects, also in lists and in pairs of object and sub-name."""
+        if self._is_object(value):
+            return self.object(value)
+        if isinstance(value, list):
+            return [self.value(one) for one in value]
+        if isinstance(value, tuple):
+            return tuple(self.value(one) for one in value)
+        return value
+
+
+class CachedObject:
+    """A document object as :class:`silo.bom.document.ObjectLike` has it; ``real`` is FreeCAD's."""
+
+    def __init__(self, real: Any, cache: FactCache) -> None:
+        known = self.__dict__
+        known["real"] = real
+        known["_cache"] = cache
+        known["Name"] = real.Name
+        known["TypeId"] = real.TypeId
+        known["PropertiesList"] = frozenset(real.PropertiesList)
+
+    def __getattr__(self, name: str) -> Any:
+        # Only asked for what is not in __dict__ yet.
+        if name in self.PropertiesList:
+            value = self._cache.value(getattr(self.real, name))
+        elif name == "Document":
+            value = self._cache.document(self.real.Document)
+        elif name in _PLAIN:
+            value = getattr(self.real, name)
+        else:
+            raise AttributeError(name)
+        self.__dict__[name] = value
+        return value
+
+    def isDerivedFrom(self, type_name: str, /) -> bool:
+        """As FreeCAD says, remembered by type."""
+        key = (self.TypeId, type_name)
+        known: bool | None = self._cache.derived.get(key)
+        if known is None:
+            known = self._cache.derived[key] = bool(self.real.isDerivedFrom(type_name))
+        return known
+
+    def __repr__(self) -> str:
+        return f"<{self.TypeId} {self.Name}>"
+
+
+class CachedDocument:
+    """A document as :class:`silo.bom.document.DocumentLike` has it."""
+
+    def __init__(self, real: Any, cache: FactCache) -> None:
+        self.real = real
+        self._cache = cache
+        self.Name: str = real.Name
+        self.Label: str = real.Label
+        self.FileName: str = real.FileName
+        self._meta: dict[str, str] | None = None
+        self._objects: list[CachedObject] | None = None
+
+    @property
+    def Meta(self) -> dict[str, str]:
+        """The document's own notes."""
+        if self._meta is None:
+            self._meta = dict(self.real.Meta)
+        return self._meta
+
+    @property
+    def Objects(self) -> list[CachedObject]:
+        """All objects, in document order."""
+        if self._objects is None:
+            self._objects = [self._cache.object(obj) for obj in self.real.Objects]
+        return self._objects
+
+    def getObject(self, name: str) -> CachedObject | None:
+        """An object by its ``Name``."""
+        found = self.real.getObject(name)
+        return self._cache.object(found) if found is not None else None
+
+    def getPropertyByName(self, name: str) -> Any:
+        """A property of the document; AttributeError where there is none, as in FreeCAD."""
+        return self.real.getPropertyByName(name)

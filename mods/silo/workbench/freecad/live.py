@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Live FreeCAD documents for the walker: what a link without a target has lost, and one path per file.
+
+The walker takes FreeCAD's own objects as they are. What it cannot ask them is why a link has no target:
+``LinkedObject`` is None for a missing file, a missing object and an unset link alike. The link's stored form
+knows (``dumpPropertyContent``), also while the document has unsaved edits.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import re
+import zipfile
+import zlib
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any
+from xml.sax.saxutils import unescape
+
+from silo.bom.document import LinkProblem, object_name
+from silo.bom.errors import DocumentError
+from silo.bom.findings import Finding, FindingCode, Place, Severity
+from silo.bom.links import extract
+from silo.bom.model import BomEntry, Extraction
+from silo.bom.roots import choose_assembly
+from silo.workbench.freecad import host, saving
+from silo.workbench.freecad.cached import CachedDocument, FactCache
+
+# <XLink file="parts/b.FCStd" stamp="…" name="Box" …>, written by FreeCAD itself into memory just now.
+_XLINK = re.compile(r"<XLink\b([^>]*)>")
+_ATTRIBUTE = re.compile(r'(\w+)="([^"]*)"')
+_ENTITIES = {"&quot;": '"', "&apos;": "'", "&#10;": "\n", "&#13;": "\r", "&#9;": "\t"}
+
+# A document type declaration stands before the root element, which FreeCAD writes within some hundred bytes.
+_BEFORE_ROOT = 1 << 16
+
+# The first FreeCAD with an Assembly workbench of its own.
+ASSEMBLY_SINCE = (0, 22)
+
+
+def read(path: str, assembly: str | None = None) -> Extraction:
+    """The BOM of a file, opened in this FreeCAD (or found open). DocumentError, InputError as told there."""
+    return extract_live(saving.open_fully(path), assembly)
+
+
+def read_checked(path: str, assembly: str | None = None) -> Extraction:
+    """As :func:`read`, for files that nobody has looked at: what could harm FreeCAD is not opened.
+
+    Where FreeCAD only says that it cannot open a file, the error has the reason that our reader finds.
+    """
+    from silo.fcstd import Library
+
+    _refuse_entities(path)
+    try:
+        return read(path, assembly)
+    except DocumentError:
+        Library().open(path)
+        raise
+
+
+def _refuse_entities(path: str) -> None:
+    """FreeCAD before its fix of CVE-2026-73235 follows external entities while it opens a document."""
+    try:
+        with zipfile.ZipFile(path) as file, file.open("Document.xml") as xml:
+            beginning = xml.read(_BEFORE_ROOT)
+    except (OSError, KeyError, RuntimeError, EOFError, zipfile.BadZipFile, zlib.error):
+        return  # FreeCAD will say so
+    if b"<!" in re.sub(rb"<!--.*?-->", b"", beginning.split(b"<Document")[0], flags=re.DOTALL):
+        raise DocumentError(
+            path, "its Document.xml declares a DOCTYPE, which FreeCAD never writes; not opened"
+        )
+
+
+def extract_live(document: Any, assembly: str | None = None) -> Extraction:
+    """The BOM of an open document, as it stands in this session, saved or not.
+
+    assembly
+        ``Name`` or ``Label`` of the assembly, where the document holds several.
+    """
+    if lost := lost_assemblies(document):
+        return _lost(document, lost)
+    cached = cached_document(document)
+    return extract_object(choose_assembly(cached, assembly))
+
+
+def cached_document(document: Any) -> CachedDocument:
+    """A live document for one walk: quick to ask, and never out of date for it is not kept."""
+    return FactCache(host.is_object).document(document)
+
+
+def extract_object(assembly_obj: Any) -> Extraction:
+    """The BOM of one assembly object, live or :func:`cached_document`."""
+    return extract(assembly_obj, inspect=LinkInspector(), canonical=canonical_paths())
+
+
+def canonical_paths() -> Callable[[str], str]:
+    """``os.path.realpath``, remembered for one walk: a file opened by two paths is one file."""
+    return lru_cache(maxsize=None)(os.path.realpath)
+
+
+def stored_target(link: Any, name: str = "LinkedObject") -> tuple[str, str] | None:
+    """File and object ``Name`` that a link has stored; ("", "") where it was never set, None where untold."""
+    try:
+        packed = link.dumpPropertyContent(name, Compression=0)
+        with zipfile.ZipFile(io.BytesIO(bytes(packed))) as content:
+            text = content.read("Persistence.xml").decode("utf-8", "replace")
+    except (AttributeError, NameError, RuntimeError, KeyError, zipfile.BadZipFile):
+        return None
+    element = _XLINK.search(text)
+    if element is None:
+        return None
+    found = {name: unescape(value, _ENTITIES) for name, value in _ATTRIBUTE.findall(element[1])}
+    return found.get("file", ""), found.get("name", "")
+
+
+class LinkInspector:
+    """Tells why links have no target, or only a changed copy of a lost original.
+
+    For one walk, so that no file is looked at twice.
+    """
+
+    def __init__(self) -> None:
+        self._library: Any = None
+
+    def __call__(self, link: Any) -> LinkProblem | None:
+        """None where that is not known, or where nothing is missing."""
+        if getattr(link, "LinkedObject", None) is None:
+            stored = stored_target(link)
+        elif getattr(link, "LinkCopyOnChangeSource", None) is None:
+            stored = stored_target(link, "LinkCopyOnChangeSource")
+            stored = stored if stored != ("", "") else None
+        else:
+            stored = None
+        if stored is None:
+            return None
+        file, name = stored
+        if not file:
+            return (
+                LinkProblem(FindingCode.MISSING_OBJECT, obj=name)
+                if name
+                else LinkProblem(FindingCode.UNSET_LINK)
+            )
+        owner = getattr(link.Document, "FileName", "")
+        return self._look(owner, file, name) if owner else LinkProblem(FindingCode.BROKEN_LINK, file, name)
+
+    def _look(self, owner: str, file: str, name: str) -> LinkProblem:
+        """What the reader of files says of the target, for it knows more than FreeCAD tells."""
+        from silo.fcstd import Library
+        from silo.fcstd.values import Ref
+
+        if self._library is None:
+            self._library = Library()
+        found = self._library.follow(_Owner(owner), Ref(file=file, name=name))
+        if isinstance(found, LinkProblem):
+            return found
+        if found.TypeId.startswith("Assembly::") and host.version() < ASSEMBLY_SINCE:
+            return LinkProblem(FindingCode.LOST_ASSEMBLY, file, name)
+        return LinkProblem(FindingCode.BROKEN_LINK, file, name, "FreeCAD did not load it")
+
+
+def live_problem(link: Any) -> LinkProblem | None:
+    """Why a live link has no target; None where that is not known, or where it has one."""
+    return LinkInspector()(link)
+
+
+class _Owner:
+    """The document that holds a link, as far as the reader of files needs it."""
+
+    def __init__(self, path: str) -> None:
+        self.FileName = os.path.realpath(path)
+        opened = os.path.dirname(os.path.abspath(path))
+        real = os.path.dirname(self.FileName)
+        self.folders = (opened, real) if real != opened else (opened,)
+
+
+def lost_assemblies(document: Any) -> list[str]:
+    """Assemblies that the file holds and this FreeCAD (before 1.0) could not load.
+
+    FreeCAD drops such objects without a word, and saving the document then destroys them in the file.
+    """
+    if host.version() >= ASSEMBLY_SINCE or not document.FileName:
+        return []
+    # Reading a large file takes long, and what an old FreeCAD has written holds nothing that this one drops.
+    if (by := saved_by(document)) is not None and by < ASSEMBLY_SINCE:
+        return []
+    from silo.fcstd import Library
+
+    try:
+        in_file = Library().open(document.FileName).Objects
+    except DocumentError:
+        return []
+    return [
+        object_name(obj)
+        for obj in in_file
+        if obj.TypeId.startswith("Assembly::Assembly") and document.getObject(obj.Name) is None
+    ]
+
+
+def saved_by(document: Any) -> tuple[int, int] | None:
+    """The FreeCAD that saved a document, such as (1, 0); None where that is not known."""
+    found = re.match(r"(\d+)\.(\d+)", document.getProgramVersion() or "")
+    return (int(found[1]), int(found[2])) if found else None
+
+
+def _lost(document: Any, names: list[str]) -> Extraction:
+    path = os.path.realpath(document.FileName)
+    major, minor = host.version()
+    message = (
+        f"{document.Label} was saved by FreeCAD {document.getProgramVersion()}; this FreeCAD {major}.{minor} "
+        f"cannot load its assemblies ({', '.join(names)}). Do not save it here, that would destroy them; "
+        "open it with FreeCAD 1.0 or newer."
+    )
+    finding = Finding(
+        FindingCode.LOST_ASSEMBLY, Severity.ERROR, message, tuple(Place(path, name) for name in names)
+    )
+    head = BomEntry(
+        doc_path=path, level=0, object_name=names[0], label=document.Label, document_label=document.Label
+    )
+    return Extraction(assembly=head, findings=(finding,))

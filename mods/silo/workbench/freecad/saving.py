@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Documents and their files: open them whole, know their unsaved edits, save them, write identities.
+
+No edit is lost and nothing is half written: what FreeCAD would silently not do is an error here. FreeCAD's
+main thread only.
+"""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+from typing import Any
+
+from silo.workbench.freecad import host
+from silo.workbench.freecad.saved_marks import SavedMarks
+
+
+def is_modified(doc: Any) -> bool:
+    """True where the document has edits that are not on disk."""
+    if not host.has_gui():
+        return bool(doc.isTouched()) if hasattr(doc, "isTouched") else False
+    return _is_marked(doc) and not (host.version() < (0, 21) and _marks().is_clean(doc))
+
+
+def _is_marked(doc: Any) -> bool:
+    view = host.view_of(doc)
+    return bool(view is not None and view.Modified)
+
+
+def open_fully(path: str) -> Any:
+    """The document of a file with all its objects, opened or completed where needed.
+
+    FreeCAD completes a partly loaded document by closing and reading it again, so unsaved edits in it would
+    be lost: then, and where the file cannot be read, :class:`DocumentError`.
+    """
+    from silo.bom.errors import DocumentError
+
+    known = host.find_document(path)
+    if known is not None and not host.is_partial(known):
+        return known
+    if known is not None and is_modified(known):
+        raise DocumentError(
+            path, "FreeCAD has loaded it only in part and it has unsaved edits, which opening it would lose"
+        )
+    with host.same_active_document():
+        try:
+            return host.open_document(known.FileName if known is not None else path)
+        except (OSError, RuntimeError) as problem:
+            raise DocumentError(path, f"FreeCAD cannot open it: {problem}") from problem
+
+
+def save(doc: Any) -> None:
+    """Save a document to its file; :class:`DocumentError` unless the file really was written."""
+    from silo.bom.errors import DocumentError
+
+    path = doc.FileName
+    if not path:
+        raise DocumentError(doc.Label, "it has never been saved; save it under a name first")
+    if host.is_partial(doc):
+        raise DocumentError(path, "FreeCAD has loaded it only in part and cannot save it")
+    if not is_writable(path):
+        raise DocumentError(path, "the file is read-only")
+    before = _stamp(path)
+    try:
+        _save(doc)
+    except (OSError, RuntimeError) as problem:
+        raise DocumentError(path, f"FreeCAD could not save it: {problem}") from problem
+    if _stamp(path) == before:
+        raise DocumentError(path, "FreeCAD did not write the file; its report view says why")
+
+
+def _save(doc: Any) -> None:
+    view = host.view_of(doc) if host.has_gui() else None
+    if view is None:
+        doc.save()
+    elif host.version() >= (0, 21):
+        doc.save()
+        view.Modified = False
+    elif view.ActiveView is None or _asks_before_saving(doc):
+        doc.save()
+        _marks().saved(doc)
+    else:
+        with host.same_active_document():
+            host.activate(doc)
+            host.run_command("Std_Save")
+
+
+@cache
+def _marks() -> SavedMarks:
+    marks = SavedMarks()
+    host.add_document_observer(marks)
+    return marks
+
+
+def _asks_before_saving(doc: Any) -> bool:
+    """True where FreeCAD's own save command would ask about further modified files."""
+    return any(other != doc and _is_marked(other) for other in doc.getDependentDocuments())
+
+
+def _stamp(path: str) -> tuple[int, int, int]:
+    try:
+        status = os.stat(path)
+    except OSError:
+        return (0, 0, 0)
+    return (status.st_mtime_ns, status.st_size, status.st_ino)
+
+
+def is_writable(path: str) -> bool:
+    """True where the file may be replaced; a file marked read-only may not, whoever asks."""
+    folder = os.path.dirname(path) or "."
+    if not os.path.exists(path):
+        return os.access(folder, os.W_OK)
+    marked = not os.stat(path).st_mode & 0o222
+    return os.access(path, os.W_OK) and os.access(folder, os.W_OK) and not marked
+
+
+def write_identity(doc: Any, name: str, identity: str, *, whole_document: bool) -> None:
+    """Write a Silo identity in every place that survives in all versions; the caller saves.
+
+    name
+        ``Name`` of the component's object; "" for the document itself.
+    whole_document
+        the document is this one component, so it carries the identity as well. Otherwise the identity is the
+        object's only (:mod:`silo.bom.identity` says where it is looked for).
+    """
+    from silo.bom.errors import DocumentError
+    from silo.bom.identity import meta_key
+
+    obj = doc.getObject(name) if name else None
+    if name and obj is None:
+        raise DocumentError(doc.FileName, f"it has no object {name} any more")
+    if obj is not None:
+        _set_text(obj, "SiloItemId", identity)
+        if "SiloUUID" in obj.PropertiesList:
+            obj.SiloUUID = identity
+    # Meta gives a copy: only assigning a whole dictionary changes it.
+    doc.Meta = {**doc.Meta, meta_key("" if whole_document else name): identity}
+    if whole_document and hasattr(doc, "addProperty"):
+        _set_text(doc, "SiloUUID", identity)
+
+
+def _set_text(owner: Any, name: str, value: str) -> None:
+    if name not in owner.PropertiesList:
+        owner.addProperty("App::PropertyString", name, "Silo", "Identity of the item in Silo")
+    setattr(owner, name, value)
+    if hasattr(owner, "setEditorMode"):
+        owner.setEditorMode(name, ["ReadOnly"])

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Qt, through FreeCAD's own ``PySide``: the only file that imports it.
+
+The shim differs between versions (measured): FreeCAD 0.20 has no ``PySide.QtWidgets``, its ``QtGui`` holds
+the widgets; PySide2 5.15 has only ``exec_``, PySide6 only ``exec``; every version takes enumerations spelled
+in full.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from PySide import QtCore, QtGui
+
+from silo.workbench.session.gui_thread_gc import collect_due
+
+try:
+    from PySide import QtWidgets
+except ImportError:
+    QtWidgets = QtGui
+
+__all__ = [
+    "QtCore",
+    "QtGui",
+    "QtWidgets",
+    "Relay",
+    "copy",
+    "in_gui_thread",
+    "later",
+    "open_url",
+    "run_dialog",
+    "tell_at_pointer",
+]
+
+
+class Relay(QtCore.QObject):  # type: ignore[misc]  # PySide has no types
+    """Runs calls in the GUI thread, whatever thread posts them. Make it in the GUI thread."""
+
+    _posted = QtCore.Signal(object)
+
+    def __init__(self, on_error: Callable[[BaseException], None] | None = None) -> None:
+        super().__init__()
+        self._on_error = on_error
+        self._posted.connect(self._run, QtCore.Qt.ConnectionType.QueuedConnection)
+
+    def post(self, call: Callable[[], None]) -> None:
+        """Run ``call`` in the GUI thread, soon; returns at once."""
+        try:
+            self._posted.emit(call)
+        except RuntimeError:
+            # FreeCAD is closing: the C++ half of this object is gone, and nobody is left to be told.
+            return
+
+    def _run(self, call: Callable[[], None]) -> None:
+        try:
+            call()
+        except Exception as error:  # noqa: BLE001  # an exception may not pass through Qt's event loop
+            if self._on_error is not None:
+                self._on_error(error)
+        # Long work tells its progress through here, so garbage does not pile up while it goes on.
+        collect_due()
+
+
+def in_gui_thread() -> bool:
+    """True in the thread that may touch widgets and documents."""
+    return threading.current_thread() is threading.main_thread()
+
+
+def later(milliseconds: int, call: Callable[[], None]) -> None:
+    """Run ``call`` in the GUI thread after a while; 0 means once the present event is done."""
+    QtCore.QTimer.singleShot(milliseconds, call)
+
+
+def run_dialog(dialog: Any) -> bool:
+    """Show a dialog and wait for its end; True where it was accepted."""
+    execute = getattr(dialog, "exec", None) or dialog.exec_
+    return bool(execute())
+
+
+def open_url(url: str) -> bool:
+    """Open a page in the browser; False where there is none."""
+    return bool(QtGui.QDesktopServices.openUrl(QtCore.QUrl(url)))
+
+
+def tell_at_pointer(text: str) -> None:
+    """A word where the person has just clicked; it goes away by itself."""
+    QtWidgets.QToolTip.showText(QtGui.QCursor.pos(), text)
+
+
+def copy(text: str) -> None:
+    """Put text on the clipboard."""
+    QtWidgets.QApplication.clipboard().setText(text)

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Small widgets that the pane and the dialogs share. Text is always shown as text, never as markup."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from silo.workbench import words
+from silo.workbench.freecad import host
+from silo.workbench.gui.flow_layout import FlowLayout
+from silo.workbench.gui.qt import QtCore, QtGui, QtWidgets
+from silo.workbench.pane.activity import Tone
+
+# (on a light ground, on a dark ground)
+_COLOURS = {
+    Tone.GOOD: ("#1f7a33", "#6fcf85"),
+    Tone.CHANGED: ("#8a5a00", "#f0bd59"),
+    Tone.WARNING: ("#a34a00", "#ffa94d"),
+    Tone.ERROR: ("#b3202c", "#ff7b85"),
+}
+
+
+def is_dark(widget: Any) -> bool:
+    """True where the widget's ground is dark (FreeCAD's dark themes).
+
+    Told by the colour of its text: a theme that is a style sheet leaves the palette's ground as it was.
+    """
+    widget.ensurePolished()
+    return bool(widget.palette().color(QtGui.QPalette.ColorRole.WindowText).lightness() > 128)
+
+
+def colour(tone: Tone, widget: Any) -> str:
+    """The colour of a tone, readable on the widget's ground; "" for the theme's own."""
+    if tone is Tone.QUIET:
+        widget.ensurePolished()
+        text = widget.palette().color(QtGui.QPalette.ColorRole.WindowText)
+        ground = widget.palette().color(QtGui.QPalette.ColorRole.Window)
+        parts = [
+            round(0.62 * t + 0.38 * g) for t, g in zip(text.getRgb()[:3], ground.getRgb()[:3], strict=True)
+        ]
+        return "#{:02x}{:02x}{:02x}".format(*parts)
+    light, dark = _COLOURS.get(tone, ("", ""))
+    return dark if is_dark(widget) else light
+
+
+def label(text: str, tone: Tone = Tone.PLAIN, *, bold: bool = False, wrap: bool = True) -> Any:
+    """Plain text that wraps, and that can be selected and copied."""
+    made = QtWidgets.QLabel()
+    made.setTextFormat(QtCore.Qt.TextFormat.PlainText)
+    made.setText(text)
+    made.setWordWrap(wrap)
+    made.setTextInteractionFlags(QtCore.Qt.TextInteractionFlag.TextSelectableByMouse)
+    if wrap:
+        # One word without a blank, however long, must not widen the whole pane.
+        policy = made.sizePolicy()
+        policy.setHorizontalPolicy(QtWidgets.QSizePolicy.Policy.Ignored)
+        made.setSizePolicy(policy)
+        made.setMinimumWidth(20)
+    paint(made, tone, bold=bold)
+    return made
+
+
+def paint(made: Any, tone: Tone, *, bold: bool = False) -> None:
+    """Give a label the colour of a tone."""
+    rules = []
+    if chosen := colour(tone, made):
+        rules.append(f"color: {chosen};")
+    if bold:
+        rules.append("font-weight: bold;")
+    made.setStyleSheet("QLabel { " + " ".join(rules) + " }" if rules else "")
+
+
+def link_button(text: str, call: Callable[[], None], tip: str = "") -> Any:
+    """A button that looks like a link: it does not shout, and the keyboard reaches it."""
+    made = QtWidgets.QPushButton(text)
+    made.setFlat(True)
+    made.setCursor(QtCore.Qt.CursorShape.PointingHandCursor)
+    made.setStyleSheet(link_style("#7cb7ff" if is_dark(made) else "#0b5cad"))
+    made.setSizePolicy(QtWidgets.QSizePolicy.Policy.Fixed, QtWidgets.QSizePolicy.Policy.Fixed)
+    made.setToolTip(words.tip(tip))
+    made.clicked.connect(lambda _checked=False: call())
+    return made
+
+
+def link_style(shade: str, more: str = "") -> str:
+    """The style sheet of a link; it has to undo what FreeCAD's themes do to buttons."""
+    return (
+        f"QPushButton {{ color: {shade}; background: transparent; border: none; min-width: 0; min-height: 0;"
+        f" margin: 0; padding: 1px 2px; text-align: left; {more} }}"
+        "QPushButton:hover, QPushButton:focus { text-decoration: underline; }"
+    )
+
+
+def row(*widgets: Any, gap: int = 10) -> Any:
+    """A layout of widgets side by side, in several lines where the width ends."""
+    layout = FlowLayout(gap)
+    for widget in widgets:
+        layout.addWidget(widget)
+    return layout
+
+
+def picture(name: str, size: int = 16) -> Any:
+    """One of the add-on's own icons as a label."""
+    made = QtWidgets.QLabel()
+    icon = host.icon(name)
+    if icon is not None:
+        made.setPixmap(icon.pixmap(size, size))
+    made.setFixedSize(size, size)
+    return made
+
+
+def broken(text: str, metrics: Any, width: int) -> str:
+    """A text with line ends where ``width`` pixels are full; a word that is wider stands alone."""
+    lines = [""]
+    for word in text.split():
+        longer = f"{lines[-1]} {word}".strip()
+        if lines[-1] and metrics.horizontalAdvance(longer) > width:
+            lines.append(word)
+        else:
+            lines[-1] = longer
+    return "\n".join(lines)
+
+
+def clear(layout: Any) -> None:
+    """Remove all widgets of a layout."""
+    while layout.count():
+        item = layout.takeAt(0)
+        if item.widget() is not None:
+            item.widget().hide()
+            item.widget().deleteLater()
+        elif item.layout() is not None:
+            clear(item.layout())
+
+
+def warn(parent: Any, title: str, text: str) -> None:
+    """Tell a problem and wait until it is read."""
+    box = QtWidgets.QMessageBox(parent)
+    box.setIcon(QtWidgets.QMessageBox.Icon.Warning)
+    box.setWindowTitle(title)
+    box.setTextFormat(QtCore.Qt.TextFormat.PlainText)
+    box.setText(words.visible(text, 2000))
+    (getattr(box, "exec", None) or box.exec_)()

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""From the command to the mass window: measure the open assembly, with progress and cancel. GUI thread.
+
+Shapes are measured where they are, in FreeCAD's main thread, face by face; in between the window lives, so
+that Cancel works. A modal window keeps the person from changing what is being measured.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from silo.bom.errors import CancelledError, SiloError
+from silo.workbench.freecad import host
+from silo.workbench.gui import widgets
+from silo.workbench.gui.qt import QtCore, QtWidgets
+from silo.workbench.words import plain, translate
+
+# The window lives this often while shapes are measured.
+BREATH_S = 0.05
+# Small assemblies are measured before anybody could read a progress window.
+PATIENCE_MS = 500
+
+
+class MassFlow:
+    """Opens mass windows."""
+
+    def start(self, doc: Any) -> Any:
+        """Measure a document's assembly and show its masses; the window, None where there is nothing."""
+        title = translate("Silo", "Mass of the assembly")
+        try:
+            import numpy  # noqa: F401
+        except ImportError:
+            text = translate("Silo", "This FreeCAD's Python has no numpy, which masses need.")
+            widgets.warn(host.main_window(), title, text)
+            return None
+        try:
+            content = self._measured(doc)
+        except CancelledError:
+            return None
+        except SiloError as error:
+            widgets.warn(host.main_window(), title, str(error))
+            return None
+        from silo.workbench.mass.dialog import MassDialog
+
+        dialog = MassDialog(content, host.main_window())
+        dialog.show()
+        return dialog
+
+    def _measured(self, doc: Any) -> Any:
+        from silo.inertia.calculator import Task, calculate
+        from silo.inertia.geometry.options import ReadOptions
+        from silo.inertia.links import Link, LinkMap
+        from silo.inertia.massrule import Options
+        from silo.inertia.materials import load_materials
+        from silo.workbench.mass import shapes
+        from silo.workbench.mass.rows import shown
+
+        with Waiting(plain(doc.Label, 60)) as waiting:
+            # FreeCAD's own volume stands witness here; meshes are for pictures, and cost as much again.
+            assembly = shapes.read_live(doc, ReadOptions(mesh_check=False), waiting.report)
+        options = Options(step_density=True, unknown_is_zero=True, own_bom=True)
+        # Without anything placed there is nothing for a pattern to match, which would be told as a fault.
+        everything = Link(assembly.name or "assembly", ("**",))
+        whole = LinkMap((everything,)) if assembly.instances else None
+        task = Task(load_materials(freecad=False), options, whole, simulated=False)
+        return shown(calculate(assembly, None, task))
+
+
+class Waiting:
+    """A progress window with Cancel; :meth:`report` raises CancelledError once it was pressed."""
+
+    def __init__(self, name: str) -> None:
+        self._part = ""
+        self._last = 0.0
+        self._window = QtWidgets.QProgressDialog(host.main_window())
+        self._window.setObjectName("SiloMeasuring")
+        self._window.setWindowTitle(translate("Silo", "Measuring {name}").replace("{name}", name))
+        self._window.setWindowModality(QtCore.Qt.WindowModality.ApplicationModal)
+        self._window.setMinimumDuration(PATIENCE_MS)
+        self._window.setRange(0, 0)
+        self._window.setLabelText(translate("Silo", "Reading the assembly…"))
+
+    def __enter__(self) -> Waiting:
+        self._window.setValue(0)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._window.reset()
+        self._window.deleteLater()
+
+    def report(self, stage: str, done: int, total: int) -> None:
+        """Called for each part and each face; lets the window live now and then."""
+        if stage == "measuring":
+            text = translate("Silo", "Part {n} of {total}")
+            self._part = text.replace("{n}", str(done)).replace("{total}", str(total))
+            self._window.setRange(0, total)
+            self._window.setValue(done - 1)
+        now = time.monotonic()
+        if now - self._last < BREATH_S:
+            return
+        self._last = now
+        if stage == "measuring faces" and total > 200:
+            faces = translate("Silo", "face {n} of {total}")
+            faces = faces.replace("{n}", str(done)).replace("{total}", str(total))
+            self._window.setLabelText(f"{self._part}, {faces}")
+        elif self._part:
+            self._window.setLabelText(self._part)
+        QtWidgets.QApplication.processEvents()
+        if self._window.wasCanceled():
+            raise CancelledError("measuring was cancelled")

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The line at the top of the pane: how the connection is, in words and colours. Pure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from urllib.parse import urlsplit
+
+from silo.workbench.pane.activity import Action, Do, Tone
+from silo.workbench.session.session import Shown
+from silo.workbench.words import plain, translate
+
+# Ground and ink; yellow read-only, orange degraded, red offline, as the Kindred workbench has them.
+_YELLOW, _ORANGE, _RED = ("#ffe08a", "#4a3b00"), ("#ffc078", "#5c2b00"), ("#f8b4b9", "#5f0a12")
+
+
+@dataclass(frozen=True)
+class Banner:
+    """What the banner says; ``ground`` is "" where it should not stand out."""
+
+    text: str
+    tone: Tone = Tone.PLAIN
+    ground: str = ""
+    ink: str = ""
+    actions: tuple[Action, ...] = ()
+
+
+def banner(shown: Shown) -> Banner:
+    """The banner for a state."""
+    settings = Action(Do.SETTINGS, translate("Silo", "Settings…"))
+    again = Action(Do.RETRY, translate("Silo", "Try again"))
+    if not shown.server.configured:
+        text = translate("Silo", "No Silo server is set up yet.")
+        return Banner(text, Tone.QUIET, actions=(settings,))
+    host = plain(urlsplit(shown.server.url).netloc or shown.server.url, 80)
+    reason = plain(shown.reason, 300)
+    kind = shown.connection
+    if kind == "online":
+        return Banner("● " + translate("Silo", "Connected to {host}").replace("{host}", host), Tone.GOOD)
+    if kind == "read-only":
+        text = translate("Silo", "{host} is read-only now. Commits wait here until it takes changes again.")
+        return Banner(text.replace("{host}", host), ground=_YELLOW[0], ink=_YELLOW[1])
+    if kind == "degraded":
+        text = translate("Silo", "{host} works only in part. What cannot be sent waits here.")
+        return Banner(text.replace("{host}", host), ground=_ORANGE[0], ink=_ORANGE[1])
+    if kind == "offline":
+        text = translate("Silo", "No connection to {host}. Commits wait here and are sent later.")
+        told = "\n".join(filter(None, (text.replace("{host}", host), reason)))
+        return Banner(told, ground=_RED[0], ink=_RED[1], actions=(again,))
+    if kind == "refused":
+        text = translate("Silo", "{host} does not accept the token.").replace("{host}", host)
+        return Banner(text, ground=_RED[0], ink=_RED[1], actions=(settings, again))
+    if kind == "connecting":
+        return Banner(translate("Silo", "Connecting to {host}…").replace("{host}", host), Tone.QUIET)
+    if kind == "unsupported":
+        text = translate("Silo", "{host} sends no live events; what you commit is shown all the same.")
+        return Banner(text.replace("{host}", host), Tone.QUIET)
+    return Banner(translate("Silo", "{host} (live events are off)").replace("{host}", host), Tone.QUIET)

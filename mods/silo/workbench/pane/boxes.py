@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The parts of the Database Activity pane: a box per entry, the banner, work in progress, what waits."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from functools import partial
+from typing import Any
+
+from silo.workbench.gui import widgets
+from silo.workbench.gui.qt import QtCore, QtWidgets
+from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone
+from silo.workbench.pane.banner import Banner
+from silo.workbench.session.session import Shown
+from silo.workbench.words import counted, plain, translate
+
+OnAction = Callable[[Action], None]
+
+
+def buttons(actions: Iterable[Action], on_action: OnAction) -> Any:
+    """A row of link buttons."""
+    made = []
+    for action in actions:
+        address = action.target if action.do is Do.VIEW else ""
+        made.append(widgets.link_button(action.text, partial(on_action, action), address))
+    return widgets.row(*made)
+
+
+class Box(QtWidgets.QFrame):  # type: ignore[misc]
+    """One entry."""
+
+    def __init__(self, entry: Entry, on_action: OnAction) -> None:
+        super().__init__()
+        self._on_action = on_action
+        self.setObjectName("siloBox")
+        edge = widgets.colour(entry.tone, self) or "palette(mid)"
+        self.setStyleSheet(
+            "QFrame#siloBox { border: 1px solid palette(mid); border-radius: 4px;"
+            f" background: {_ground(self)}; border-left: 4px solid {edge}; }}"
+        )
+        layout = QtWidgets.QVBoxLayout(self)
+        layout.setContentsMargins(9, 6, 8, 6)
+        layout.setSpacing(3)
+        layout.addLayout(self._head(entry))
+        if entry.badges:
+            badges = [widgets.label(badge.text, badge.tone, bold=True, wrap=False) for badge in entry.badges]
+            layout.addLayout(widgets.row(*badges, gap=12))
+        for line in entry.lines:
+            self._line(layout, line)
+        if entry.actions:
+            layout.addLayout(buttons(entry.actions, self._on_action))
+
+    def _head(self, entry: Entry) -> Any:
+        layout = QtWidgets.QHBoxLayout()
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(6)
+        if entry.icon:
+            layout.addWidget(widgets.picture(entry.icon), 0, QtCore.Qt.AlignmentFlag.AlignTop)
+        layout.addWidget(widgets.label(entry.title, bold=True), 1)
+        when = widgets.label(
+            " · ".join(filter(None, (entry.who, _clock(entry.when)))), Tone.QUIET, wrap=False
+        )
+        when.setToolTip(time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(entry.when)))
+        layout.addWidget(when, 0, QtCore.Qt.AlignmentFlag.AlignTop)
+        return layout
+
+    def _line(self, layout: Any, line: Line) -> None:
+        sign = {Tone.WARNING: "⚠ ", Tone.ERROR: "✗ "}.get(line.tone, "")
+        layout.addWidget(widgets.label(sign + line.text, line.tone))
+        if line.actions:
+            layout.addLayout(buttons(line.actions, self._on_action))
+
+
+def _ground(widget: Any) -> str:
+    """The ground of a box. In a dark theme the palette may still be the light one."""
+    return "rgba(255, 255, 255, 13)" if widgets.is_dark(widget) else "palette(base)"
+
+
+def _clock(when: float) -> str:
+    moment = time.localtime(when)
+    today = time.strftime("%Y-%m-%d")
+    return time.strftime("%H:%M" if time.strftime("%Y-%m-%d", moment) == today else "%Y-%m-%d %H:%M", moment)
+
+
+class BannerWidget(QtWidgets.QFrame):  # type: ignore[misc]
+    """How the connection is, and what to do about it."""
+
+    def __init__(self, on_action: OnAction) -> None:
+        super().__init__()
+        self._on_action = on_action
+        self._drawn: Banner | None = None
+        self.setObjectName("siloBanner")
+        self._layout = QtWidgets.QVBoxLayout(self)
+        self._layout.setContentsMargins(8, 5, 8, 5)
+        self._layout.setSpacing(2)
+
+    def forget(self) -> None:
+        """Draw anew next time, whatever the state."""
+        self._drawn = None
+
+    def draw(self, told: Banner) -> None:
+        """Show a state of the connection."""
+        if told == self._drawn:
+            return
+        self._drawn = told
+        widgets.clear(self._layout)
+        self.setStyleSheet(
+            f"QFrame#siloBanner {{ background: {told.ground}; border-radius: 4px; }}"
+            f" QFrame#siloBanner QLabel {{ color: {told.ink}; }}"
+            if told.ground
+            else ""
+        )
+        text = widgets.label(told.text)
+        self._layout.addWidget(text)
+        if told.ground:
+            text.setStyleSheet(f"QLabel {{ color: {told.ink}; }}")
+        else:
+            widgets.paint(text, told.tone)
+        if not told.actions:
+            return
+        made = [widgets.link_button(a.text, partial(self._on_action, a)) for a in told.actions]
+        for button in made if told.ground else ():
+            button.setStyleSheet(widgets.link_style(told.ink, "text-decoration: underline;"))
+        self._layout.addLayout(widgets.row(*made))
+
+
+class BusyWidget(QtWidgets.QWidget):  # type: ignore[misc]
+    """What a worker is doing, with a way to stop it."""
+
+    def __init__(self, on_action: OnAction) -> None:
+        super().__init__()
+        layout = QtWidgets.QHBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        self._text = widgets.label("", Tone.QUIET)
+        self._bar = QtWidgets.QProgressBar()
+        self._bar.setTextVisible(False)
+        self._bar.setMaximumHeight(8)
+        self._bar.setMaximumWidth(110)
+        layout.addWidget(self._text, 1)
+        layout.addWidget(self._bar)
+        stop = Action(Do.STOP, translate("Silo", "Stop"))
+        layout.addWidget(widgets.link_button(stop.text, partial(on_action, stop)))
+        self.hide()
+
+    def draw(self, shown: Shown) -> None:
+        """Show the work in progress, if there is any."""
+        busy = shown.busy
+        self.setVisible(busy is not None)
+        if busy is None:
+            return
+        self._text.setText(plain(": ".join(filter(None, (busy.title, busy.detail))), 120))
+        self._bar.setRange(0, 0 if busy.fraction is None else 1000)
+        if busy.fraction is not None:
+            self._bar.setValue(round(1000 * busy.fraction))
+
+
+class WaitingWidget(QtWidgets.QFrame):  # type: ignore[misc]
+    """What is not sent yet, and why, with Retry and Discard."""
+
+    # Some hundred rows help nobody; all of them are sent all the same.
+    MOST = 20
+
+    def __init__(self, on_action: OnAction) -> None:
+        super().__init__()
+        self._on_action = on_action
+        self.setObjectName("siloWaiting")
+        self.setStyleSheet("QFrame#siloWaiting { border: 1px solid palette(mid); border-radius: 4px; }")
+        self._layout = QtWidgets.QVBoxLayout(self)
+        self._layout.setContentsMargins(9, 6, 8, 6)
+        self._layout.setSpacing(3)
+        self.hide()
+
+    def draw(self, shown: Shown) -> None:
+        """Show what waits."""
+        widgets.clear(self._layout)
+        self.setVisible(bool(shown.waiting))
+        if not shown.waiting:
+            return
+        one = translate("Silo", "{n} thing waits to be sent")
+        many = translate("Silo", "{n} things wait to be sent")
+        self._layout.addWidget(widgets.label(counted(len(shown.waiting), one, many), bold=True))
+        # What needs a person comes first.
+        ordered = sorted(shown.waiting, key=lambda waiting: not waiting.rejected)
+        for waiting in ordered[: self.MOST]:
+            self._row(waiting)
+        left = len(ordered) - self.MOST
+        if left > 0:
+            self._layout.addWidget(
+                widgets.label(translate("Silo", "… and {n} more").replace("{n}", str(left)), Tone.QUIET)
+            )
+        send = Action(Do.RETRY, translate("Silo", "Send now"))
+        self._layout.addLayout(buttons((send,), self._on_action))
+
+    def _row(self, waiting: Any) -> None:
+        what = f"{plain(waiting.title, 80)} · {plain(waiting.what, 80)} · {_clock(waiting.since)}"
+        self._layout.addWidget(widgets.label(what, Tone.ERROR if waiting.rejected else Tone.PLAIN))
+        if waiting.reason:
+            self._layout.addWidget(widgets.label(plain(waiting.reason, 300), Tone.QUIET))
+        actions = [Action(Do.DISCARD, translate("Silo", "Discard"), target=waiting.id)]
+        if waiting.rejected:
+            actions.insert(0, Action(Do.RETRY, translate("Silo", "Retry"), target=waiting.id))
+        if waiting.rejected or waiting.reason:
+            self._layout.addLayout(buttons(actions, self._on_action))

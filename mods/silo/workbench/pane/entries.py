@@ -1,0 +1,305 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""From what happened to what the pane shows: commits of this FreeCAD, and events of the server. Pure."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterable
+from datetime import datetime
+from typing import Any
+
+from silo.api.sse import MERGE, RESET, ServerEvent
+from silo.api.wire import MergeDiff, MergeEvent, MergeWarning
+from silo.bom.errors import SiloError
+from silo.bom.findings import Finding, FindingCode, Severity
+from silo.bom.model import BomEntry
+from silo.bom.naming import display_name
+from silo.bom.report import shorten
+from silo.bom_sync import Resolved, Status
+from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone, shortened
+from silo.workbench.session.sending import Sent
+from silo.workbench.words import counted, plain, quantity, translate
+
+# Makes an absolute address of a page such as `resolve_url`; raises SiloError for another server's.
+Page = Callable[[str], str]
+
+
+def of_sent(sent: Sent, page: Page, now: float | None = None) -> Entry:
+    """The box of one commit."""
+    lines = (*_revision_lines(sent), *_status_lines(sent), *_resolved_lines(sent))
+    tone = max((line.tone for line in lines), key=_WEIGHT.__getitem__, default=Tone.GOOD)
+    url = (sent.result.resolve_url if sent.result is not None else "") or f"/items/{sent.part_number}/bom"
+    return Entry(
+        key=f"sync:{sent.sync_id}" if sent.sync_id else f"commit:{sent.part_number}:{now}",
+        also=_revision_key(sent.part_number, sent.revision.revision_number) if sent.revision else "",
+        title=_title(sent),
+        when=time.time() if now is None else now,
+        tone=tone if tone in (Tone.WARNING, Tone.ERROR) else Tone.GOOD,
+        badges=_badges(sent),
+        lines=lines,
+        actions=_view(url, page),
+        rank=1,
+        icon="silo-bom" if sent.status in (Status.MERGED, Status.BLOCKED) else "silo-commit",
+    )
+
+
+_JUST_NOW_S = 120.0
+
+_WEIGHT = {
+    Tone.QUIET: 0,
+    Tone.PLAIN: 1,
+    Tone.GOOD: 2,
+    Tone.CHANGED: 3,
+    Tone.WARNING: 4,
+    Tone.ERROR: 5,
+}
+
+
+def _title(sent: Sent) -> str:
+    if sent.status is Status.MERGED:
+        text = translate("Silo", "BOM Updated: {number}")
+    elif sent.status is Status.BLOCKED:
+        text = translate("Silo", "BOM not synced: {number}")
+    else:
+        text = translate("Silo", "Committed: {number}")
+    return text.replace("{number}", " ".join(filter(None, (sent.part_number, _name(sent)))))
+
+
+def _name(sent: Sent) -> str:
+    if sent.resolved is not None and sent.resolved.assembly.name:
+        return sent.resolved.assembly.name
+    return sent.commit.snapshot.label if sent.commit is not None else ""
+
+
+def _badges(sent: Sent) -> tuple[Line, ...]:
+    if sent.result is not None:
+        return badges(sent.result.diff, sent.result.warnings)
+    if sent.status is Status.UNCHANGED:
+        return (Line(translate("Silo", "BOM unchanged"), Tone.QUIET),)
+    return ()
+
+
+def badges(diff: MergeDiff, warnings: Iterable[MergeWarning] = ()) -> tuple[Line, ...]:
+    """The counts of a merge, as the spec's box has them; what is zero is left out."""
+    conflicts = sum(1 for warning in warnings if warning.type == "conflict")
+    parts = (
+        (len(diff.added), translate("Silo", "+{n} added"), Tone.GOOD),
+        (len(diff.quantity_changed), translate("Silo", "~{n} qty changed"), Tone.CHANGED),
+        (len(diff.removed), translate("Silo", "⚠{n} unreferenced"), Tone.WARNING),
+        (conflicts, translate("Silo", "⚡{n} in conflict"), Tone.WARNING),
+    )
+    told = tuple(Line(text.replace("{n}", str(count)), tone) for count, text, tone in parts if count)
+    return told or (Line(translate("Silo", "no changes"), Tone.QUIET),)
+
+
+def _revision_lines(sent: Sent) -> tuple[Line, ...]:
+    if sent.revision is not None:
+        text = translate("Silo", "Revision {n} uploaded").replace("{n}", str(sent.revision.revision_number))
+        comment = plain(sent.revision.comment, 120)
+        return (Line(f"{text}: {comment}" if comment else text, Tone.PLAIN),)
+    if sent.commit is not None and sent.commit.file is not None:
+        return (Line(translate("Silo", "The file is in Silo already"), Tone.QUIET),)
+    return ()
+
+
+def _status_lines(sent: Sent) -> tuple[Line, ...]:
+    lines = []
+    if sent.commit is not None and sent.commit.snapshot.problem:
+        lines.append(Line(sent.commit.snapshot.problem, Tone.WARNING))
+    removed = len(sent.result.diff.removed) if sent.result is not None else 0
+    if sent.status is Status.UNCHANGED and sent.plan is not None:
+        removed = len(sent.plan.diff.removed)
+    if removed:
+        one = translate("Silo", "{n} item in the Silo BOM is not referenced by components in this assembly.")
+        many = translate(
+            "Silo", "{n} items in the Silo BOM are not referenced by components in this assembly."
+        )
+        lines.append(Line(counted(removed, one, many), Tone.WARNING))
+    if sent.status is Status.BLOCKED:
+        text = translate("Silo", "The file is in Silo. The BOM waits until these are mended:")
+        lines.append(Line(text, Tone.ERROR))
+    return tuple(lines)
+
+
+def _resolved_lines(sent: Sent) -> tuple[Line, ...]:
+    resolved = sent.resolved
+    if resolved is None:
+        return ()
+    base = os.path.dirname(resolved.assembly.doc_path)
+    rest = (Action(Do.PREVIEW, translate("Silo", "Show all…"), document=resolved.assembly.doc_path),)
+    return (
+        *shortened(tuple(_finding_lines(resolved, base)), MOST_FINDINGS, rest),
+        *shortened(tuple(_conflict_lines(sent, resolved)), MOST_CONFLICTS, rest),
+        *unregistered_lines(resolved),
+    )
+
+
+# However many of a kind there are, the box has room for the other kinds and their buttons.
+MOST_FINDINGS, MOST_CONFLICTS = 6, 4
+MOST_IN_CONSOLE = 20
+
+# Told elsewhere in the box, or in the report view only.
+_NOT_HERE = (FindingCode.UNREGISTERED, FindingCode.CONSOLIDATION)
+
+
+def _finding_lines(resolved: Resolved, base: str) -> list[Line]:
+    lines = []
+    order = {Severity.ERROR: 0, Severity.WARNING: 1}
+    told = [f for f in resolved.findings if f.severity in order and f.code not in _NOT_HERE]
+    for finding in sorted(told, key=lambda f: order[f.severity]):
+        tone = Tone.ERROR if finding.severity is Severity.ERROR else Tone.WARNING
+        lines.append(Line(shorten(finding.message, base), tone, finding_actions(finding, resolved)))
+    return lines
+
+
+def finding_actions(finding: Finding, resolved: Resolved) -> tuple[Action, ...]:
+    """What a person can do about a finding: see the objects, or decide about a copied identity."""
+    top = resolved.assembly.doc_path
+    if finding.code is FindingCode.COPIED_IDENTITY:
+        return (Action(Do.DECIDE, translate("Silo", "Same or new part…"), document=top),)
+    names = tuple(place.obj for place in finding.where if place.doc_path == top and place.obj)
+    return (Action(Do.SHOW, translate("Silo", "Show"), document=top, objects=names),) if names else ()
+
+
+def _conflict_lines(sent: Sent, resolved: Resolved) -> list[Line]:
+    if sent.plan is None:
+        return []
+    text = translate("Silo", "{number}: the assembly has {cad}, a manual line in Silo says {silo}")
+    known = {entry.part_number: entry for entry in resolved.entries}
+    lines = []
+    for change in sent.plan.diff.conflicts:
+        told = text.replace("{number}", change.part_number).replace("{cad}", quantity(change.local_quantity))
+        told = told.replace("{silo}", quantity(change.remote_quantity))
+        lines.append(Line(told, Tone.WARNING, _show(known.get(change.part_number), resolved)))
+    return lines
+
+
+def _show(entry: BomEntry | None, resolved: Resolved) -> tuple[Action, ...]:
+    if entry is None or not entry.instances:
+        return ()
+    text = translate("Silo", "Show")
+    return (Action(Do.SHOW, text, document=resolved.assembly.doc_path, objects=entry.instances),)
+
+
+def unregistered_lines(resolved: Resolved) -> tuple[Line, ...]:
+    """``⚠ 2 components have no Silo part number [Register Parts…]``, and which they are."""
+    count = len(resolved.unresolved)
+    if not count:
+        return ()
+    one = translate("Silo", "{n} component has no Silo part number")
+    many = translate("Silo", "{n} components have no Silo part number")
+    register = Action(Do.REGISTER, translate("Silo", "Register Parts…"), document=resolved.assembly.doc_path)
+    names = ", ".join(plain(display_name(entry), 40) for entry in resolved.unresolved[:5])
+    more = ", …" if count > 5 else ""
+    return (
+        Line(counted(count, one, many), Tone.WARNING, (register,)),
+        Line(f"{names}{more}", Tone.QUIET),
+    )
+
+
+def console_lines(sent: Sent) -> tuple[str, ...]:
+    """What goes to the report view: the consolidation warnings in the spec's words (§6)."""
+    findings = sent.resolved.findings if sent.resolved is not None else ()
+    told = [plain(f.message, 300) for f in findings if f.code is FindingCode.CONSOLIDATION]
+    left = len(told) - MOST_IN_CONSOLE
+    if left < 2:
+        return tuple(told)
+    more = translate("Silo", "[Silo BOM] … and {n} more of these; the preview lists them all.")
+    return (*told[:MOST_IN_CONSOLE], more.replace("{n}", str(left)))
+
+
+# --- events of the server --------------------------------------------------------------------------------
+
+
+def of_event(event: ServerEvent, page: Page, now: float | None = None) -> Entry | None:
+    """The box of one event; None for those that people need not see."""
+    when = time.time() if now is None else now
+    if event.merge is not None:
+        return of_merge(event.merge, page, when, event.id)
+    if event.type == RESET:
+        return of_gap(when)
+    data = event.data if isinstance(event.data, dict) else {}
+    number = event.item or ""
+    title, key = _event_words(event.type, number, data)
+    if not title or not number:
+        return None
+    return Entry(
+        key=key or f"event:{event.id}:{event.type}:{number}",
+        title=title,
+        when=when,
+        who=_text(data, "user", "created_by"),
+        lines=tuple(Line(text) for text in (_text(data, "comment", "description", "name"),) if text),
+        actions=_view(f"/items/{number}", page),
+        icon="silo-commit" if event.type == "revision.created" else "silo-register",
+    )
+
+
+def of_gap(when: float) -> Entry:
+    """The box for what was not heard: the server lost its log, or counts anew."""
+    text = translate(
+        "Silo", "The server cannot tell any more what happened since. Its own activity page shows what is so."
+    )
+    return Entry(
+        key="gap",
+        title=translate("Silo", "Some activity may be missing"),
+        when=when,
+        lines=(Line(text, Tone.QUIET),),
+        icon="silo-activity",
+    )
+
+
+def of_merge(merge: MergeEvent, page: Page, when: float, event_id: str | None = None) -> Entry:
+    """The box of a merge that the server announced (spec §5, SSE Event)."""
+    told = badges(merge.diff, merge.warnings)
+    return Entry(
+        key=f"sync:{merge.sync_id}" if merge.sync_id else f"event:{event_id}:{MERGE}",
+        title=translate("Silo", "BOM Updated: {number}").replace("{number}", merge.item),
+        when=_moment(merge.timestamp, when),
+        tone=Tone.WARNING if any(badge.tone is Tone.WARNING for badge in told) else Tone.PLAIN,
+        who=merge.user,
+        badges=told,
+        actions=_view(merge.resolve_url or f"/items/{merge.item}/bom", page),
+        icon="silo-bom",
+    )
+
+
+def _moment(told: datetime | None, now: float) -> float:
+    """When an event happened: as the server says where it is an old one, else now.
+
+    Servers tell whole seconds, and their clocks are a little off: just now, the order of arrival is truer.
+    """
+    stamp = told.timestamp() if told is not None else now
+    return stamp if abs(stamp - now) > _JUST_NOW_S else now
+
+
+def _event_words(kind: str, number: str, data: dict[str, Any]) -> tuple[str, str]:
+    """Title and key of an event; the key of a revision is that of our own upload of it."""
+    revision = data.get("revision_number", data.get("revision"))
+    if kind == "revision.created" and isinstance(revision, int):
+        if revision == 1 and _text(data, "comment") in ("", "created"):
+            return "", ""  # An item is born with it, and that is told already.
+        text = translate("Silo", "Revision {n} of {number}").replace("{n}", str(revision))
+        return text.replace("{number}", number), _revision_key(number, revision)
+    words = {
+        "item.created": translate("Silo", "New item: {number}"),
+        "item.deleted": translate("Silo", "Archived: {number}"),
+    }
+    return words.get(kind, "").replace("{number}", number), ""
+
+
+def _revision_key(number: str, revision: int) -> str:
+    return f"revision:{number}:{revision}"
+
+
+def _text(data: dict[str, Any], *names: str) -> str:
+    return next((plain(value) for name in names if isinstance(value := data.get(name), str) and value), "")
+
+
+def _view(path: str, page: Page) -> tuple[Action, ...]:
+    try:
+        url = page(path)
+    except SiloError:
+        # Another server's page: a message must not send people where the settings do not.
+        return ()
+    return (Action(Do.VIEW, translate("Silo", "View in Silo →"), target=url),)

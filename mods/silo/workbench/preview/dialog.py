@@ -1,0 +1,298 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The preview window: the assembly's BOM against the server's, and Sync. It draws ``preview.rows``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from silo.bom.errors import SiloError
+from silo.workbench.gui import widgets
+from silo.workbench.gui.qt import QtCore, QtGui, QtWidgets
+from silo.workbench.pane.activity import Tone
+from silo.workbench.preview.rows import MOST_ROWS, Kind, Preview, Row, rows, summary
+from silo.workbench.words import counted, plain, tip, translate
+
+# Of the sentences below the table, only the first are broken into lines.
+MOST_WRAPPED = 200
+
+_TONES = {
+    Kind.ADDED: Tone.GOOD,
+    Kind.CHANGED: Tone.CHANGED,
+    Kind.CONFLICT: Tone.ERROR,
+    Kind.UNREFERENCED: Tone.WARNING,
+    Kind.MANUAL: Tone.QUIET,
+    Kind.UNREGISTERED: Tone.WARNING,
+    Kind.NOT_COUNTED: Tone.PLAIN,
+}
+_SIGNS = {
+    Kind.ADDED: "+",
+    Kind.CHANGED: "~",
+    Kind.CONFLICT: "⚡",
+    Kind.UNREFERENCED: "⚠",
+    Kind.MANUAL: "✎",
+    Kind.UNREGISTERED: "?",
+    Kind.UNCHANGED: "=",
+}
+
+# Sentences rather than lines of a BOM.
+_WIDE = (Kind.GROUP, Kind.NOT_COUNTED)
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What the window asks for; all in the GUI thread.
+
+    sync
+        (preview, sub-assemblies too, although links are broken).
+    show
+        select instances: (document, objects).
+    """
+
+    refresh: Callable[[], None]
+    sync: Callable[[Preview, bool, bool], None]
+    register: Callable[[Preview], None]
+    show: Callable[[str, tuple[str, ...]], None]
+    view: Callable[[Preview], None]
+
+
+class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
+    """Not modal: one looks at the model while one reads it."""
+
+    def __init__(self, title: str, wishes: Wishes, parent: Any) -> None:
+        super().__init__(parent)
+        self._wishes = wishes
+        self._preview: Preview | None = None
+        self.setObjectName("SiloPreview")
+        self.setWindowTitle(translate("Silo", "BOM in Silo: {name}").replace("{name}", plain(title, 80)))
+        self.setAttribute(QtCore.Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.resize(860, 560)
+        layout = QtWidgets.QVBoxLayout(self)
+        layout.setSpacing(8)
+        self._title = widgets.label("", bold=True)
+        self._summary = widgets.label(translate("Silo", "Comparing with Silo…"))
+        self._problem = widgets.label("", Tone.ERROR)
+        self._problem.hide()
+        self.table = self._make_table()
+        for part in (self._title, self._summary, self._problem):
+            layout.addWidget(part)
+        layout.addWidget(self.table, 1)
+        self._make_options(layout)
+        layout.addLayout(self._make_buttons())
+        self._enable()
+
+    # -- made once --------------------------------------------------------------------------------------
+
+    def _make_table(self) -> Any:
+        tree = QtWidgets.QTreeWidget()
+        tree.setObjectName("rows")
+        tree.setAlternatingRowColors(True)
+        tree.setUniformRowHeights(False)
+        tree.setHeaderLabels(
+            [
+                translate("Silo", "Part number"),
+                translate("Silo", "Name"),
+                translate("Silo", "Assembly"),
+                translate("Silo", "In Silo"),
+                translate("Silo", "What a sync does"),
+            ]
+        )
+        for column in (2, 3):
+            tree.headerItem().setTextAlignment(column, QtCore.Qt.AlignmentFlag.AlignRight)
+        tree.itemDoubleClicked.connect(lambda item, _column: self._show(item))
+        return tree
+
+    def _make_options(self, layout: Any) -> None:
+        self.changes_only = QtWidgets.QCheckBox(translate("Silo", "Show only lines that differ"))
+        self.changes_only.toggled.connect(lambda _on: self._fill())
+        self.below = QtWidgets.QCheckBox("")
+        self.missing = QtWidgets.QCheckBox(
+            translate("Silo", "Sync although links are broken (what they stood for becomes unreferenced)")
+        )
+        self.missing.toggled.connect(lambda _on: self._enable())
+        for box in (self.changes_only, self.below, self.missing):
+            layout.addWidget(box)
+        self.below.hide()
+        self.missing.hide()
+
+    def _make_buttons(self) -> Any:
+        def button(text: str, name: str, call: Callable[[], None]) -> Any:
+            made = QtWidgets.QPushButton(text)
+            made.setObjectName(name)
+            made.setAutoDefault(False)
+            made.clicked.connect(lambda _checked=False: call())
+            return made
+
+        self.show_button = button(
+            translate("Silo", "Show"), "show", lambda: self._show(self.table.currentItem())
+        )
+        self.show_button.setToolTip(translate("Silo", "Select the instances in the 3D view and the tree"))
+        self.refresh_button = button(translate("Silo", "Compare again"), "refresh", self._wishes.refresh)
+        self.view_button = button(translate("Silo", "View in Silo →"), "view", self._view)
+        self.register_button = button(translate("Silo", "Register Parts…"), "register", self._register)
+        self.sync_button = button(translate("Silo", "Sync"), "sync", self._sync)
+        self.sync_button.setDefault(True)
+        close = button(translate("Silo", "Close"), "close", self.close)
+        row = QtWidgets.QHBoxLayout()
+        for made in (self.show_button, self.refresh_button, self.view_button):
+            row.addWidget(made)
+        row.addStretch(1)
+        for made in (self.register_button, self.sync_button, close):
+            row.addWidget(made)
+        return row
+
+    # -- what is shown ----------------------------------------------------------------------------------
+
+    def busy(self) -> None:
+        """A comparison is under way."""
+        self._problem.hide()
+        self._summary.setText(translate("Silo", "Comparing with Silo…"))
+        self._preview = None
+        self._enable()
+
+    def fail(self, error: SiloError) -> None:
+        """The comparison did not come about."""
+        self._summary.setText("")
+        self._tell(str(error))
+        self._enable()
+
+    def fill(self, preview: Preview) -> None:
+        """Show a comparison."""
+        self._preview = preview
+        head = preview.top.resolved.assembly
+        self._title.setText(
+            plain(" ".join(filter(None, (preview.number, head.name or preview.snapshot.label))))
+        )
+        self._summary.setText(summary(preview))
+        self._tell(self._problems(preview))
+        one = translate("Silo", "Sync the {n} sub-assembly that differs too, before this one")
+        many = translate("Silo", "Sync the {n} sub-assemblies that differ too, before this one")
+        self.below.setText(counted(preview.drifted_below, one, many))
+        self.below.setVisible(bool(preview.drifted_below))
+        self.missing.setVisible(bool(preview.broken))
+        self._fill()
+        self._enable()
+
+    def _problems(self, preview: Preview) -> str:
+        told = []
+        if not preview.number:
+            told.append(
+                translate("Silo", "This assembly has no Silo part number yet. Register it to sync its BOM.")
+            )
+        if preview.broken:
+            one = translate("Silo", "{n} broken link: the BOM is not synced until it is mended.")
+            many = translate("Silo", "{n} broken links: the BOM is not synced until they are mended.")
+            told.append(counted(len(preview.broken), one, many))
+        return "\n".join(told)
+
+    def _tell(self, text: str) -> None:
+        self._problem.setText(plain(text, 500) if "\n" not in text else text)
+        self._problem.setVisible(bool(text))
+
+    def _fill(self) -> None:
+        self.table.clear()
+        if self._preview is None:
+            return
+        left = [MOST_ROWS]
+        self.table.addTopLevelItems(list(self._items(rows(self._preview), left)))
+        if left[0] < 0:
+            more = QtWidgets.QTreeWidgetItem(
+                ["", translate("Silo", "… and {n} more rows").replace("{n}", str(-left[0]))]
+            )
+            self.table.addTopLevelItem(more)
+        for number in range(self.table.topLevelItemCount()):
+            self._spread(self.table.topLevelItem(number))
+        for column in range(4):
+            self.table.resizeColumnToContents(column)
+        for column, least, most in ((0, 130, 240), (1, 150, 280), (2, 66, 110), (3, 66, 110)):
+            self.table.setColumnWidth(column, min(max(self.table.columnWidth(column) + 12, least), most))
+        self._wrap()
+
+    def _spread(self, item: Any) -> None:
+        """Sentences take the whole width; what is short enough is opened."""
+        kind = item.data(1, QtCore.Qt.ItemDataRole.UserRole)
+        item.setFirstColumnSpanned(kind in _WIDE)
+        item.setExpanded(item.childCount() <= 12)
+        for number in range(item.childCount()):
+            self._spread(item.child(number))
+
+    def resizeEvent(self, event: Any) -> None:
+        """Sentences are broken anew for the new width."""
+        super().resizeEvent(event)
+        QtCore.QTimer.singleShot(0, self._wrap)
+
+    def _wrap(self) -> None:
+        """Break the sentences to the width that there is; the view itself would cut them."""
+        tree = self.table
+        for place in range(tree.topLevelItemCount()):
+            group = tree.topLevelItem(place)
+            width = tree.viewport().width() - 2 * tree.indentation() - 12
+            for number in range(min(group.childCount(), MOST_WRAPPED)):
+                item = group.child(number)
+                if item.data(1, QtCore.Qt.ItemDataRole.UserRole) == Kind.NOT_COUNTED.value:
+                    whole = item.data(2, QtCore.Qt.ItemDataRole.UserRole)
+                    item.setText(0, widgets.broken(whole, tree.fontMetrics(), width))
+
+    def _items(self, wanted: Iterable[Row], left: list[int]) -> Iterable[Any]:
+        only = self.changes_only.isChecked()
+        for row in wanted:
+            children = list(self._items(row.children, left))
+            if only and row.kind is Kind.UNCHANGED and not children:
+                continue
+            left[0] -= 1
+            if left[0] >= 0:
+                yield self._item(row, children)
+
+    def _item(self, row: Row, children: list[Any]) -> Any:
+        sign = _SIGNS.get(row.kind, "")
+        texts = [f"{sign} {row.number}".strip(), row.name, row.cad, row.silo, row.note]
+        if row.kind in _WIDE:
+            texts = [" ".join(filter(None, (row.number, row.name or row.note)))]
+        item = QtWidgets.QTreeWidgetItem(texts)
+        item.setData(2, QtCore.Qt.ItemDataRole.UserRole, texts[0])
+        tone = Tone.ERROR if row.number == "✗" else _TONES.get(row.kind, Tone.PLAIN)
+        if shade := widgets.colour(tone, self.table):
+            brush = QtGui.QBrush(QtGui.QColor(shade))
+            for column in range(5):
+                item.setForeground(column, brush)
+        for column in (2, 3):
+            item.setTextAlignment(column, QtCore.Qt.AlignmentFlag.AlignRight)
+        if row.kind is Kind.GROUP:
+            font = item.font(0)
+            font.setBold(True)
+            item.setFont(0, font)
+        if row.note:
+            item.setToolTip(0 if row.kind in _WIDE else 4, tip(row.note))
+        item.setData(0, QtCore.Qt.ItemDataRole.UserRole, (row.document, list(row.objects)))
+        item.setData(1, QtCore.Qt.ItemDataRole.UserRole, row.kind.value)
+        item.addChildren(children)
+        return item
+
+    def _enable(self) -> None:
+        preview = self._preview
+        ready = preview is not None and bool(preview.number)
+        held = preview is not None and bool(preview.broken) and not self.missing.isChecked()
+        self.sync_button.setEnabled(ready and not held)
+        self.view_button.setEnabled(ready)
+        self.register_button.setEnabled(preview is not None and bool(preview.unregistered))
+
+    # -- what is asked for ------------------------------------------------------------------------------
+
+    def _show(self, item: Any) -> None:
+        data = item.data(0, QtCore.Qt.ItemDataRole.UserRole) if item is not None else None
+        if data and data[1]:
+            self._wishes.show(data[0], tuple(data[1]))
+
+    def _sync(self) -> None:
+        if self._preview is not None:
+            below = self.below.isVisible() and self.below.isChecked()
+            self._wishes.sync(self._preview, below, self.missing.isChecked())
+
+    def _register(self) -> None:
+        if self._preview is not None:
+            self._wishes.register(self._preview)
+
+    def _view(self) -> None:
+        if self._preview is not None:
+            self._wishes.view(self._preview)

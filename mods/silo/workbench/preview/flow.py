@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""From the command to the preview window, and from its buttons to the workers. GUI thread."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from silo.bom.errors import SiloError
+from silo.workbench.commit.flow import CommitFlow, take_snapshot
+from silo.workbench.commit.snapshot import Snapshot
+from silo.workbench.freecad import host
+from silo.workbench.gui import widgets
+from silo.workbench.session.session import Session
+from silo.workbench.session.spool import Commit, new_key
+from silo.workbench.words import translate
+
+if TYPE_CHECKING:
+    from silo.workbench.preview.dialog import PreviewDialog
+    from silo.workbench.preview.rows import Preview
+
+
+class PreviewFlow:
+    """Opens previews, one per document.
+
+    register, show, view
+        what the add-on does for the window: register what a preview lists, select objects, open a page.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        commits: CommitFlow,
+        *,
+        register: Callable[[str], None],
+        show: Callable[[str, tuple[str, ...]], None],
+        view: Callable[[str], None],
+    ) -> None:
+        self._session, self._commits = session, commits
+        self._register, self._show, self._view = register, show, view
+        self._open: dict[str, PreviewDialog] = {}
+
+    def start(self, doc: Any) -> None:
+        """Compare a document's assembly with the server."""
+        taken = self._take(doc)
+        if taken is None:
+            return
+        if not taken.is_assembly:
+            text = taken.problem or translate("Silo", "{name} holds no assembly, so it has no BOM.")
+            widgets.warn(
+                host.main_window(), translate("Silo", "BOM in Silo"), text.replace("{name}", taken.label)
+            )
+            return
+        self._dialog(taken, doc.Name)
+        self._ask(taken)
+
+    def again(self, path: str) -> None:
+        """Compare anew where a window is open: what it shows has changed."""
+        doc = host.find_document(path)
+        if path in self._open and doc is not None and (taken := self._take(doc)) is not None:
+            self._ask(taken)
+
+    def _take(self, doc: Any) -> Snapshot | None:
+        try:
+            return self._commits.decided(take_snapshot(doc))
+        except SiloError as error:
+            widgets.warn(host.main_window(), translate("Silo", "BOM in Silo"), str(error))
+            return None
+
+    def _dialog(self, taken: Snapshot, name: str) -> PreviewDialog:
+        from silo.workbench.preview.dialog import PreviewDialog, Wishes
+
+        if taken.path in self._open:
+            self._open[taken.path].raise_()
+            return self._open[taken.path]
+        wishes = Wishes(
+            refresh=lambda: self.again(taken.path),
+            sync=self._sync,
+            register=lambda preview: self._register(preview.snapshot.path),
+            show=self._show,
+            view=lambda preview: self._view(preview.page),
+        )
+        dialog = PreviewDialog(taken.label or name, wishes, host.main_window())
+        self._open[taken.path] = dialog
+        dialog.finished.connect(lambda _result: self._open.pop(taken.path, None))
+        dialog.show()
+        return dialog
+
+    def _ask(self, taken: Snapshot) -> None:
+        self._open[taken.path].busy()
+
+        def question(client: Any, control: Any) -> Preview:
+            from silo.workbench.preview.rows import ask
+
+            return ask(taken, client, control)
+
+        self._session.ask(
+            translate("Silo", "Comparing with Silo"),
+            question,
+            done=lambda preview: self._with_dialog(taken.path, lambda dialog: dialog.fill(preview)),
+            failed=lambda error: self._with_dialog(taken.path, lambda dialog: dialog.fail(error)),
+        )
+
+    def _with_dialog(self, path: str, call: Callable[[PreviewDialog], None]) -> None:
+        # The window may have been closed while the server was thinking.
+        if path in self._open:
+            call(self._open[path])
+
+    def _sync(self, preview: Preview, below: bool, allow_missing: bool) -> None:
+        from silo.workbench.preview.rows import to_sync
+
+        def failed(error: SiloError) -> None:
+            self._with_dialog(preview.snapshot.path, lambda dialog: dialog.fail(error))
+
+        for taken in to_sync(preview, below=below):
+            commit = Commit(new_key(), taken, time.time(), allow_missing=allow_missing)
+            self._session.keep(commit, failed=failed)

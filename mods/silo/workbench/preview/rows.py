@@ -1,0 +1,326 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The BOM preview as rows: the assembly against the server, level by level (the rows of ``silo-mod diff``).
+
+Pure, but for :func:`ask`, which reads from the server and belongs into the worker.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any
+
+from silo.bom.diff import diff_bom
+from silo.bom.findings import Finding, FindingCode, Severity
+from silo.bom.model import BomDiff, BomEntry, Extraction
+from silo.bom.naming import display_name
+from silo.bom.report import relative, shorten
+from silo.workbench.commit.snapshot import Snapshot
+from silo.workbench.session.jobs import Control
+from silo.workbench.words import plain, quantity, translate
+
+if TYPE_CHECKING:
+    # It brings pydantic with it, which only a worker may import.
+    from silo.bom_sync import Resolved
+
+
+class Kind(StrEnum):
+    """What a row says."""
+
+    ADDED = "added"
+    CHANGED = "changed"
+    CONFLICT = "conflict"
+    UNREFERENCED = "unreferenced"
+    MANUAL = "manual"
+    UNCHANGED = "unchanged"
+    UNREGISTERED = "unregistered"
+    NOT_COUNTED = "not counted"
+    GROUP = "group"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of the table.
+
+    cad, silo
+        quantities per one parent, as text; "" where that side has none.
+    document, objects
+        the instances in the CAD model, to select them.
+    """
+
+    kind: Kind
+    number: str = ""
+    name: str = ""
+    cad: str = ""
+    silo: str = ""
+    note: str = ""
+    document: str = ""
+    objects: tuple[str, ...] = ()
+    children: tuple[Row, ...] = ()
+
+    def __post_init__(self) -> None:
+        for text in ("number", "name", "note"):
+            object.__setattr__(self, text, plain(getattr(self, text), 300))
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One assembly against the server's lines."""
+
+    resolved: Resolved
+    lines: tuple[Mapping[str, Any], ...]
+    diff: BomDiff
+
+
+@dataclass(frozen=True)
+class Preview:
+    """All that the preview shows, and what a sync from it needs.
+
+    compared
+        every assembly, children before parents; the one that was asked for is the last.
+    broken
+        what keeps the assembly from being synced.
+    page
+        address of the assembly's BOM on the server.
+    """
+
+    snapshot: Snapshot
+    compared: tuple[Compared, ...]
+    names: Mapping[str, str] = field(default_factory=dict)
+    broken: tuple[Finding, ...] = ()
+    page: str = ""
+
+    @property
+    def top(self) -> Compared:
+        return self.compared[-1]
+
+    @property
+    def number(self) -> str:
+        """Part number of the assembly; "" while it has none."""
+        return self.top.resolved.assembly.part_number or ""
+
+    @property
+    def unregistered(self) -> tuple[BomEntry, ...]:
+        """Components without a part number, the assembly itself included."""
+        head = self.top.resolved.assembly
+        return (*self.top.resolved.unresolved, *(() if head.part_number else (head,)))
+
+    @property
+    def drifted_below(self) -> int:
+        """Sub-assemblies that differ from the server."""
+        return sum(1 for one in self.compared[:-1] if one.diff.drifted)
+
+
+def ask(snapshot: Snapshot, api: Any, control: Control) -> Preview:
+    """Compare a snapshot with the server, sub-assemblies included. Worker."""
+    from silo.bom_sync import assemblies, blocking, names_of, resolve, server_lines
+
+    extraction = snapshot.extraction or Extraction(BomEntry(snapshot.path, label=snapshot.label))
+    whole = resolve(extraction, api)
+    compared = []
+    for one in assemblies(whole):
+        control.check()
+        control.progress(one.assembly.part_number or one.assembly.label)
+        lines = server_lines(one, api)
+        compared.append(Compared(one, lines, diff_bom(one.entries, lines)))
+    all_lines = [line for one in compared for line in one.lines]
+    number = whole.assembly.part_number
+    page = api.web_url(f"/items/{number}/bom") if number else ""
+    return Preview(snapshot, tuple(compared), names_of(whole, all_lines), blocking(whole), page)
+
+
+# Nested assemblies share their lines: some dozen small files can stand for more rows than memory holds.
+MOST_ROWS = 3000
+
+
+def rows(preview: Preview, most: int = MOST_ROWS) -> tuple[Row, ...]:
+    """The table: the lines of the assembly, then what is left out and why.
+
+    most
+        so many rows of sub-assemblies at most, each of which gets its share; the rest is told by one row.
+    """
+    by_key = {one.resolved.assembly.key: one for one in preview.compared}
+    base = os.path.dirname(preview.snapshot.path)
+    room = most // 2
+    table = [*_assembly_rows(preview.top, by_key, preview.names, frozenset(), room)]
+    unresolved = preview.top.resolved.unresolved
+    share = _share(room, unresolved)
+    unregistered = tuple(
+        _unregistered_row(entry, base, tuple(_below(entry, by_key, preview.names, frozenset(), share)))
+        for entry in unresolved
+    )
+    if unregistered:
+        title = translate("Silo", "Without a part number: left out until registered")
+        table.append(_group(title, unregistered))
+    left_out = tuple(_finding_row(f, preview, base) for f in _told(preview.top.resolved.findings))
+    if left_out:
+        title = translate("Silo", "Not counted, or counted with a remark")
+        table.append(_group(title, left_out))
+    return tuple(table)
+
+
+def _group(title: str, children: tuple[Row, ...]) -> Row:
+    return Row(Kind.GROUP, name=f"{title} ({len(children)})", children=children)
+
+
+Known = Mapping[tuple[str, str], Compared]
+Keys = frozenset[tuple[str, str]]
+
+
+def _share(room: int, entries: Sequence[BomEntry]) -> int:
+    return room // max(1, sum(entry.is_assembly for entry in entries))
+
+
+def _assembly_rows(
+    one: Compared, known: Known, names: Mapping[str, str], above: Keys, room: int
+) -> Iterator[Row]:
+    """The assembly's own lines in its own order, then those that only the server has.
+
+    room
+        so many rows may stand below them.
+    """
+    states = _states(one.diff)
+    share = _share(room, one.resolved.entries)
+    above = above | {one.resolved.assembly.key}
+    for entry in one.resolved.entries:
+        kind, silo, note = states.get(entry.part_number or "", (Kind.UNCHANGED, "", ""))
+        yield Row(
+            kind,
+            number=entry.part_number or "",
+            name=entry.name or "",
+            cad=quantity(entry.quantity),
+            silo=silo,
+            note=note,
+            document=one.resolved.assembly.doc_path,
+            objects=entry.instances,
+            children=tuple(_below(entry, known, names, above, share)),
+        )
+    local = {entry.part_number for entry in one.resolved.entries}
+    for kind, changes in ((Kind.UNREFERENCED, one.diff.removed), (Kind.MANUAL, one.diff.manual)):
+        for change in changes:
+            if change.part_number not in local:
+                number, amount = change.part_number, quantity(change.quantity)
+                name = names.get(number, "")
+                yield Row(kind, number=number, name=name, silo=amount, note=_notes()[kind])
+
+
+def _below(entry: BomEntry, known: Known, names: Mapping[str, str], above: Keys, room: int) -> Iterator[Row]:
+    """The lines of a sub-assembly; none where it stands above itself (a loop is told as a finding)."""
+    one = known.get(entry.key) if entry.is_assembly and entry.key not in above else None
+    if one is None:
+        return
+    left = room - len(one.resolved.entries) - len(one.diff.removed) - len(one.diff.manual)
+    if left < 0:
+        yield Row(Kind.GROUP, name=translate("Silo", "… more rows than can be shown here"))
+    else:
+        yield from _assembly_rows(one, known, names, above, left)
+
+
+def _states(diff: BomDiff) -> dict[str, tuple[Kind, str, str]]:
+    """Part number → kind, the server's quantity, and what a sync does."""
+    notes = _notes()
+    states: dict[str, tuple[Kind, str, str]] = {}
+    for line in diff.unchanged:
+        states[line.part_number] = (Kind.UNCHANGED, quantity(line.quantity), "")
+    for line in diff.added:
+        states[line.part_number] = (Kind.ADDED, "", notes[Kind.ADDED])
+    for change in diff.quantity_changed:
+        states[change.part_number] = (Kind.CHANGED, quantity(change.remote_quantity), notes[Kind.CHANGED])
+    for change in diff.conflicts:
+        states[change.part_number] = (Kind.CONFLICT, quantity(change.remote_quantity), notes[Kind.CONFLICT])
+    return states
+
+
+def _notes() -> dict[Kind, str]:
+    return {
+        Kind.ADDED: translate("Silo", "new in the assembly: will be added"),
+        Kind.CHANGED: translate("Silo", "will take the assembly's quantity"),
+        Kind.CONFLICT: translate("Silo", "manual line in Silo with another quantity: a person decides there"),
+        Kind.UNREFERENCED: translate("Silo", "not in the assembly: kept, marked unreferenced"),
+        Kind.MANUAL: translate("Silo", "manual line: not touched"),
+    }
+
+
+def _unregistered_row(entry: BomEntry, base: str, children: tuple[Row, ...]) -> Row:
+    return Row(
+        Kind.UNREGISTERED,
+        name=display_name(entry),
+        cad=quantity(entry.quantity),
+        note=relative(entry.doc_path, base),
+        children=children,
+    )
+
+
+# Told as rows of their own.
+_ELSEWHERE = (FindingCode.UNREGISTERED,)
+_ORDER = {Severity.ERROR: 0, Severity.WARNING: 1, Severity.INFO: 2}
+
+
+def _told(findings: Iterable[Finding]) -> list[Finding]:
+    return sorted((f for f in findings if f.code not in _ELSEWHERE), key=lambda f: _ORDER[f.severity])
+
+
+def _finding_row(finding: Finding, preview: Preview, base: str) -> Row:
+    top = preview.snapshot.path
+    mine = tuple(place.obj for place in finding.where if place.doc_path == top and place.obj)
+    return Row(
+        Kind.NOT_COUNTED,
+        number={Severity.ERROR: "✗", Severity.WARNING: "⚠", Severity.INFO: "·"}[finding.severity],
+        note=shorten(finding.message, base),
+        document=top if mine else "",
+        objects=mine,
+    )
+
+
+def summary(preview: Preview) -> str:
+    """One line over the table."""
+    diff = preview.top.diff
+    parts = (
+        (len(diff.added), translate("Silo", "{n} to add")),
+        (len(diff.quantity_changed), translate("Silo", "{n} with another quantity")),
+        (len(diff.removed), translate("Silo", "{n} unreferenced")),
+        (len(diff.conflicts), translate("Silo", "{n} in conflict")),
+        (len(preview.top.resolved.unresolved), translate("Silo", "{n} without a part number")),
+    )
+    told = [text.replace("{n}", str(count)) for count, text in parts if count]
+    if not told:
+        agree = translate("Silo", "Nothing to sync: all {n} lines agree with Silo.")
+        return agree.replace("{n}", str(len(diff.unchanged)))
+    return ", ".join(told)
+
+
+def to_sync(preview: Preview, *, below: bool) -> tuple[Snapshot, ...]:
+    """Snapshots whose BOMs a sync sends, children before parents; without ``below`` the top one only."""
+    found = []
+    for one in preview.compared[:-1] if below else ():
+        if one.resolved.assembly.part_number and one.diff.drifted:
+            found.append(_part_of(preview.snapshot, one.resolved))
+    return (*found, preview.snapshot)
+
+
+def _part_of(snapshot: Snapshot, one: Resolved) -> Snapshot:
+    """A sub-assembly as a snapshot of its own, cut from that of its parent."""
+    head = one.assembly
+    original = _find(snapshot.extraction, head.key)
+    mine = tuple(f for f in one.findings if any(place.doc_path == head.doc_path for place in f.where))
+    return Snapshot(
+        path=head.doc_path,
+        label=display_name(head),
+        identity=head.silo_uuid,
+        extraction=Extraction(replace(head, children=()), original.children if original else (), mine),
+    )
+
+
+def _find(extraction: Extraction | None, key: tuple[str, str]) -> BomEntry | None:
+    stack = list(extraction.entries) if extraction is not None else []
+    seen = set()
+    while stack:
+        entry = stack.pop()
+        if entry.key == key:
+            return entry
+        if id(entry) not in seen:
+            seen.add(id(entry))
+            stack.extend(entry.children)
+    return None

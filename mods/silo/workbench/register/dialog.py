@@ -1,0 +1,361 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The Register Components dialog of spec bom-sync §6; it draws :mod:`silo.workbench.register.rows`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from silo.bom.errors import SiloError
+from silo.registration import Registration
+from silo.workbench.gui import widgets
+from silo.workbench.gui.choice_cell import KEY, ChoiceDelegate
+from silo.workbench.gui.qt import QtCore, QtGui, QtWidgets
+from silo.workbench.pane.activity import Tone
+from silo.workbench.register.registering import Offer, Order
+from silo.workbench.register.rows import (
+    NEW,
+    EditedRow,
+    choose,
+    group,
+    number_texts,
+    retype,
+    type_words,
+)
+from silo.workbench.words import counted, plain, tip, translate
+
+# Rows have buttons, and nobody decides on a thousand parts at once; the next ones come after these.
+MOST_ROWS = 400
+
+COMPONENT, NAME, TYPE, CATEGORY, NUMBER, NOTE, BUTTON = range(7)
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What the dialog asks for; all in the GUI thread.
+
+    same
+        the person says that these copied identities are one part.
+    number
+        tell the next number of this category.
+    """
+
+    register: Callable[[Sequence[Order]], None]
+    same: Callable[[Sequence[EditedRow]], None]
+    number: Callable[[str], None]
+    ask_again: Callable[[bool], None]
+
+
+@dataclass(frozen=True)
+class _Look:
+    """How a row is drawn. Only rows that look different are drawn anew: there may be hundreds."""
+
+    texts: tuple[str, ...]
+    keys: tuple[str, ...]
+    tone: Tone
+    checked: bool
+    editable: bool
+    can_choose: bool
+    can_register: bool
+    can_keep: bool
+
+
+class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
+    """Not modal: documents are opened and saved while it is there."""
+
+    def __init__(self, title: str, wishes: Wishes, parent: Any, *, asks: bool) -> None:
+        super().__init__(parent)
+        self._wishes = wishes
+        self._rows: list[EditedRow] = []
+        self._offer = Offer((), {})
+        self._types = type_words()
+        self._categories: dict[str, str] = {}
+        self._drawn: dict[int, _Look] = {}
+        self._filling = False
+        self.setObjectName("SiloRegister")
+        self.setWindowTitle(translate("Silo", "Register Components"))
+        self.setAttribute(QtCore.Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.resize(1080, 480)
+        layout = QtWidgets.QVBoxLayout(self)
+        layout.setSpacing(8)
+        self._title = title
+        self._text = widgets.label(translate("Silo", "Looking for components without a part number…"))
+        layout.addWidget(self._text)
+        self.table = self._make_table()
+        layout.addWidget(self.table, 1)
+        self._problem = widgets.label("", Tone.ERROR)
+        self._problem.hide()
+        layout.addWidget(self._problem)
+        layout.addLayout(self._make_buttons(asks))
+        self._enable()
+
+    # -- made once --------------------------------------------------------------------------------------
+
+    def _make_table(self) -> Any:
+        table = QtWidgets.QTableWidget(0, 7)
+        table.setObjectName("components")
+        table.setHorizontalHeaderLabels(
+            [
+                translate("Silo", "Component"),
+                translate("Silo", "Name"),
+                translate("Silo", "Type"),
+                translate("Silo", "Category"),
+                translate("Silo", "Part number"),
+                translate("Silo", "Remarks"),
+                "",
+            ]
+        )
+        table.verticalHeader().hide()
+        table.setWordWrap(True)
+        table.setSelectionBehavior(QtWidgets.QAbstractItemView.SelectionBehavior.SelectRows)
+        table.setEditTriggers(QtWidgets.QAbstractItemView.EditTrigger.AllEditTriggers)
+        # A view does not own its delegates.
+        self._delegates = {
+            TYPE: ChoiceDelegate(lambda row: self._types, table),
+            CATEGORY: ChoiceDelegate(lambda row: self._categories, table),
+            NUMBER: ChoiceDelegate(lambda row: self._rows[row].choices(), table),
+        }
+        for column, delegate in self._delegates.items():
+            table.setItemDelegateForColumn(column, delegate)
+        table.itemChanged.connect(self._changed)
+        return table
+
+    def _make_buttons(self, asks: bool) -> Any:
+        self.ask_again = QtWidgets.QCheckBox(translate("Silo", "Ask after each commit"))
+        self.ask_again.setChecked(asks)
+        self.ask_again.toggled.connect(lambda on: self._wishes.ask_again(bool(on)))
+        self.register_button = QtWidgets.QPushButton(translate("Silo", "Register Selected"))
+        self.register_button.setObjectName("register")
+        self.register_button.setDefault(True)
+        self.register_button.clicked.connect(lambda _checked=False: self._register_checked())
+        self.skip_button = QtWidgets.QPushButton(translate("Silo", "Skip All"))
+        self.skip_button.setObjectName("skip")
+        self.skip_button.setAutoDefault(False)
+        self.skip_button.clicked.connect(lambda _checked=False: self.close())
+        layout = QtWidgets.QHBoxLayout()
+        layout.addWidget(self.ask_again)
+        layout.addStretch(1)
+        layout.addWidget(self.register_button)
+        layout.addWidget(self.skip_button)
+        return layout
+
+    # -- what is shown ----------------------------------------------------------------------------------
+
+    @property
+    def rows(self) -> Sequence[EditedRow]:
+        """The rows as they stand."""
+        return self._rows
+
+    def fill(self, offer: Offer) -> None:
+        """Show what can be registered."""
+        self._offer = offer
+        self._categories = {
+            code: f"{code} {plain(text, 60)}".strip() for code, text in offer.categories.items()
+        }
+        self._drawn.clear()
+        self._rows = [EditedRow.of(candidate) for candidate in offer.candidates[:MOST_ROWS]]
+        self._filling = True
+        self.table.setRowCount(len(self._rows))
+        for number, row in enumerate(self._rows):
+            self._fill_row(number, row)
+        self._filling = False
+        self._refresh()
+        for column, most in ((COMPONENT, 230), (NAME, 220), (TYPE, 110), (CATEGORY, 220), (NUMBER, 170)):
+            self.table.resizeColumnToContents(column)
+            self.table.setColumnWidth(column, min(self.table.columnWidth(column) + 14, most))
+        mode = QtWidgets.QHeaderView.ResizeMode
+        self.table.horizontalHeader().setSectionResizeMode(NOTE, mode.Stretch)
+        self.table.horizontalHeader().setSectionResizeMode(BUTTON, mode.ResizeToContents)
+        self.table.resizeRowsToContents()
+
+    def _fill_row(self, number: int, row: EditedRow) -> None:
+        for column in range(6):
+            self.table.setItem(number, column, QtWidgets.QTableWidgetItem())
+        entry = row.candidate.entry
+        self.table.item(number, COMPONENT).setToolTip(tip(f"{entry.doc_path} · {entry.object_name}"))
+        button = QtWidgets.QPushButton(translate("Silo", "Register"))
+        button.setAutoDefault(False)
+        button.clicked.connect(lambda _checked=False: self._carry_out([row]))
+        self.table.setCellWidget(number, BUTTON, button)
+
+    def fail(self, error: SiloError) -> None:
+        """The components could not be looked up."""
+        self._text.setText("")
+        self.tell(str(error))
+
+    def tell(self, text: str) -> None:
+        """Show a problem; "" takes it away."""
+        self._problem.setText(plain(text, 500))
+        self._problem.setVisible(bool(text))
+
+    def registered(self, order: Order, result: Registration) -> None:
+        """One component is registered, or could not be."""
+        for row in self._rows:
+            if row.candidate is order.candidate:
+                row.result, row.running = result, False
+                row.checked = row.checked and result.error is not None
+        self._refresh()
+
+    def stopped(self) -> None:
+        """Nothing is being registered any more."""
+        for row in self._rows:
+            row.running = False
+        self._refresh()
+
+    def set_number(self, category: str, number: str) -> None:
+        """The next number of a category is known."""
+        self._offer = Offer(
+            self._offer.candidates, self._offer.categories, {**self._offer.numbers, category: number}
+        )
+        self._refresh()
+
+    def _refresh(self) -> None:
+        self._filling = True
+        texts = number_texts(self._rows, self._offer.numbers)
+        for number, row in enumerate(self._rows):
+            self._refresh_row(number, row, texts[number])
+        self._filling = False
+        self._text.setText(self._heading())
+        self._enable()
+
+    def _refresh_row(self, number: int, row: EditedRow, number_text: str) -> None:
+        look = self._look(row, number_text)
+        if self._drawn.get(number) != look:
+            self._drawn[number] = look
+            self._draw_row(number, look)
+
+    def _look(self, row: EditedRow, number_text: str) -> _Look:
+        note, tone = row.note()
+        category = self._categories.get(row.category, row.category)
+        kind = self._types.get(row.item_type, row.item_type)
+        return _Look(
+            texts=(row.component(), row.name, kind, category, number_text, note),
+            keys=(row.item_type, row.category, row.number),
+            tone=tone,
+            checked=row.checked,
+            editable=row.editable,
+            can_choose=row.can_choose,
+            can_register=row.can_register,
+            can_keep=row.can_keep,
+        )
+
+    def _draw_row(self, number: int, look: _Look) -> None:
+        keys = dict(zip((TYPE, CATEGORY, NUMBER), look.keys, strict=True))
+        for column, text in enumerate(look.texts):
+            item = self.table.item(number, column)
+            item.setText(text)
+            item.setData(KEY, keys.get(column))
+            item.setFlags(_flags(look, column))
+        state = QtCore.Qt.CheckState.Checked if look.checked else QtCore.Qt.CheckState.Unchecked
+        self.table.item(number, COMPONENT).setCheckState(state)
+        remark = self.table.item(number, NOTE)
+        remark.setToolTip(tip(look.texts[NOTE]))
+        shade = widgets.colour(look.tone, self.table)
+        remark.setForeground(QtGui.QBrush(QtGui.QColor(shade)) if shade else QtGui.QBrush())
+        button = self.table.cellWidget(number, BUTTON)
+        button.setText(translate("Silo", "Keep") if look.can_keep else translate("Silo", "Register"))
+        button.setEnabled(look.can_register or look.can_keep)
+
+    def _heading(self) -> str:
+        more = len(self._offer.candidates) - len(self._rows)
+        if not self._rows:
+            text = translate("Silo", "All components of {name} have their Silo part number.")
+            return text.replace("{name}", plain(self._title, 80))
+        left = [row for row in self._rows if not row.finished]
+        if not left:
+            return translate("Silo", "All of these have their part number now.")
+        copied = sum(1 for row in left if row.candidate.same_as)
+        told = [self._unregistered(len(left) - copied)] if len(left) > copied else []
+        if copied:
+            told.append(
+                translate(
+                    "Silo",
+                    "Where files carry one identity, choose in the column Part number: the same part, or a "
+                    "new one?",
+                )
+            )
+        if more > 0:
+            told.append(translate("Silo", "({n} more after these)").replace("{n}", str(more)))
+        return "\n".join(told)
+
+    def _unregistered(self, left: int) -> str:
+        one = translate(
+            "Silo",
+            "The following component has no Silo part number and will be excluded from the BOM until "
+            "registered:",
+        )
+        many = translate(
+            "Silo",
+            "The following components have no Silo part number and will be excluded from the BOM until "
+            "registered:",
+        )
+        return counted(left, one, many)
+
+    def _enable(self) -> None:
+        chosen = any(row.checked and (row.can_register or row.can_keep) for row in self._rows)
+        self.register_button.setEnabled(chosen)
+        done = bool(self._rows) and all(row.finished for row in self._rows)
+        text = translate("Silo", "Close") if done or not self._rows else translate("Silo", "Skip All")
+        self.skip_button.setText(text)
+
+    # -- what the person does ---------------------------------------------------------------------------
+
+    def _changed(self, item: Any) -> None:
+        if self._filling:
+            return
+        row, column = self._rows[item.row()], item.column()
+        chosen = item.data(QtCore.Qt.ItemDataRole.UserRole)
+        if column == COMPONENT:
+            row.checked = item.checkState() == QtCore.Qt.CheckState.Checked
+        elif column == NAME:
+            row.name = str(item.text())
+        elif column == TYPE and chosen:
+            retype(row, chosen, self._offer.categories)
+            self._need_number(row.category)
+        elif column == NUMBER and chosen:
+            choose(self._rows, row, chosen)
+        elif column == CATEGORY and chosen:
+            row.category = chosen
+            self._need_number(chosen)
+        self._refresh()
+
+    def _need_number(self, category: str) -> None:
+        if category not in self._offer.numbers:
+            self._wishes.number(category)
+
+    def _register_checked(self) -> None:
+        self._carry_out([row for row in self._rows if row.checked])
+
+    def _carry_out(self, rows: Sequence[EditedRow]) -> None:
+        # Keeping is said of all files of an identity together, or it is said of none.
+        kept = {id(other): other for row in rows if row.can_keep for other in group(self._rows, row)}
+        if same := [row for row in kept.values() if row.can_keep]:
+            self._wishes.same(same)
+            for row in same:
+                row.keep()
+            self._refresh()
+        self._register([row for row in rows if row.can_register])
+
+    def _register(self, rows: Sequence[EditedRow]) -> None:
+        ready = [row for row in rows if row.can_register]
+        if not ready:
+            return
+        self.tell("")
+        for row in ready:
+            row.running, row.result = True, None
+            if row.number != NEW and row.order().existing is None:
+                row.number = NEW
+        self._refresh()
+        self._wishes.register([row.order() for row in ready])
+
+
+def _flags(row: _Look, column: int) -> Any:
+    """What a person can do with a cell."""
+    flag = QtCore.Qt.ItemFlag
+    flags = flag.ItemIsEnabled | flag.ItemIsSelectable
+    if (row.editable and column in (NAME, TYPE, CATEGORY)) or (row.can_choose and column == NUMBER):
+        flags |= flag.ItemIsEditable
+    if column == COMPONENT and (row.can_register or row.can_keep):
+        flags |= flag.ItemIsUserCheckable
+    return flags

@@ -1,0 +1,362 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What the Register Parts dialog shows and does, without the dialog (spec bom-sync §2 and §6).
+
+A :class:`Candidate` is one component without a part number. Questions to the server run in the worker; the
+identity is written into the document in the GUI thread, through a function that waits for it there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from typing import Any
+
+from silo.bom.errors import NotFoundError, SiloError, UnreachableError
+from silo.bom.findings import FindingCode
+from silo.bom.identity import walk_entries
+from silo.bom.model import BomEntry, Extraction
+from silo.bom.naming import Proposal, clean_name, crowded_files, propose
+from silo.registration import Journal, Registration, RegistrationApi, component_key, register
+from silo.workbench.commit.item_file import other_name
+from silo.workbench.register.on_disk import changed_since, sha256_or_nothing
+from silo.workbench.session.jobs import Control
+from silo.workbench.words import translate
+
+# Looking for look-alikes costs a request each; beyond this many nobody reads them.
+MOST_LOOKED_UP = 100
+_AT_ONCE = 6
+
+
+class State(StrEnum):
+    """How a component's file stands."""
+
+    READY = "ready"
+    EDITED = "edited"  # has unsaved edits, which are saved along with the identity
+    ELSEWHERE = "elsewhere"  # another FreeCAD has it open, and may overwrite what is saved here
+    READ_ONLY = "read-only"
+    PARTIAL = "partial"  # unsaved edits in a partly loaded document: FreeCAD cannot save them
+    NEWER = "newer"  # somebody else saved or registered the file since it was opened here
+    MISSING = "missing"
+    UNNAMED = "unnamed"  # never saved
+    LOST = "lost"  # saving it in this FreeCAD would destroy its assemblies
+
+    @property
+    def usable(self) -> bool:
+        """True where the identity can be written."""
+        return self in (State.READY, State.EDITED, State.ELSEWHERE)
+
+
+def state_words() -> dict[State, str]:
+    """The states for people."""
+    return {
+        State.READY: "",
+        State.EDITED: translate("Silo", "its unsaved edits are saved too"),
+        State.ELSEWHERE: translate(
+            "Silo", "open in another FreeCAD: close it there first, or saving there undoes this"
+        ),
+        State.READ_ONLY: translate("Silo", "the file is read-only"),
+        State.PARTIAL: translate("Silo", "has edits, but is loaded only in part: open the file itself first"),
+        State.NEWER: translate("Silo", "has changed on disk since you opened it: open it again first"),
+        State.MISSING: translate("Silo", "the file is missing"),
+        State.UNNAMED: translate("Silo", "has no file yet: save it first"),
+        State.LOST: translate("Silo", "made by a newer FreeCAD: cannot be saved here"),
+    }
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What the GUI thread saw of a component's file. ``saved_at`` is the open document's own time stamp."""
+
+    state: State
+    saved_at: str = ""
+
+
+@dataclass(frozen=True)
+class Similar:
+    """An item on the server that this component may be already. A suggestion only."""
+
+    part_number: str
+    item_id: str
+    name: str
+    same_file: bool = False
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One row of the dialog.
+
+    same_as
+        part number whose identity the file carries although another file has it too ("copied identity").
+    twins
+        labels of other rows whose files have the very same content.
+    """
+
+    proposal: Proposal
+    state: State
+    shares_file: bool = False
+    similar: tuple[Similar, ...] = ()
+    twins: tuple[str, ...] = ()
+    same_as: str = ""
+    sha256: str = field(default="", repr=False)
+
+    @property
+    def entry(self) -> BomEntry:
+        return self.proposal.entry
+
+    @property
+    def wanted(self) -> bool:
+        """Checked to begin with? Not where a person has to look first."""
+        fine = self.state.usable and self.state is not State.ELSEWHERE
+        return fine and not self.same_as and not any(s.same_file for s in self.similar)
+
+
+@dataclass(frozen=True)
+class Offer:
+    """All rows, and what there is to choose from.
+
+    numbers
+        category → the number that its next item would get.
+    """
+
+    candidates: tuple[Candidate, ...]
+    categories: Mapping[str, str]
+    numbers: Mapping[str, str] = field(default_factory=dict)
+
+
+# --- which components, and what of them -------------------------------------------------------------------
+
+
+def unregistered(extraction: Extraction, resolved: Any) -> tuple[BomEntry, ...]:
+    """The components without an item, parts first, the assembly itself last."""
+    wanted = list(resolved.unresolved)
+    if resolved.assembly.part_number is None:
+        wanted.append(extraction.assembly)
+    return tuple(sorted(wanted, key=lambda entry: (entry.is_assembly, -entry.level)))
+
+
+def copied(extraction: Extraction) -> tuple[BomEntry, ...]:
+    """The components that carry an identity which another file carries too."""
+    places = {
+        (place.doc_path, place.obj)
+        for finding in extraction.findings
+        if finding.code is FindingCode.COPIED_IDENTITY
+        for place in finding.where
+    }
+    return tuple(e for e in walk_entries((extraction.assembly, *extraction.entries)) if e.key in places)
+
+
+def offer(
+    extraction: Extraction,
+    seen: Mapping[str, Seen],
+    api: Any,
+    schema: str,
+    control: Control,
+    begun: Mapping[str, str] | None = None,
+) -> Offer:
+    """What the dialog shows. Worker.
+
+    begun
+        registrations that were interrupted (:meth:`silo.registration.Journal.pending`): the item that such a
+        one made is no look-alike of the component, it is its own.
+    """
+    from silo.bom_sync import resolve
+
+    resolved = resolve(extraction, api)
+    numbers = _numbers_by_identity(resolved)
+    categories = api.categories(schema)
+    crowded = crowded_files((extraction.assembly, *extraction.entries))
+    candidates = [
+        _candidate(entry, categories, crowded, seen, same_as="")
+        for entry in unregistered(extraction, resolved)
+    ]
+    candidates += [
+        _candidate(entry, categories, crowded, seen, same_as=numbers[(entry.silo_uuid or "").lower()])
+        for entry in _perhaps_copies(extraction, numbers, api)
+        if (entry.silo_uuid or "").lower() in numbers
+    ]
+    control.check()
+    looked = _with_look_alikes(candidates, api, control, begun or {})
+    return Offer(_with_twins(looked), categories, _next_numbers(looked, api, schema))
+
+
+def _perhaps_copies(extraction: Extraction, numbers: Mapping[str, str], api: Any) -> tuple[BomEntry, ...]:
+    """The copied ones, and the document itself where its item's file has another name."""
+    found, top = copied(extraction), extraction.assembly
+    number = numbers.get((top.silo_uuid or "").lower())
+    if number is None or any(entry.key == top.key for entry in found):
+        return found
+    try:
+        return (*found, top) if other_name(top.doc_path, api.revisions(number)) else found
+    except NotFoundError:
+        return found
+
+
+def _numbers_by_identity(resolved: Any) -> dict[str, str]:
+    known = walk_entries((resolved.assembly, *resolved.entries))
+    return {e.silo_uuid.lower(): e.part_number for e in known if e.silo_uuid and e.part_number}
+
+
+def _candidate(
+    entry: BomEntry,
+    categories: Mapping[str, str],
+    crowded: frozenset[str],
+    seen: Mapping[str, Seen],
+    same_as: str,
+) -> Candidate:
+    shares = entry.doc_path in crowded
+    look = seen.get(entry.doc_path, Seen(State.MISSING))
+    state, digest = look.state, ""
+    if state.usable:
+        if look.saved_at and changed_since(entry, look.saved_at):
+            state = State.NEWER
+        digest = sha256_or_nothing(entry.doc_path)
+    proposal = propose(entry, categories, shares_file=shares)
+    return Candidate(proposal, state, shares, same_as=same_as, sha256=digest)
+
+
+def _with_look_alikes(
+    candidates: Sequence[Candidate], api: Any, control: Control, begun: Mapping[str, str]
+) -> list[Candidate]:
+    first, rest = candidates[:MOST_LOOKED_UP], candidates[MOST_LOOKED_UP:]
+
+    def one(candidate: Candidate) -> Candidate:
+        if control.cancelled.is_set():
+            return candidate
+        own = begun.get(component_key(candidate.entry), "")
+        return replace(candidate, similar=_look_alikes(candidate, api, own))
+
+    if not first:
+        return list(rest)
+    with ThreadPoolExecutor(_AT_ONCE, "silo-look-alikes") as pool:
+        return [*pool.map(one, first), *rest]
+
+
+def _look_alikes(candidate: Candidate, api: Any, own: str) -> tuple[Similar, ...]:
+    name = candidate.proposal.name
+    try:
+        named = api.search_items(name, limit=8)
+        # A server that does not search by content finds nothing; what has the name is compared all the same.
+        with_file = api.search_items(candidate.sha256, limit=4) if candidate.sha256 else []
+        told = []
+        for item in {item.id: item for item in (*with_file, *named)}.values():
+            same_name = clean_name(item.name).casefold() == name.casefold()
+            same_file = bool(candidate.sha256) and candidate.sha256 in _checksums(item, api)
+            if (same_name or same_file) and item.part_number != candidate.same_as and item.id != own:
+                told.append(Similar(item.part_number, item.id, item.name, same_file))
+    except SiloError:
+        # Suggestions are a courtesy; registering must not fail for want of them.
+        return ()
+    return tuple(sorted(told, key=lambda similar: not similar.same_file))
+
+
+def _checksums(item: Any, api: Any) -> set[str]:
+    known = {str(item.properties.get("file_sha256", ""))}
+    known.update((r.file_checksum or "").removeprefix("sha256:") for r in api.revisions(item.part_number))
+    return known - {""}
+
+
+def _with_twins(candidates: Iterable[Candidate]) -> tuple[Candidate, ...]:
+    listed = list(candidates)
+    by_content: dict[str, list[Candidate]] = {}
+    for candidate in listed:
+        if candidate.sha256:
+            by_content.setdefault(candidate.sha256, []).append(candidate)
+    told = []
+    for candidate in listed:
+        others = [
+            c for c in by_content.get(candidate.sha256, ()) if c.entry.doc_path != candidate.entry.doc_path
+        ]
+        told.append(replace(candidate, twins=tuple(c.proposal.name for c in others)))
+    return tuple(told)
+
+
+def _next_numbers(candidates: Iterable[Candidate], api: Any, schema: str) -> dict[str, str]:
+    numbers = {}
+    for category in sorted({c.proposal.category for c in candidates if c.proposal.category}):
+        numbers[category] = next_number(api, schema, category)
+    return numbers
+
+
+def next_number(api: Any, schema: str, category: str) -> str:
+    """The number that the next item of a category would get; "" where the server does not say."""
+    try:
+        return str(api.generate_part_number(schema, category))
+    except SiloError:
+        return ""
+
+
+# --- registering -----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Order:
+    """A row that is to be registered, as the person left it.
+
+    existing
+        item to join instead of making a new one.
+    """
+
+    candidate: Candidate
+    name: str
+    item_type: str
+    category: str
+    existing: Similar | None = None
+
+    @property
+    def proposal(self) -> Proposal:
+        return replace(
+            self.candidate.proposal, name=self.name, item_type=self.item_type, category=self.category
+        )
+
+
+# Writes an identity into the component's document and saves it: (candidate, identity).
+Write = Callable[[Candidate, str], None]
+
+
+def carry_out(
+    orders: Sequence[Order],
+    api: RegistrationApi,
+    journal: Journal,
+    write: Write,
+    *,
+    schema: str,
+    control: Control,
+    done: Callable[[Order, Registration], None],
+) -> None:
+    """Register one after another; ``done`` is told of each, a failure does not stop the rest. Worker.
+
+    Only where nobody answers at all, the rest is not tried: each would wait for its own time-out.
+    """
+    gone: SiloError | None = None
+    for number, order in enumerate(orders):
+        control.check()
+        control.progress(order.name, number / len(orders))
+        if gone is not None:
+            done(order, Registration(order.proposal, error=gone))
+            continue
+        result = _carry_out(order, api, journal, write, schema)
+        gone = result.error if isinstance(result.error, UnreachableError) else None
+        done(order, result)
+
+
+def _carry_out(
+    order: Order, api: RegistrationApi, journal: Journal, write: Write, schema: str
+) -> Registration:
+    if order.existing is not None:
+        try:
+            write(order.candidate, order.existing.item_id)
+        except SiloError as error:
+            return Registration(order.proposal, error=error)
+        return Registration(
+            order.proposal, part_number=order.existing.part_number, item_id=order.existing.item_id
+        )
+    return register(
+        order.proposal,
+        api,
+        journal,
+        lambda _entry, identity: write(order.candidate, identity),
+        schema=schema,
+        properties={"file_sha256": order.candidate.sha256} if order.candidate.sha256 else None,
+    )

@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The rows of the Register Parts dialog while a person edits them. Pure; the dialog only draws them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from silo.bom.naming import proposed_category
+from silo.registration import Registration
+from silo.workbench.pane.activity import Tone
+from silo.workbench.register.registering import Candidate, Order, Similar, State, state_words
+from silo.workbench.words import plain, translate
+
+TYPES = ("part", "assembly", "consumable", "tool")
+
+NEW = "new"
+SAME = "same"
+ASK = "ask"
+
+
+def type_words() -> dict[str, str]:
+    """Item types for people."""
+    return {
+        "part": translate("Silo", "Part"),
+        "assembly": translate("Silo", "Assembly"),
+        "consumable": translate("Silo", "Consumable"),
+        "tool": translate("Silo", "Tool"),
+    }
+
+
+@dataclass
+class EditedRow:
+    """A component with what the person chose for it.
+
+    number
+        NEW for a new item, else the part number of an item to join. A copied identity begins with ASK, until
+        the person says NEW or SAME (keep it).
+    result
+        what became of it; None while it is not registered.
+    """
+
+    candidate: Candidate
+    name: str
+    item_type: str
+    category: str
+    number: str = NEW
+    checked: bool = True
+    running: bool = False
+    result: Registration | None = None
+
+    @classmethod
+    def of(cls, candidate: Candidate) -> EditedRow:
+        """A row as it is offered."""
+        proposal = candidate.proposal
+        return cls(
+            candidate,
+            name=proposal.name,
+            item_type=proposal.item_type,
+            category=proposal.category,
+            number=ASK if candidate.same_as else NEW,
+            checked=candidate.wanted,
+        )
+
+    @property
+    def finished(self) -> bool:
+        """True where it has its number."""
+        return self.result is not None and self.result.error is None
+
+    @property
+    def editable(self) -> bool:
+        """True while something can still be chosen."""
+        return self.candidate.state.usable and not self.finished and not self.running
+
+    @property
+    def can_choose(self) -> bool:
+        """True while its number can be chosen; a copied identity can be kept without writing to the file."""
+        return self.editable or (bool(self.candidate.same_as) and not self.finished and not self.running)
+
+    @property
+    def can_register(self) -> bool:
+        """True where pressing Register gives it a number."""
+        return self.editable and bool(self.name.strip()) and self.number not in (SAME, ASK)
+
+    @property
+    def can_keep(self) -> bool:
+        """True where pressing the button keeps the identity that it has."""
+        return self.can_choose and self.number == SAME
+
+    def keep(self) -> None:
+        """It stays what it is."""
+        self.result = Registration(self.candidate.proposal, part_number=self.candidate.same_as)
+        self.checked = False
+
+    def order(self) -> Order:
+        """The row as an order for the worker."""
+        existing = next((s for s in self.candidate.similar if s.part_number == self.number), None)
+        return Order(self.candidate, self.name.strip(), self.item_type, self.category, existing)
+
+    def component(self) -> str:
+        """Which component this is."""
+        return self._component
+
+    @cached_property
+    def _component(self) -> str:
+        entry = self.candidate.entry
+        file = os.path.basename(entry.doc_path)
+        return plain(f"{file} · {entry.label}" if self.candidate.shares_file else file, 80)
+
+    def number_text(self, numbers: Mapping[str, str], taken: int) -> str:
+        """The number that it has, or would get; ``taken`` rows before it want one of the same category."""
+        if self.finished and self.result is not None:
+            return self.result.part_number or ""
+        if self.number == SAME:
+            text = translate("Silo", "{number} (kept)")
+            return text.replace("{number}", self.candidate.same_as)
+        if self.number == ASK:
+            return translate("Silo", "same or new part?")
+        if self.number != NEW:
+            return self.number
+        if not self.candidate.state.usable:
+            return ""
+        following = numbers.get(self.category, "")
+        if not following:
+            return translate("Silo", "new")
+        text = translate("Silo", "{number} or later") if taken else translate("Silo", "{number} (new)")
+        return text.replace("{number}", following)
+
+    def choices(self) -> dict[str, str]:
+        """What can be chosen as its number."""
+        found = {}
+        if self.candidate.same_as:
+            same = translate("Silo", "same part: keep {number}")
+            found[SAME] = same.replace("{number}", self.candidate.same_as)
+        if not self.candidate.state.usable:
+            return found
+        new = translate("Silo", "new part: a new number")
+        found[NEW] = new if self.candidate.same_as else translate("Silo", "a new number")
+        for similar in self.candidate.similar:
+            found[similar.part_number] = f"{similar.part_number} {plain(similar.name, 60)}"
+        return found
+
+    def note(self) -> tuple[str, Tone]:
+        """The last column: what happened, what is in the way, or what to look at."""
+        if self.result is not None and self.result.error is not None:
+            return plain(str(self.result.error), 300), Tone.ERROR
+        if self.finished:
+            kept, registered = translate("Silo", "stays as it is"), translate("Silo", "registered")
+            return kept if self.number == SAME else registered, Tone.GOOD
+        if self.running:
+            return translate("Silo", "registering…"), Tone.QUIET
+        if not self.candidate.state.usable and not self.candidate.same_as:
+            return state_words()[self.candidate.state], Tone.WARNING
+        told = [*self._suspicions(), state_words()[self.candidate.state]]
+        text = "; ".join(filter(None, told))
+        doubtful = bool(self._suspicions()) or self.candidate.state is State.ELSEWHERE
+        return text, Tone.WARNING if doubtful else Tone.QUIET
+
+    def _suspicions(self) -> list[str]:
+        told = []
+        if self.candidate.same_as:
+            text = translate("Silo", "carries the identity of {number}, as another file does")
+            told.append(text.replace("{number}", self.candidate.same_as))
+        told += [_similar_words(similar) for similar in self.candidate.similar[:2]]
+        if self.candidate.twins:
+            text = translate("Silo", "the same content as {name}")
+            told.append(text.replace("{name}", plain(self.candidate.twins[0], 40)))
+        return told
+
+
+def _similar_words(similar: Similar) -> str:
+    if similar.same_file:
+        text = translate("Silo", "Silo has this very file as {number}")
+    else:
+        text = translate("Silo", "Silo has {number} with the same name")
+    return text.replace("{number}", similar.part_number)
+
+
+def group(rows: Sequence[EditedRow], row: EditedRow) -> list[EditedRow]:
+    """The rows that carry the same identity as this one, itself among them."""
+    if not row.candidate.same_as:
+        return [row]
+    return [other for other in rows if other.candidate.same_as == row.candidate.same_as]
+
+
+def choose(rows: Sequence[EditedRow], row: EditedRow, number: str) -> None:
+    """Take over what the person chose as a row's number, and what follows from it for its group."""
+    row.number, row.checked = number, True
+    asked = [other for other in group(rows, row) if other.number == ASK and not other.finished]
+    last = len(asked) == 1 and all(
+        other.number != SAME for other in group(rows, row) if other is not asked[0]
+    )
+    # "The same part" is said of all of them; once all others are new parts, the last one is the part itself.
+    for other in asked if number == SAME or last else ():
+        other.number, other.checked = SAME, True
+
+
+def retype(row: EditedRow, item_type: str, categories: Mapping[str, str]) -> None:
+    """Take over the chosen type; the category follows where it is still the one that was proposed.
+
+    categories
+        code → description, as the schema has them.
+    """
+
+    def proposed(kind: str) -> str:
+        entry = replace(row.candidate.entry, is_assembly=kind == "assembly")
+        return proposed_category(entry, row.name, categories)
+
+    was = row.item_type
+    row.item_type = item_type
+    if row.category in (row.candidate.proposal.category, proposed(was)):
+        row.category = proposed(item_type)
+
+
+def number_texts(rows: list[EditedRow], numbers: Mapping[str, str]) -> list[str]:
+    """The number column of all rows."""
+    taken: dict[str, int] = {}
+    texts = []
+    for row in rows:
+        texts.append(row.number_text(numbers, taken.get(row.category, 0)))
+        if row.number == NEW and row.checked and not row.finished:
+            taken[row.category] = taken.get(row.category, 0) + 1
+    return texts

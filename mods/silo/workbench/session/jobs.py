@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""One worker thread with a queue: work that must not hold up the GUI, done in order.
+
+A job is a function and what to do with its result. The function runs in the worker and must not touch
+documents or widgets; ``done`` and ``failed`` are handed to ``deliver``, which in FreeCAD runs them in the GUI
+thread (:class:`silo.workbench.gui.qt.Relay`), and in the tests wherever the test likes.
+"""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from silo.bom.errors import CancelledError, SiloError
+from silo.workbench.session.gui_thread_gc import collection_off
+
+Deliver = Callable[[Callable[[], None]], None]
+
+
+@dataclass(frozen=True)
+class Busy:
+    """What a worker is doing, for a progress bar. ``fraction`` is None where nobody can say."""
+
+    title: str
+    detail: str = ""
+    fraction: float | None = None
+    waiting: int = 0
+
+
+class Control:
+    """A running job's way to the outside: tell progress, and learn that it should stop."""
+
+    def __init__(self, tell: Callable[[str, float | None], None]) -> None:
+        self.cancelled = threading.Event()
+        self._tell = tell
+
+    def progress(self, detail: str = "", fraction: float | None = None) -> None:
+        """Say how far the job is."""
+        self._tell(detail, fraction)
+
+    def check(self) -> None:
+        """Stop here, by :class:`CancelledError`, where somebody asked for it."""
+        if self.cancelled.is_set():
+            raise CancelledError("stopped")
+
+
+@dataclass(frozen=True)
+class Job:
+    """Work for the worker; ``done`` gets what ``run`` returned, ``failed`` the error that ended it."""
+
+    title: str
+    run: Callable[[Control], Any]
+    done: Callable[[Any], None] = lambda _result: None
+    failed: Callable[[SiloError], None] = lambda _error: None
+    # A job that asks for something which another one, still waiting, will bring anyway is not queued twice.
+    same_as: str = ""
+
+
+@dataclass(eq=False)
+class _Queued:
+    job: Job
+    control: Control = field(init=False)
+
+
+class Worker:
+    """A thread that does jobs one after another.
+
+    deliver
+        runs a function where the results are wanted.
+    on_busy
+        told (through ``deliver``) whenever there is something new to show; None when idle.
+    on_bug
+        told of exceptions that are no :class:`SiloError`; the job then ends with a plain sentence.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        deliver: Deliver,
+        *,
+        on_busy: Callable[[Busy | None], None] = lambda _busy: None,
+        on_bug: Callable[[BaseException], None] = lambda _error: None,
+    ) -> None:
+        self._name = name
+        self._deliver = deliver
+        self._on_busy = on_busy
+        self._on_bug = on_bug
+        self._queue: queue.Queue[_Queued | None] = queue.Queue()
+        self._lock = threading.Lock()
+        self._thread: threading.Thread | None = None
+        self._current: _Queued | None = None
+        self._waiting: list[_Queued] = []
+        self._closed = False
+
+    def submit(self, job: Job) -> bool:
+        """Queue a job; False where an equal one (``same_as``) waits already, or the worker is closed."""
+        with self._lock:
+            twice = job.same_as and any(q.job.same_as == job.same_as for q in self._waiting)
+            if twice or self._closed:
+                return False
+            queued = _Queued(job)
+            queued.control = Control(lambda detail, fraction: self._tell(queued, detail, fraction))
+            self._waiting.append(queued)
+            self._start()
+        self._queue.put(queued)
+        return True
+
+    def cancel(self) -> None:
+        """Ask the running job to stop. Jobs that wait are kept."""
+        with self._lock:
+            if self._current is not None:
+                self._current.control.cancelled.set()
+
+    def close(self, timeout: float = 1.0) -> bool:
+        """Ask the running job to end, drop the waiting ones. True where the thread has ended."""
+        with self._lock:
+            self._closed = True
+            self._waiting.clear()
+            if self._current is not None:
+                self._current.control.cancelled.set()
+            thread = self._thread
+        self._queue.put(None)
+        if thread is not None:
+            thread.join(timeout)
+        return thread is None or not thread.is_alive()
+
+    @property
+    def idle(self) -> bool:
+        """True where nothing runs and nothing waits."""
+        with self._lock:
+            return self._current is None and not self._waiting
+
+    def _start(self) -> None:
+        if self._thread is None:
+            # A daemon: a server that does not answer must not keep FreeCAD from closing.
+            self._thread = threading.Thread(target=self._work, name=self._name, daemon=True)
+            self._thread.start()
+
+    def _work(self) -> None:
+        while (queued := self._queue.get()) is not None:
+            with self._lock:
+                if self._closed:
+                    return
+                self._waiting.remove(queued)
+                self._current = queued
+            self._tell(queued, "", None)
+            with collection_off():
+                end = self._finish(queued)
+            with self._lock:
+                self._current = None
+                left = len(self._waiting)
+            if end is not None:
+                self._deliver(end)
+            if not left:
+                self._deliver(lambda: self._on_busy(None))
+
+    def _finish(self, queued: _Queued) -> Callable[[], None] | None:
+        job = queued.job
+        try:
+            result = job.run(queued.control)
+        except SiloError as error:
+            failure = error
+        except Exception as error:  # noqa: BLE001  # a bug in one job must not end the thread for all others
+            self._on_bug(error)
+            failure = SiloError(f"{job.title}: unexpected problem ({type(error).__name__}: {error})")
+        else:
+            return lambda: job.done(result)
+        return lambda: job.failed(failure)
+
+    def _tell(self, queued: _Queued, detail: str, fraction: float | None) -> None:
+        busy = Busy(queued.job.title, detail, fraction, len(self._waiting))
+        self._deliver(lambda: self._on_busy(busy))

@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The worker's side of a session: the client, the live connection, and sending. Imported in a worker only."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from silo.api.client import SiloClient
+from silo.api.config import resolve_server
+from silo.api.events import ConnectionState, EventListener, ServerEvent
+from silo.api.outbox import Outbox
+from silo.bom.errors import ConfigError
+from silo.folders import data_folder
+from silo.workbench.pane import entries
+from silo.workbench.pane.activity import Entry
+from silo.workbench.session.gui_thread_gc import collection_off
+from silo.workbench.session.sending import Sending, Sent
+from silo.workbench.session.spool import Spool
+from silo.workbench.settings.server import Known, Server, TokenStore, choose_server
+from silo.workbench.words import translate
+
+
+class Online:
+    """Talks to the server that the settings name.
+
+    entry, sent, state
+        told of a box to show, of a commit that arrived (with lines for the report view), and of the
+        connection (kind, reason); from any thread.
+    make_client
+        makes the client of a server; :class:`SiloClient` unless told otherwise.
+    """
+
+    def __init__(
+        self,
+        spool: Spool,
+        folder: Path | None,
+        *,
+        entry: Callable[[Entry], None],
+        sent: Callable[[Sent, tuple[str, ...]], None],
+        state: Callable[[str, str], None],
+        make_client: Callable[[Server], Any] | None = None,
+    ) -> None:
+        self._make_client = make_client or _client
+        folder = folder or data_folder()
+        self._entry, self._sent, self._state = entry, sent, state
+        self.sending = Sending(spool, Outbox(folder / "outbox.sqlite3"), tell=self._tell)
+        self._last_ids = LastIds(folder / "last-events.json")
+        self._client: SiloClient | None = None
+        self._server = Server()
+        self._listener: EventListener | None = None
+
+    @property
+    def client(self) -> SiloClient:
+        """The client; :class:`ConfigError` where no server is configured."""
+        if self._client is None:
+            raise ConfigError(
+                translate("Silo", "No Silo server is set up yet. Enter its address in the Silo preferences.")
+            )
+        return self._client
+
+    def connect(self, known: Known, store: TokenStore, *, live: bool) -> Server:
+        """Use the server that the settings name; begin to listen to it where ``live``."""
+        self._use(choose_server(known, store, file_server=file_server()))
+        self._listen(live=live)
+        return self._server
+
+    def need_client(self, known: Known, store: TokenStore) -> None:
+        """Have a client; :class:`ConfigError` where no server is configured."""
+        if self._client is None:
+            self._use(choose_server(known, store, file_server=file_server()))
+        _ = self.client
+
+    def retry_now(self) -> None:
+        """Try to connect again at once."""
+        if self._listener is not None:
+            self._listener.retry_now()
+
+    def close(self) -> None:
+        """End the connection."""
+        self._stop_listening()
+        if self._client is not None:
+            self._client.close()
+
+    def _use(self, server: Server) -> None:
+        if server == self._server and self._client is not None:
+            return
+        self._stop_listening()
+        if self._client is not None:
+            self._client.close()
+        self._client = (
+            SiloClient(server.url, server.token or None, verify=server.verify) if server.url else None
+        )
+        self._server = server
+
+    def _listen(self, *, live: bool) -> None:
+        self._stop_listening()
+        if self._client is None or not live:
+            self._state("stopped", "")
+            return
+        url = self._client.base_url
+        self._listener = EventListener(
+            self._client,
+            on_event=lambda event: self._heard(event, url),
+            on_state=self._heard_state,
+            last_event_id=self._last_ids.get(url),
+            around=collection_off,
+        )
+        self._listener.start()
+
+    def _stop_listening(self) -> None:
+        if self._listener is not None:
+            self._listener.stop(timeout=1.0)
+            self._listener = None
+
+    def _heard(self, event: ServerEvent, url: str) -> None:
+        if event.id is not None:
+            self._last_ids.set(url, event.id)
+        entry = entries.of_event(event, self.client.web_url)
+        if entry is not None:
+            self._entry(entry)
+
+    def _heard_state(self, state: ConnectionState) -> None:
+        self._state(state.kind.value, state.message)
+
+    def _tell(self, sent: Sent) -> None:
+        self._entry(entries.of_sent(sent, self.client.web_url))
+        self._sent(sent, entries.console_lines(sent))
+
+
+def _client(server: Server) -> SiloClient:
+    return SiloClient(server.url, server.token or None, verify=server.verify)
+
+
+def file_server() -> object | None:
+    """The server in the configuration file of the command line; None where there is none."""
+    # The environment is looked at before; here it is only asked where the file is.
+    env = {name: value for name, value in os.environ.items() if not name.startswith("SILO_")}
+    try:
+        return resolve_server(env=env)
+    except ConfigError:
+        return None
+
+
+class LastIds:
+    """The last event seen of each server, so that what happened while FreeCAD was closed is shown too."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._known = self._read()
+
+    def get(self, url: str) -> str | None:
+        """Where to go on; None for a server that was never listened to."""
+        return self._known.get(url)
+
+    def set(self, url: str, event_id: str) -> None:
+        """Remember an event. A lost write costs a repeated event, so nothing is synced here."""
+        self._known[url] = event_id
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            part = self._path.with_suffix(".new")
+            part.write_text(json.dumps(self._known), encoding="utf-8")
+            part.replace(self._path)
+        except OSError:
+            return
+
+    def _read(self) -> dict[str, str]:
+        try:
+            data = json.loads(self._path.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return {}
+        return {str(k): str(v) for k, v in data.items()} if isinstance(data, dict) else {}

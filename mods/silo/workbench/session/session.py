@@ -1,0 +1,322 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What goes on between FreeCAD and the server while FreeCAD runs: workers, connection, and what is shown.
+
+Methods are called in the GUI thread and return at once. Work is done by two workers, so that a commit is on
+disk at once even while the network hangs: one for the disk, one for the server. Results come back through
+``deliver``. No widgets here, and no FreeCAD.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from silo.bom.errors import ConfigError, SiloError
+from silo.workbench.pane.activity import Activity, Entry
+from silo.workbench.session.jobs import Busy, Control, Deliver, Job, Worker
+from silo.workbench.session.spool import Commit, Spool
+from silo.workbench.settings.server import Known, Server, TokenStore
+from silo.workbench.words import translate
+
+if TYPE_CHECKING:
+    # These bring requests and pydantic with them, which only a worker may import (start-up time).
+    from silo.api.client import SiloClient
+    from silo.workbench.session.online import Online
+    from silo.workbench.session.sending import Sent, Waiting
+
+
+@dataclass(frozen=True)
+class Shown:
+    """Everything that the pane shows."""
+
+    server: Server = field(default_factory=Server)
+    connection: str = "stopped"
+    reason: str = ""
+    busy: Busy | None = None
+    waiting: tuple[Waiting, ...] = ()
+    activity: Activity = field(default_factory=Activity)
+
+
+@dataclass(frozen=True)
+class Listener:
+    """Who hears what happens in a session; all calls come through ``deliver``.
+
+    shown
+        something to show has changed.
+    console
+        a line for the report view.
+    sent
+        a commit of this FreeCAD arrived.
+    bug
+        an exception that should not have been.
+    """
+
+    shown: Callable[[Shown], None] = lambda _shown: None
+    console: Callable[[str], None] = lambda _text: None
+    sent: Callable[[Sent], None] = lambda _sent: None
+    bug: Callable[[BaseException], None] = lambda _error: None
+
+
+class Session:
+    """One per FreeCAD.
+
+    known
+        the server settings of the preferences; replaced by :meth:`settings_changed`.
+    store
+        the keyring; asked in a worker only.
+    folder
+        where commits and outbox are kept; the user's data folder unless told otherwise.
+    make_client
+        makes the client of a server; for tests.
+    """
+
+    def __init__(
+        self,
+        deliver: Deliver,
+        known: Known,
+        store: TokenStore,
+        *,
+        listener: Listener | None = None,
+        folder: Path | None = None,
+        make_client: Callable[[Server], Any] | None = None,
+    ) -> None:
+        self._make_client = make_client
+        self._deliver, self._listener, self._folder = deliver, listener or Listener(), folder
+        self._known, self._store = known, store
+        self.shown = Shown()
+        self.spool = Spool(folder / "commits" if folder is not None else None)
+        bug = self._listener.bug
+        self._disk = Worker("silo-disk", deliver, on_bug=bug)
+        self._net = Worker("silo-network", deliver, on_busy=self._busy, on_bug=bug)
+        # What a person waits for on the preference page must not queue behind a long upload.
+        self._aside = Worker("silo-aside", deliver, on_bug=bug)
+        self._online: Online | None = None
+        self._live = False
+
+    # -- the server -------------------------------------------------------------------------------------
+
+    def begin(self, *, live: bool) -> None:
+        """Connect, where a server is configured; send what an earlier FreeCAD left behind."""
+        self._live = live
+        self._net.submit(
+            Job(translate("Silo", "Connecting"), self._connect, done=self._connected, failed=self.problem)
+        )
+
+    def settings_changed(self, known: Known, *, live: bool) -> None:
+        """Take over new settings."""
+        self._known = known
+        self.begin(live=live)
+
+    def _connect(self, _control: Control) -> tuple[Server, tuple[Waiting, ...]]:
+        online = self._need_online()
+        self.spool.sweep()
+        server = online.connect(self._known, self._store, live=self._live)
+        return server, online.sending.waiting()
+
+    def _need_online(self) -> Online:
+        """Made in the worker: its import is what would hold up FreeCAD's start."""
+        if self._online is None:
+            from silo.workbench.session.online import Online
+
+            self._online = Online(
+                self.spool,
+                self._folder,
+                entry=lambda entry: self._deliver(lambda: self.add(entry)),
+                sent=lambda sent, lines: self._deliver(lambda: self._arrived(sent, lines)),
+                state=lambda kind, reason: self._deliver(lambda: self._connection(kind, reason)),
+                make_client=self._make_client,
+            )
+        return self._online
+
+    def _connected(self, result: tuple[Server, tuple[Waiting, ...]]) -> None:
+        server, waiting = result
+        self._show(server=server, waiting=waiting)
+        if waiting and server.configured:
+            self.send(force=False)
+
+    def _connection(self, kind: str, reason: str) -> None:
+        before = self.shown.connection
+        self._show(connection=kind, reason=reason)
+        if kind == "online" and before != "online" and self.shown.waiting:
+            self.send(force=True)
+
+    # -- commits ----------------------------------------------------------------------------------------
+
+    def keep(self, commit: Commit, failed: Callable[[SiloError], None]) -> None:
+        """Put a commit on disk, then send it. ``failed`` is told where the disk does not take it."""
+        job = Job(
+            translate("Silo", "Keeping the commit"),
+            lambda _control: self.spool.add(commit),
+            done=lambda _kept: self.send(force=True),
+            failed=failed,
+        )
+        self._disk.submit(job)
+
+    def send(self, *, force: bool) -> None:
+        """Send what waits; ``force`` also what was to be tried later only."""
+
+        def run(control: Control) -> Any:
+            online = self._need_online()
+            try:
+                online.need_client(self._known, self._store)
+                return online.sending.run(online.client, control, force=force), online.sending.waiting()
+            except ConfigError:
+                # Without a server all that waits is kept; the pane says what to do.
+                return None, online.sending.waiting()
+
+        self._net.submit(
+            Job(
+                translate("Silo", "Sending to Silo"),
+                run,
+                done=self._sent_all,
+                failed=self.problem,
+                same_as=f"send {force}",
+            )
+        )
+
+    def _sent_all(self, result: Any) -> None:
+        report, waiting = result
+        self._show(waiting=waiting)
+        stopped = report.stopped_by if report is not None else None
+        if stopped is not None and stopped.code != "cancelled":
+            self._show(reason=str(stopped), connection=self._connection_after(stopped))
+
+    def _connection_after(self, error: SiloError) -> str:
+        # The live connection knows best; without one, this is all that is known.
+        if self.shown.connection in ("stopped", "unsupported"):
+            return {"unauthorized": "refused", "read_only": "read-only"}.get(error.code, "offline")
+        return self.shown.connection
+
+    def _arrived(self, sent: Sent, lines: tuple[str, ...]) -> None:
+        for line in lines:
+            self._listener.console(line)
+        self._listener.sent(sent)
+
+    def tick(self) -> None:
+        """Called now and then: what waits is tried again when its time has come."""
+        if self.shown.waiting and self._net.idle:
+            self.send(force=False)
+
+    def retry(self, waiting_id: str) -> None:
+        """Send something rejected once more."""
+        self._with_sending(
+            lambda online: online.sending.retry(waiting_id), then=lambda: self.send(force=True)
+        )
+
+    def retry_all(self) -> None:
+        """Send all that waits, now."""
+        if self._online is not None:
+            self._online.retry_now()
+        self.send(force=True)
+
+    def discard(self, waiting_id: str) -> None:
+        """Forget something that waits; the document is not touched."""
+        self._with_sending(lambda online: online.sending.discard(waiting_id))
+
+    def _with_sending(
+        self, change: Callable[[Online], None], then: Callable[[], None] = lambda: None
+    ) -> None:
+        def run(_control: Control) -> tuple[Waiting, ...]:
+            online = self._need_online()
+            change(online)
+            return online.sending.waiting()
+
+        def done(waiting: tuple[Waiting, ...]) -> None:
+            self._show(waiting=waiting)
+            then()
+
+        self._disk.submit(Job(translate("Silo", "Outbox"), run, done=done, failed=self.problem))
+
+    # -- anything else that asks the server -------------------------------------------------------------
+
+    def ask(
+        self,
+        title: str,
+        question: Callable[[SiloClient, Control], Any],
+        done: Callable[[Any], None],
+        failed: Callable[[SiloError], None],
+    ) -> None:
+        """Ask the server something; the answer, or the error, comes back in the GUI thread."""
+
+        def run(control: Control) -> Any:
+            online = self._need_online()
+            online.need_client(self._known, self._store)
+            return question(online.client, control)
+
+        self._net.submit(Job(title, run, done=done, failed=failed))
+
+    def aside(
+        self,
+        title: str,
+        work: Callable[[Control], Any],
+        done: Callable[[Any], None],
+        failed: Callable[[SiloError], None],
+    ) -> None:
+        """Work for a worker that needs no server of the session (settings, keyring)."""
+        self._aside.submit(Job(title, work, done=done, failed=failed))
+
+    def in_gui(self, call: Callable[[], Any], control: Control) -> Any:
+        """For a job: run ``call`` in the GUI thread and wait for what it gives or raises."""
+        finished = threading.Event()
+        result: list[Any] = []
+        problem: list[BaseException] = []
+
+        def run() -> None:
+            try:
+                result.append(call())
+            except BaseException as error:
+                problem.append(error)
+                if not isinstance(error, SiloError):
+                    raise
+            finally:
+                finished.set()
+
+        self._deliver(run)
+        while not finished.wait(0.2):
+            # Whoever closes FreeCAD, or presses Stop, must not wait for the GUI thread to have time.
+            control.check()
+        if problem:
+            raise problem[0]
+        return result[0]
+
+    def cancel(self) -> None:
+        """Stop what the network worker is doing."""
+        self._net.cancel()
+
+    def close(self) -> None:
+        """FreeCAD ends. What is not sent waits on disk for the next time."""
+        for worker in (self._aside, self._disk, self._net):
+            worker.close(0.5)
+        if self._online is not None:
+            self._online.close()
+
+    @property
+    def idle(self) -> bool:
+        """True where no worker has anything to do."""
+        return self._disk.idle and self._net.idle
+
+    # -- what is shown ----------------------------------------------------------------------------------
+
+    def add(self, entry: Entry) -> None:
+        """Show one more box."""
+        self._show(activity=self.shown.activity.add(entry))
+
+    def _busy(self, busy: Busy | None) -> None:
+        self._show(busy=busy)
+
+    def problem(self, error: SiloError) -> None:
+        """Show a problem that belongs to nothing else that is shown."""
+        if error.code == "bad_config":
+            self._show(reason=str(error))
+        elif error.code != "cancelled":
+            self._show(reason=str(error))
+            self._listener.console(f"[Silo] {error}")
+
+    def _show(self, **changes: Any) -> None:
+        shown = replace(self.shown, **changes)
+        if shown != self.shown:
+            self.shown = shown
+            self._listener.shown(shown)

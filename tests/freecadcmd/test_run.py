@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Starting FreeCAD from outside, with stand-ins that do what a FreeCAD may do: work, die, hang."""
+
+from __future__ import annotations
+
+import json
+import stat
+import sys
+from pathlib import Path
+
+import pytest
+
+from silo.bom.errors import ConfigError, DocumentError, InputError
+from silo.bom.model import BomEntry, Extraction
+from silo.bom.snapshot import to_plain
+from silo.freecadcmd.run import find_freecadcmd, run_freecad
+
+# A stand-in for freecadcmd: it gets the same arguments and answers in the same file. What it does with a file
+# stands in that file.
+PRETENDER = f"""#!{sys.executable}
+import json, os, signal, sys, time
+assert sys.argv[1] == "-c" and "run_path" in sys.argv[2], sys.argv
+assert not sys.stdin.read(), "FreeCAD must not wait for a terminal"
+job = json.loads(os.environ["SILO_ARGS"])
+with open(job["lines"], "a") as out:
+    def tell(data):
+        out.write(json.dumps(data) + "\\n"); out.flush()
+    for top in job["tops"]:
+        what = open(top).read()
+        if what == "never starts":
+            print("Cannot load library"); sys.exit(4)
+        tell({{"begun": top}})
+        if what == "die":
+            os.kill(os.getpid(), signal.SIGSEGV)
+        if what == "leave":
+            sys.exit(7)
+        if what == "hang":
+            time.sleep(60)
+        if what == "refuse":
+            tell({{"top": top, "error": {{"code": "x", "message": "m", "path": top, "reason": "bad"}}}})
+        elif what == "ask":
+            tell({{"top": top, "error": {{"code": "bad_input", "message": "which assembly?"}}}})
+        else:
+            plain = json.loads(what)
+            plain["table"][0]["label"] = job.get("assembly", "")
+            tell({{"top": top, "extraction": plain}})
+"""
+
+GOOD = Extraction(assembly=BomEntry(doc_path="top.FCStd", object_name="Top", is_assembly=True, level=0))
+
+
+@pytest.fixture
+def freecadcmd(tmp_path: Path) -> str:
+    path = tmp_path / "freecadcmd"
+    path.write_text(PRETENDER)
+    path.chmod(path.stat().st_mode | stat.S_IXUSR)
+    return str(path)
+
+
+def tops(folder: Path, *contents: str) -> list[str]:
+    found = []
+    for number, content in enumerate(contents):
+        path = folder / f"top{number}.FCStd"
+        path.write_text(json.dumps(to_plain(GOOD)) if content == "good" else content)
+        found.append(str(path))
+    return found
+
+
+def test_each_file_gives_its_extraction_in_order(tmp_path: Path, freecadcmd: str) -> None:
+    """Results come in the order of the files, and name them as the caller did."""
+    wanted = tops(tmp_path, "good", "good")
+    results = list(run_freecad(wanted, "Main", command=freecadcmd))
+    assert [top for top, _ in results] == wanted
+    assert all(found == GOOD for _, found in results)
+    assert isinstance(results[0][1], Extraction)
+    assert results[0][1].assembly.label == "Main"
+
+
+def test_a_file_that_kills_freecad_does_not_stop_the_rest(tmp_path: Path, freecadcmd: str) -> None:
+    """FreeCAD is started again for what is left; the deadly files have an error that says how it died."""
+    wanted = tops(tmp_path, "good", "die", "good", "leave", "good")
+    results = [found for _, found in run_freecad(wanted, command=freecadcmd)]
+    assert [isinstance(found, Extraction) for found in results] == [True, False, True, False, True]
+    assert str(results[1]) == f"{wanted[1]}: FreeCAD died while it read this file (signal SIGSEGV)"
+    assert str(results[3]) == f"{wanted[3]}: FreeCAD died while it read this file (exit code 7)"
+
+
+def test_a_file_that_freecad_hangs_on_is_given_up(tmp_path: Path, freecadcmd: str) -> None:
+    """After its time FreeCAD is ended, and started again for the rest."""
+    wanted = tops(tmp_path, "hang", "good")
+    results = [found for _, found in run_freecad(wanted, command=freecadcmd, timeout_s=2)]
+    assert isinstance(results[0], DocumentError)
+    assert "did not finish it within 2 s" in str(results[0])
+    assert results[1] == GOOD
+
+
+def test_errors_of_files_come_back_as_they_were(tmp_path: Path, freecadcmd: str) -> None:
+    """A document's error keeps path and reason; another input error its sentence."""
+    wanted = tops(tmp_path, "refuse", "ask")
+    first, second = (found for _, found in run_freecad(wanted, command=freecadcmd))
+    assert isinstance(first, DocumentError)
+    assert (first.path, first.reason) == (wanted[0], "bad")
+    assert isinstance(second, InputError)
+    assert str(second) == "which assembly?"
+
+
+def test_a_freecad_that_does_not_start_is_told_once(tmp_path: Path, freecadcmd: str) -> None:
+    """Not one error per file, but one that says what FreeCAD said."""
+    with pytest.raises(ConfigError, match=r"did not work \(exit code 4\).*Cannot load library"):
+        list(run_freecad(tops(tmp_path, "never starts", "good"), command=freecadcmd))
+
+
+def test_a_reader_that_stops_early_ends_freecad(tmp_path: Path, freecadcmd: str) -> None:
+    """Nothing is left running when the caller has seen enough."""
+    results = run_freecad(tops(tmp_path, "good", "hang"), command=freecadcmd)
+    assert next(results)[1] == GOOD
+    results.close()  # would wait for the hanging program's minute if it were not ended
+
+
+def test_the_freecad_of_the_environment_is_taken(freecadcmd: str) -> None:
+    """SILO_FREECADCMD decides; a given command comes before it."""
+    assert find_freecadcmd(env={"SILO_FREECADCMD": freecadcmd}) == freecadcmd
+    assert find_freecadcmd(freecadcmd, env={"SILO_FREECADCMD": "/nowhere"}) == freecadcmd
+
+
+def test_a_wrong_freecad_is_one_plain_sentence() -> None:
+    """The message names what was wanted and where it is set."""
+    with pytest.raises(ConfigError, match="/nowhere/freecadcmd cannot be run; SILO_FREECADCMD must name"):
+        find_freecadcmd(env={"SILO_FREECADCMD": "/nowhere/freecadcmd"})
+
+
+def test_without_any_freecad_the_message_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither on the PATH nor in the usual places."""
+    monkeypatch.setenv("PATH", "")
+    with pytest.raises(ConfigError, match="Install FreeCAD, or set SILO_FREECADCMD"):
+        find_freecadcmd(env={})

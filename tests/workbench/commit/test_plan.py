@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What a commit saves, in which order, and what it leaves alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from silo.bom.errors import DocumentError
+from silo.workbench.commit.plan import Plan, State, Taker, leaves_first, plan
+from silo.workbench.commit.snapshot import Snapshot
+
+
+class Doc:
+    """A document with FreeCAD's names, and what a commit asks of it."""
+
+    def __init__(self, name: str, *below: Doc, path: str | None = None, **marks: bool) -> None:
+        self.Name = self.Label = name
+        self.FileName = f"/v/{name}.FCStd" if path is None else path
+        self.OutList = list(below)
+        self.marks = marks
+
+
+class Documents:
+    """FreeCAD's documents: ``changed``, ``partial``, ``fixed`` (read-only) and ``newer`` are their marks."""
+
+    def __init__(self) -> None:
+        self.saved: list[str] = []
+
+    def linked(self, doc: Any, /) -> list[Any]:
+        found, left = {doc.Name: doc}, [doc]
+        while left:
+            for below in left.pop().OutList:
+                if below.Name not in found:
+                    found[below.Name] = below
+                    left.append(below)
+        return list(found.values())
+
+    def is_modified(self, doc: Any, /) -> bool:
+        return bool(doc.marks.get("changed"))
+
+    def is_partial(self, doc: Any, /) -> bool:
+        return bool(doc.marks.get("partial"))
+
+    def is_writable(self, path: str, /) -> bool:
+        return "fixed" not in path
+
+    def lost_assemblies(self, doc: Any, /) -> list[str]:
+        return ["Assembly"] if doc.marks.get("newer") else []
+
+    def save(self, doc: Any, /) -> None:
+        if doc.marks.get("full_disk"):
+            raise DocumentError(doc.FileName, "the disk is full")
+        self.saved.append(doc.Name)
+        doc.marks["changed"] = False
+
+
+def names(planned: Plan) -> list[str]:
+    return [row.label for row in planned.rows]
+
+
+def test_changed_documents_come_leaves_first_and_the_asked_one_last() -> None:
+    """Spec, design decision 3: each parent refers to children that are committed already."""
+    leaf = Doc("Leaf", changed=True)
+    sub = Doc("Sub", leaf, changed=True)
+    top = Doc("Top", Doc("Untouched"), sub, leaf, changed=True)
+    planned = plan(top, Documents())
+    assert names(planned) == ["Leaf", "Sub", "Top"]
+    assert [row.is_top for row in planned.rows] == [False, False, True]
+
+
+def test_a_saved_document_is_committed_all_the_same() -> None:
+    """The person asked for it; the server says whether it is news."""
+    planned = plan(Doc("Top", Doc("Part")), Documents())
+    assert [(row.label, row.state) for row in planned.rows] == [("Top", State.SAVED)]
+    assert planned.is_simple
+
+
+def test_a_leaf_below_untouched_documents_is_found() -> None:
+    """What was changed three levels down belongs to the commit."""
+    deep = Doc("Deep", changed=True)
+    top = Doc("Top", Doc("Middle", Doc("Lower", deep)))
+    assert names(plan(top, Documents())) == ["Deep", "Top"]
+
+
+def test_documents_that_link_to_each_other() -> None:
+    """A ring ends, each document once, the asked one last."""
+    one, two = Doc("One", changed=True), Doc("Two", changed=True)
+    one.OutList, two.OutList = [two], [one]
+    assert names(plan(one, Documents())) == ["Two", "One"]
+
+
+@pytest.mark.parametrize(
+    ("doc", "state", "can_commit"),
+    [
+        (Doc("T", changed=True), State.CHANGED, True),
+        (Doc("T"), State.SAVED, True),
+        (Doc("T", path=""), State.UNNAMED, False),
+        (Doc("T", changed=True, partial=True), State.PARTIAL, False),
+        (Doc("T", partial=True), State.SAVED, True),
+        (Doc("fixed", changed=True), State.READ_ONLY, False),
+        (Doc("fixed"), State.SAVED, True),
+        (Doc("T", changed=True, newer=True), State.LOST, False),
+        (Doc("T", newer=True), State.SAVED, True),
+    ],
+    ids=lambda value: value.Name if isinstance(value, Doc) else str(value),
+)
+def test_states(doc: Doc, state: State, can_commit: bool) -> None:
+    """What cannot be saved whole is never saved; what needs no saving is sent as it is."""
+    (row,) = plan(doc, Documents()).rows
+    assert (row.state, row.can_commit) == (state, can_commit)
+    assert row.note
+
+
+def taker(documents: Documents, *, unknown: str = "") -> Taker:
+    def take(doc: Any) -> Snapshot:
+        return Snapshot(doc.FileName, doc.Label, None if doc.Name == unknown else f"{doc.Name}-id")
+
+    keys = iter(range(100))
+    return Taker(documents, take, lambda path, key: Path(f"/held/{key}"), lambda: f"k{next(keys)}")
+
+
+def test_each_is_saved_then_taken() -> None:
+    """In the order of the plan."""
+    documents = Documents()
+    top = Doc("Top", Doc("Sub", changed=True), changed=True)
+    taken = list(taker(documents).each(plan(top, documents).rows))
+    assert documents.saved == ["Sub", "Top"]
+    assert [(one.snapshot.identity, one.key, one.held) for one in taken if one.snapshot] == [
+        ("Sub-id", "k0", Path("/held/k0")),
+        ("Top-id", "k1", Path("/held/k1")),
+    ]
+
+
+def test_what_is_saved_already_is_not_saved_again() -> None:
+    """Its time stamp would change for nothing."""
+    documents = Documents()
+    list(taker(documents).each(plan(Doc("Top"), documents).rows))
+    assert documents.saved == []
+
+
+def test_a_failure_does_not_stop_the_others() -> None:
+    """And nothing of the failed one is sent."""
+    documents = Documents()
+    top = Doc("Top", Doc("Sub", changed=True, full_disk=True), changed=True)
+    first, second = taker(documents).each(plan(top, documents).rows)
+    assert isinstance(first.error, DocumentError)
+    assert first.snapshot is None
+    assert second.error is None
+    assert documents.saved == ["Top"]
+
+
+def test_a_document_without_identity_is_not_held() -> None:
+    """There is nothing to send it to, so no copy is kept."""
+    documents = Documents()
+    (taken,) = taker(documents, unknown="Top").each(plan(Doc("Top", changed=True), documents).rows)
+    assert taken.held is None
+    assert documents.saved == ["Top"]
+
+
+@given(st.lists(st.tuples(st.integers(0, 7), st.integers(0, 7)), max_size=30))
+def test_order_of_any_web_of_documents(links: list[tuple[int, int]]) -> None:
+    """Each reachable document once, the top last; and below before above wherever there is no ring."""
+    docs = [Doc(str(i)) for i in range(8)]
+    for above, below in links:
+        docs[above].OutList.append(docs[below])
+    order = [doc.Name for doc in leaves_first(docs[0])]
+    reach = {name: {doc.Name for doc in leaves_first(docs[int(name)])} for name in order}
+    assert len(order) == len(set(order))
+    assert set(order) == reach["0"]
+    assert order[-1] == "0"
+    for above in order:
+        for below in (doc.Name for doc in docs[int(above)].OutList):
+            if above not in reach[below]:
+                assert order.index(below) < order.index(above)

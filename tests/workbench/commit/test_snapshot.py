@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Snapshots of documents, and their way through JSON."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+from fakes import Doc, edit
+
+from silo.bom.errors import InputError
+from silo.bom.findings import Finding, FindingCode, Place, Severity
+from silo.bom.model import BomEntry, Extraction
+from silo.workbench.commit.snapshot import Snapshot, from_json, part_identity, take, to_json
+
+
+def gearbox() -> tuple[Doc, Doc, Doc]:
+    """Top with two bolts and a sub-assembly that has a bolt as well."""
+    bolt = Doc("/v/Bolt.FCStd", meta={"SiloUUID": "bolt-id"})
+    body = bolt.body()
+    sub = Doc("/v/Sub.FCStd", meta={"SiloUUID": "sub-id"})
+    inner = sub.assembly(sub.link("B", body))
+    top = Doc("/v/Top.FCStd", meta={"SiloUUID": "top-id"})
+    top.assembly(top.link("B1", body), top.link("B2", body), top.link("S", inner))
+    return top, sub, bolt
+
+
+def test_an_assembly_is_taken_with_its_bom() -> None:
+    """Identity, label and the whole tree."""
+    taken = take(gearbox()[0])
+    assert (taken.path, taken.label, taken.identity) == ("/v/Top.FCStd", "Top", "top-id")
+    assert taken.is_assembly
+    assert taken.extraction is not None
+    assert {e.silo_uuid: e.quantity for e in taken.extraction.entries} == {"bolt-id": 2, "sub-id": 1}
+
+
+def test_a_part_has_no_bom() -> None:
+    """Only its file is committed."""
+    taken = take(gearbox()[2])
+    assert taken == Snapshot("/v/Bolt.FCStd", "Bolt", "bolt-id")
+    assert not taken.is_assembly
+
+
+def test_an_empty_assembly_is_an_assembly() -> None:
+    """Its BOM became empty, which is worth telling."""
+    doc = Doc("/v/A.FCStd")
+    doc.assembly()
+    assert take(doc).is_assembly
+
+
+def test_a_part_with_a_broken_link_is_no_part() -> None:
+    """A missing file must never read as "no BOM"."""
+    doc = Doc("/v/A.FCStd")
+    doc.part("Model", doc.link("L", None))
+    from silo.bom.document import LinkProblem
+    from silo.bom.links import extract
+
+    problem = LinkProblem(FindingCode.MISSING_FILE, "b.FCStd")
+    taken = take(doc, walk=lambda obj: extract(obj, inspect=lambda _link: problem))
+    assert taken.is_assembly
+    assert taken.extraction is not None
+    assert taken.extraction.blocked
+
+
+def two_assemblies() -> tuple[Doc, Any]:
+    bolt = Doc("/v/Bolt.FCStd")
+    body = bolt.body()
+    doc = Doc("/v/Two.FCStd", meta={"SiloUUID": "two-id"})
+    doc.assembly(doc.link("L1", body), name="One")
+    second = doc.assembly(doc.link("L2", body), doc.link("L3", body), name="Two")
+    return doc, second
+
+
+def test_several_assemblies_and_no_hint_is_told_not_guessed() -> None:
+    """The file can be committed; its BOM needs a choice."""
+    taken = take(two_assemblies()[0])
+    assert not taken.is_assembly
+    assert taken.identity == "two-id"
+    assert "2 assemblies" in taken.problem
+    # What to do is told in the words of the window, not of the command line.
+    assert "--assembly" not in taken.problem
+    assert taken.problem.endswith("Make the one that is meant active: double-click it in the tree.")
+
+
+def test_the_active_assembly_decides_between_several() -> None:
+    """What the person works in is what is meant."""
+    doc, second = two_assemblies()
+    taken = take(doc, assembly=second)
+    assert taken.extraction is not None
+    assert [entry.quantity for entry in taken.extraction.entries] == [2]
+
+
+def test_the_hint_does_not_override_the_only_assembly() -> None:
+    """A sub-part that happens to be active is not the assembly."""
+    top, _, _ = gearbox()
+    other = top.part("Helper")
+    taken = take(top, assembly=other)
+    assert taken.extraction is not None
+    assert len(taken.extraction.entries) == 2
+
+
+@pytest.mark.parametrize(
+    ("doc", "identity"),
+    [
+        (Doc("/v/A.FCStd"), None),
+        (Doc("/v/A.FCStd", meta={"SiloUUID": " m "}), "m"),
+        (Doc("/v/A.FCStd", SiloUUID="p", meta={"SiloUUID": "m"}), "p"),
+    ],
+    ids=["none", "meta", "property before meta"],
+)
+def test_identity_of_a_file(doc: Doc, identity: str | None) -> None:
+    """The document's own."""
+    assert part_identity(doc) == identity
+
+
+def test_identity_of_the_only_marked_object() -> None:
+    """The real Silo marks objects; two different marks in one file say nothing of the file."""
+    doc = Doc("/v/A.FCStd")
+    one, other = doc.body("One"), doc.body("Other")
+    edit(one, SiloItemId="i")
+    assert part_identity(doc) == "i"
+    edit(other, SiloItemId="j")
+    assert part_identity(doc) is None
+
+
+def test_json_and_back() -> None:
+    """A snapshot that waited on disk is the one that was taken."""
+    taken = take(gearbox()[0])
+    again = from_json(json.loads(json.dumps(to_json(taken))))
+    assert again == taken
+    assert again.extraction is not None
+    assert taken.extraction is not None
+    # These do not take part in equality, and are needed all the same.
+    assert again.extraction.entries[0].instances == taken.extraction.entries[0].instances
+    assert again.extraction.entries[0].label == taken.extraction.entries[0].label
+
+
+def test_shared_sub_assemblies_are_written_once() -> None:
+    """Twenty levels of pairs are a million instances and twenty nodes."""
+    entry = BomEntry("/v/0.FCStd", object_name="O")
+    for level in range(1, 21):
+        left = BomEntry(f"/v/{level}.FCStd", object_name="L", children=(entry,), is_assembly=True)
+        entry = BomEntry(f"/v/{level}.FCStd", object_name="R", children=(left, left), is_assembly=True)
+    finding = Finding(FindingCode.MIRRORED, Severity.WARNING, "m", (Place("/v/0.FCStd", "O"),))
+    taken = Snapshot("/v/t", "t", "id", Extraction(BomEntry("/v/t"), (entry,), (finding,)))
+    data = to_json(taken)
+    assert len(data["bom"]["table"]) == 42
+    again = from_json(data)
+    assert again.extraction is not None
+    assert again.extraction.findings == (finding,)
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda data: data.pop("path"),
+        lambda data: data["bom"]["table"][0].update(children=[5]),
+        lambda data: data["bom"].update(entries=["x"]),
+        lambda data: data["bom"].update(findings=[{"code": "no such code"}]),
+        lambda data: data.update(format=99),
+        lambda data: data.update(bom=[]),
+    ],
+)
+def test_a_damaged_snapshot_is_told(damage: Any) -> None:
+    """Never half a BOM."""
+    data = json.loads(json.dumps(to_json(take(gearbox()[0]))))
+    damage(data)
+    with pytest.raises(InputError):
+        from_json(data)

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What the pane shows, as values."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from silo.workbench.pane.activity import (
+    MOST_ENTRIES,
+    MOST_LINES,
+    Action,
+    Activity,
+    Do,
+    Entry,
+    Line,
+    Tone,
+    entry_text,
+)
+
+
+def entry(key: str, when: float = 0.0, title: str = "x", rank: int = 0, also: str = "") -> Entry:
+    return Entry(key=key, title=title, when=when, rank=rank, also=also)
+
+
+def keys(activity: Activity) -> list[str]:
+    return [one.key for one in activity.entries]
+
+
+def test_newest_first_also_when_told_late() -> None:
+    """An event that arrives late is put where its time belongs."""
+    activity = Activity().extend([entry("a", 1), entry("c", 3), entry("b", 2)])
+    assert keys(activity) == ["c", "b", "a"]
+
+
+def test_of_equal_time_the_later_told_stands_first() -> None:
+    """What was told last is what a person looks for."""
+    assert keys(Activity().extend([entry("a", 1), entry("b", 1)])) == ["b", "a"]
+
+
+def test_the_same_key_replaces() -> None:
+    """One box per sync."""
+    activity = Activity().extend([entry("a", 1, "old"), entry("a", 2, "new")])
+    assert [one.title for one in activity.entries] == ["new"]
+
+
+def test_the_servers_event_does_not_replace_our_own_richer_box() -> None:
+    """Whichever of the two comes first, our own stays."""
+    ours, event = entry("sync:1", 1, "ours", rank=1), entry("sync:1", 2, "event")
+    assert [e.title for e in Activity().extend([ours, event]).entries] == ["ours"]
+    assert [e.title for e in Activity().extend([event, ours]).entries] == ["ours"]
+
+
+def test_a_box_that_includes_another_takes_its_place() -> None:
+    """The upload's event is part of our own commit's box."""
+    ours, event = entry("sync:1", 1, "ours", rank=1, also="revision:A:2"), entry("revision:A:2", 2, "event")
+    assert keys(Activity().extend([ours, event])) == ["sync:1"]
+    assert keys(Activity().extend([event, ours])) == ["sync:1"]
+
+
+def test_only_so_many_are_kept() -> None:
+    """The oldest go."""
+    activity = Activity().extend(entry(str(i), i) for i in range(MOST_ENTRIES + 50))
+    assert len(activity.entries) == MOST_ENTRIES
+    assert activity.entries[-1].key == "50"
+
+
+def test_a_removed_entry_is_gone() -> None:
+    """And removing an unknown one is harmless."""
+    activity = Activity().add(entry("a")).remove("a").remove("b")
+    assert activity.entries == ()
+    assert activity.get("a") is None
+
+
+def test_a_box_is_never_longer_than_can_be_read() -> None:
+    """Ten thousand findings are some lines, the last of which counts the rest."""
+    lines = tuple(Line(f"finding {i}") for i in range(10_000))
+    made = Entry("k", "t", 0.0, lines=lines)
+    assert len(made.lines) == MOST_LINES
+    assert made.lines[-1].text == f"… and {10_001 - MOST_LINES} more lines; the preview shows all"
+
+
+def test_text_in_boxes_is_harmless() -> None:
+    """Titles, names and lines pass through the same cleaning."""
+    made = Entry("k", "\x1b[2J<b>", 0.0, who="a\nb", lines=(Line("x\u202ey"),))
+    assert (made.title, made.who, made.lines[0].text) == ("[2J<b>", "a b", "x y")
+
+
+def test_a_box_as_plain_text() -> None:
+    """The spec's box (§6)."""
+    register = Action(Do.REGISTER, "Register Parts…")
+    box = Entry(
+        "k",
+        "BOM Updated: ASM-001",
+        0.0,
+        badges=(
+            Line("+1 added", Tone.GOOD),
+            Line("~1 qty changed", Tone.CHANGED),
+            Line("⚠1 unreferenced", Tone.WARNING),
+        ),
+        lines=(Line("2 components have no Silo part number", Tone.WARNING, (register,)),),
+        actions=(Action(Do.VIEW, "View in Silo →"),),
+    )
+    assert entry_text(box) == (
+        "BOM Updated: ASM-001\n"
+        "+1 added  ~1 qty changed  ⚠1 unreferenced\n"
+        "2 components have no Silo part number [Register Parts…]\n"
+        "[View in Silo →]"
+    )
+
+
+entries = st.builds(
+    entry,
+    key=st.sampled_from("abcdef"),
+    when=st.floats(min_value=0, max_value=9, allow_nan=False),
+    rank=st.integers(min_value=0, max_value=1),
+)
+
+
+@given(st.lists(entries, max_size=40))
+def test_always_sorted_unique_and_never_poorer(told: list[Entry]) -> None:
+    """Whatever comes in whatever order: newest first, one per key, the highest rank of each key wins."""
+    activity = Activity().extend(told)
+    whens = [one.when for one in activity.entries]
+    assert whens == sorted(whens, reverse=True)
+    assert sorted(keys(activity)) == sorted({one.key for one in told})
+    for one in activity.entries:
+        assert one.rank == max(other.rank for other in told if other.key == one.key)

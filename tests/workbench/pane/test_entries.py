@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What the pane shows of a commit (spec bom-sync §6)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import pytest
+
+from silo.api.sse import ServerEvent
+from silo.bom.errors import InputError
+from silo.bom.findings import Finding, FindingCode, Place, Severity
+from silo.workbench.pane.activity import Activity, Do, Entry, entry_text
+from silo.workbench.pane.entries import MOST_IN_CONSOLE, console_lines, of_event, of_sent
+from silo.workbench.session.jobs import Control
+from silo.workbench.session.sending import Sent
+
+if TYPE_CHECKING:
+    from conftest import Vault
+
+
+def page(path: str) -> str:
+    return f"https://silo.example.com{path}"
+
+
+def box(vault: Vault) -> Entry:
+    return of_sent(vault.told[-1], page, now=0.0)
+
+
+def test_a_merge_is_the_box_of_the_spec(vault: Vault, control: Control) -> None:
+    """Counts, the link to the server's page, and what has no number."""
+    vault.commit(vault.snapshot(vault.part("Bolt", 12), vault.part("Cover", identity="no-item")))
+    vault.sending.run(vault.silo, control)
+    assert entry_text(box(vault)).splitlines() == [
+        f"BOM Updated: {vault.number} Top",
+        "+1 added",
+        "Revision 1 uploaded",
+        "1 component has no Silo part number [Register Parts…]",
+        "Cover",
+        "[View in Silo →]",
+    ]
+    (view,) = box(vault).actions
+    assert view.target == page(f"/items/{vault.number}/bom")
+
+
+def test_however_much_is_broken_registering_stays_within_reach(vault: Vault, control: Control) -> None:
+    """A thousand broken links must not push the button out of the box."""
+    snapshot = vault.snapshot(vault.part("Cover", identity="no-item"), broken=True)
+    assert snapshot.extraction is not None
+    lost = tuple(
+        Finding(
+            FindingCode.MISSING_FILE, Severity.ERROR, f"Gone{n} is missing", (Place(str(vault.top), f"L{n}"),)
+        )
+        for n in range(1000)
+    )
+    vault.commit(replace(snapshot, extraction=replace(snapshot.extraction, findings=lost)))
+    vault.sending.run(vault.silo, control)
+    made = box(vault)
+    offered = [a.do for line in made.lines for a in line.actions if a.do is not Do.SHOW]
+    assert offered == [Do.PREVIEW, Do.REGISTER]
+    assert "… and 995 more lines; the preview shows all" in entry_text(made)
+
+
+def test_a_broken_link_can_be_shown_in_the_model(vault: Vault, control: Control) -> None:
+    """By the objects that the finding names."""
+    vault.commit(vault.snapshot(vault.part("Bolt"), broken=True))
+    vault.sending.run(vault.silo, control)
+    (show,) = [a for line in box(vault).lines for a in line.actions]
+    assert (show.do, show.document, show.objects) == (Do.SHOW, str(vault.top), ("Link",))
+
+
+def test_the_report_view_is_not_flooded(vault: Vault, control: Control) -> None:
+    """The consolidation warnings of a large assembly are told up to a number, then how many more."""
+    vault.commit(vault.snapshot(vault.part("Bolt", 4)))
+    vault.sending.run(vault.silo, control)
+    (sent,) = vault.told
+    assert sent.resolved is not None
+    many = [
+        Finding(FindingCode.CONSOLIDATION, Severity.WARNING, f"[Silo BOM] P{n} has 2 individual links.")
+        for n in range(300)
+    ]
+    lines = console_lines(Sent("A", resolved=replace(sent.resolved, findings=tuple(many))))
+    assert len(lines) == MOST_IN_CONSOLE + 1
+    assert lines[-1] == f"[Silo BOM] … and {300 - MOST_IN_CONSOLE} more of these; the preview lists them all."
+    few = console_lines(Sent("A", resolved=replace(sent.resolved, findings=tuple(many[:3]))))
+    assert few == tuple(f"[Silo BOM] P{n} has 2 individual links." for n in range(3))
+
+
+def test_a_page_of_another_server_is_not_offered() -> None:
+    """Events say where to look; only the server in the settings may send people anywhere."""
+
+    def refuse(path: str) -> str:
+        raise InputError(path)
+
+    event = ServerEvent("1", "item.created", {"part_number": "M01-0001", "name": "x"})
+    made = of_event(event, refuse)
+    assert made is not None
+    assert made.actions == ()
+
+
+def test_a_gap_is_told_once() -> None:
+    """A server that counts anew has forgotten what happened; the pane does not pretend to know."""
+    gaps = [of_event(ServerEvent(str(n), "reset", {"reason": "counts anew"}), page, now=n) for n in range(3)]
+    activity = Activity().extend(gap for gap in gaps if gap is not None)
+    (entry,) = activity.entries
+    assert entry.title == "Some activity may be missing"
+
+
+@pytest.mark.parametrize("kind", ["heartbeat", "server.state", "job.done"])
+def test_what_people_need_not_see_is_no_box(kind: str) -> None:
+    """Nor is an event without an item."""
+    assert of_event(ServerEvent("1", kind, {"part_number": "M01-0001"}), page) is None
+    assert of_event(ServerEvent("1", "item.created", {}), page) is None

@@ -1,0 +1,235 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The preview's rows: the same as those of ``silo-mod diff``, on the example assembly and a real server."""
+
+from __future__ import annotations
+
+import json
+import uuid
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from gearbox_story import GearboxStory
+
+from silo.api.client import SiloClient
+from silo.api.wire import MergeEntry, MergeRequest
+from silo.bom.model import BomEntry, Extraction
+from silo.cli.common import read_assembly
+from silo.cli.main import main
+from silo.cli.register import proposals_for, register_all
+from silo.workbench.commit.snapshot import Snapshot
+from silo.workbench.preview.rows import Kind, Preview, Row, ask, rows, summary, to_sync
+from silo.workbench.session.jobs import Control
+from silo_server.run import running_server
+
+CONTROL = Control(lambda _detail, _fraction: None)
+# Of these two one stays without a part number, the other one is new to the server's BOM.
+UNREGISTERED, NEW = "MotorMount", "Cover"
+
+
+@pytest.fixture(name="story", scope="module")
+def _story(tmp_path_factory: pytest.TempPathFactory) -> Iterator[GearboxStory]:
+    """Every kind of difference at once, in the top assembly and below it."""
+    folder = tmp_path_factory.mktemp("preview")
+    token = "silo_" + uuid.uuid4().hex
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        running_server(f"sqlite:///{folder / 'silo.db'}", token=token) as server,
+        SiloClient(server.base_url, token) as client,
+    ):
+        for name in ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME"):
+            patch.setenv(name, str(folder / "home"))
+        patch.setenv("SILO_API_URL", server.base_url)
+        patch.setenv("SILO_API_TOKEN", token)
+        story = GearboxStory(folder, client)
+        register_but(story, UNREGISTERED)
+        story.sync()
+        people_work(story)
+        story.more_bolts(2)
+        yield story
+
+
+def register_but(story: GearboxStory, left_out: str) -> None:
+    extraction = read_assembly(str(story.top))
+    proposals = [
+        proposal
+        for proposal in proposals_for(extraction, story.client, "kindred-rd")
+        if Path(proposal.entry.doc_path).stem != left_out
+    ]
+    for done in register_all(proposals, extraction, story.client, schema="kindred-rd"):
+        assert done.error is None
+
+
+def people_work(story: GearboxStory) -> None:
+    client, top, gearbox = story.client, story.number_of("TopAssembly"), story.number_of("Gearbox")
+    oil = client.create_item("kindred-rd", "C01", "Gear oil", item_type="consumable")
+    plug = client.create_item("kindred-rd", "F01", "Drain plug")
+    client.add_bom_line(top, oil.part_number, quantity=0.4, unit="l")
+    client.update_bom_line(top, story.number_of("BasePlate"), quantity=3)
+    for parent, left_out, more in (
+        (top, story.number_of(NEW), plug.part_number),
+        (gearbox, story.number_of("Gear"), plug.part_number),
+    ):
+        for line in client.get_bom(parent):
+            if line.child_part_number == left_out:
+                client.remove_bom_line(parent, left_out)
+        kept = [
+            MergeEntry(child_part_number=line.child_part_number, quantity=line.quantity)
+            for line in client.get_bom(parent)
+            if line.source != "manual"
+        ]
+        entries = [*kept, MergeEntry(child_part_number=more, quantity=1)]
+        client.merge_bom(parent, MergeRequest(entries=entries))
+
+
+def preview_of(story: GearboxStory, extraction: Extraction | None = None) -> Preview:
+    found = extraction or read_assembly(str(story.top))
+    head = found.assembly
+    return ask(Snapshot(str(story.top), head.label, head.silo_uuid, found), story.client, CONTROL)
+
+
+@pytest.fixture(name="preview", scope="module")
+def _preview(story: GearboxStory) -> Preview:
+    return preview_of(story)
+
+
+@pytest.fixture(name="diff")
+def _diff(story: GearboxStory, capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
+    capsys.readouterr()
+    assert main(["diff", "--recursive", "--json", str(story.top)]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert isinstance(data, dict)
+    return data
+
+
+def lines(table: Iterable[Row]) -> set[tuple[str, str, str, str]]:
+    """(kind, part number, CAD's quantity, Silo's)."""
+    told = (Kind.GROUP, Kind.NOT_COUNTED, Kind.UNREGISTERED)
+    return {(row.kind.value, row.number, row.cad, row.silo) for row in table if row.kind not in told}
+
+
+def lines_of_diff(diff: dict[str, Any]) -> set[tuple[str, str, str, str]]:
+    def q(value: float) -> str:
+        return f"{value:g}"
+
+    found = {("added", d["part_number"], q(d["quantity"]), "") for d in diff["added"]}
+    found |= {("unchanged", d["part_number"], q(d["quantity"]), q(d["quantity"])) for d in diff["unchanged"]}
+    found |= {("unreferenced", d["part_number"], "", q(d["quantity"])) for d in diff["removed"]}
+    for kind, key in (("changed", "quantity_changed"), ("conflict", "conflicts")):
+        found |= {
+            (kind, d["part_number"], q(d["local_quantity"]), q(d["remote_quantity"])) for d in diff[key]
+        }
+    # A line in conflict stands in the table once, with both quantities.
+    conflicts = {d["part_number"] for d in diff["conflicts"]}
+    return found | {
+        ("manual", d["part_number"], "", q(d["quantity"]))
+        for d in diff["manual"]
+        if d["part_number"] not in conflicts
+    }
+
+
+def below(table: Iterable[Row], number: str) -> tuple[Row, ...]:
+    return next(row.children for row in table if row.number == number)
+
+
+def test_each_assembly_has_the_lines_of_the_diff(
+    story: GearboxStory, preview: Preview, diff: dict[str, Any]
+) -> None:
+    """Added, changed, unchanged, unreferenced, manual and in conflict, at the top and in the sub-assembly."""
+    table = rows(preview)
+    by_number = {one["part_number"]: lines_of_diff(one["diff"]) for one in diff["assemblies"]}
+    top, gearbox = story.number_of("TopAssembly"), story.number_of("Gearbox")
+    assert lines(table) == by_number[top]
+    assert lines(below(table, gearbox)) == by_number[gearbox]
+    kinds = {kind for kind, *_ in lines(table)}
+    assert kinds == {"added", "changed", "unchanged", "unreferenced", "manual", "conflict"}
+
+
+def test_what_is_not_counted_has_the_reason_of_the_diff(preview: Preview, diff: dict[str, Any]) -> None:
+    """Every finding of the walk, in the same words; unregistered components are rows of their own."""
+    groups = [row for row in rows(preview) if row.kind is Kind.GROUP]
+    told = {child.note for row in groups for child in row.children if child.kind is Kind.NOT_COUNTED}
+    elsewhere = ("unregistered", "unreferenced", "conflict")
+    assert told == {f["message"] for f in diff["findings"] if f["code"] not in elsewhere}
+    assert any("construction geometry, not counted" in text for text in told)
+    unregistered = [child.name for row in groups for child in row.children if child.kind is Kind.UNREGISTERED]
+    assert unregistered == ["Motor Mount"]
+    assert [f["code"] for f in diff["findings"]].count("unregistered") == 1
+
+
+def test_the_summary_counts_the_same(preview: Preview) -> None:
+    """One line over the table."""
+    assert summary(preview) == (
+        "1 to add, 1 with another quantity, 1 unreferenced, 1 in conflict, 1 without a part number"
+    )
+
+
+def test_a_sync_with_its_sub_assemblies_sends_those_that_differ_first(
+    story: GearboxStory, preview: Preview
+) -> None:
+    """The gearbox differs too; without the wish the top assembly only."""
+    assert preview.drifted_below == 1
+    paths = [Path(taken.path).name for taken in to_sync(preview, below=True)]
+    assert paths == ["Gearbox.FCStd", "TopAssembly.FCStd"]
+    assert [Path(t.path).name for t in to_sync(preview, below=False)] == ["TopAssembly.FCStd"]
+
+
+def test_an_unregistered_sub_assembly_can_be_opened_too(story: GearboxStory) -> None:
+    """Its own lines are below it, as the diff lists them."""
+    found = read_assembly(str(story.top))
+    entries = tuple(_without_identity(entry) if entry.is_assembly else entry for entry in found.entries)
+    table = rows(preview_of(story, replace(found, entries=entries)))
+    (group,) = (row for row in table if row.kind is Kind.GROUP and row.name.startswith("Without"))
+    gearbox = next(row for row in group.children if row.name.startswith("Gearbox"))
+    assert {row.name for row in gearbox.children} == {"Housing", "Shaft", "Gear"}
+
+
+def _without_identity(entry: BomEntry) -> BomEntry:
+    return replace(entry, silo_uuid=None)
+
+
+def nested(depth: int) -> Extraction:
+    """Each level holds the two assemblies below it: 2 ** depth lines when written out."""
+    below: tuple[BomEntry, ...] = ()
+    for level in range(depth):
+        below = tuple(
+            BomEntry(
+                f"/v/{side}{level}.FCStd", None, label=f"{side}{level}", is_assembly=True, children=below
+            )
+            for side in "AB"
+        )
+    return Extraction(BomEntry("/v/Top.FCStd", label="Top", is_assembly=True, level=0), below)
+
+
+def size(table: Iterable[Row]) -> int:
+    return sum(1 + size(row.children) for row in table)
+
+
+def test_a_tree_that_nobody_could_read_is_cut(story: GearboxStory) -> None:
+    """Thirty levels of two assemblies are a billion lines; the own lines of the top are all there."""
+    extraction = nested(30)
+    uuids = {name: str(uuid.uuid4()) for name in ("A", "B")}
+    for name, identity in uuids.items():
+        story.client.create_item("kindred-rd", "A01", name, item_type="assembly", idempotency_key=identity)
+    table = rows(preview_of(story, _known(extraction, uuids)))
+    assert size(table) < 5000
+    assert [row.name for row in table[:2]] == ["A", "B"]
+    assert "more" in _last(table[0]).name
+
+
+def _known(extraction: Extraction, uuids: dict[str, str]) -> Extraction:
+    done: dict[int, BomEntry] = {}
+
+    def known(entry: BomEntry) -> BomEntry:
+        if id(entry) not in done:
+            children = tuple(known(child) for child in entry.children)
+            done[id(entry)] = replace(entry, silo_uuid=uuids[entry.label[0]], children=children)
+        return done[id(entry)]
+
+    return replace(extraction, entries=tuple(known(entry) for entry in extraction.entries))
+
+
+def _last(row: Row) -> Row:
+    return _last(row.children[-1]) if row.children else row

@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Which server, which token, and who said so."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from silo.bom.errors import ConfigError
+from silo.workbench.settings.preferences import DEFAULTS, Preferences
+from silo.workbench.settings.server import (
+    Known,
+    Origin,
+    Server,
+    choose_server,
+    read_known,
+    same_server,
+)
+
+HOME, OTHER = "https://silo.example.com", "https://other.example.com"
+
+
+class Parameters:
+    """FreeCAD's parameter group, in memory."""
+
+    def __init__(self) -> None:
+        self.values: dict[str, Any] = {}
+
+    def GetString(self, name: str, default: str = "", /) -> str:
+        return str(self.values.get(name, default))
+
+    def SetString(self, name: str, value: str, /) -> None:
+        self.values[name] = value
+
+    def GetBool(self, name: str, default: bool = False, /) -> bool:
+        return bool(self.values.get(name, default))
+
+    def SetBool(self, name: str, value: bool, /) -> None:
+        self.values[name] = value
+
+
+@dataclass
+class Store:
+    """A keyring with tokens by address."""
+
+    tokens: dict[str, str]
+
+    def get(self, url: str) -> str:
+        return self.tokens.get(url, "")
+
+
+EMPTY = Store({})
+
+
+def test_every_preference_has_its_default() -> None:
+    """An untouched FreeCAD behaves as the documentation says."""
+    preferences = Preferences(Parameters())
+    for name, default in DEFAULTS.items():
+        read = preferences.flag if isinstance(default, bool) else preferences.text
+        assert read(name) == default
+
+
+def test_an_unknown_preference_is_an_error() -> None:
+    """A misspelled name must not read as a default."""
+    preferences = Preferences(Parameters())
+    with pytest.raises(KeyError, match="ApiURL: no such preference"):
+        preferences.text("ApiURL")
+    with pytest.raises(KeyError, match="SslVerify"):
+        preferences.text("SslVerify")
+    with pytest.raises(KeyError):
+        preferences.set("SyncBom", "yes")
+
+
+def test_what_is_set_is_read_again() -> None:
+    """Texts and flags."""
+    preferences = Preferences(Parameters())
+    preferences.set("ApiUrl", HOME)
+    preferences.set("SyncBom", False)
+    assert preferences.text("ApiUrl") == HOME
+    assert not preferences.flag("SyncBom")
+
+
+def test_the_certificate_settings_are_one_value() -> None:
+    """A file with authorities counts only while certificates are checked at all."""
+    preferences = Preferences(Parameters())
+    assert read_known(preferences).verify is True
+    preferences.set("SslCertPath", " ca.pem ")
+    assert read_known(preferences).verify == "ca.pem"
+    preferences.set("SslVerify", False)
+    assert read_known(preferences).verify is False
+
+
+def test_nothing_set_up_is_no_error() -> None:
+    """FreeCAD without a server is a normal thing."""
+    assert choose_server(Known(), EMPTY, {}) == Server()
+    assert not choose_server(Known(), EMPTY, {}).configured
+
+
+@pytest.mark.parametrize(
+    ("known", "store", "env", "wanted"),
+    [
+        pytest.param(
+            Known(HOME, "from-preference"),
+            EMPTY,
+            {},
+            Server(HOME, "from-preference", True, Origin.PREFERENCES, Origin.PREFERENCES),
+            id="preferences alone",
+        ),
+        pytest.param(
+            Known(HOME, "from-preference"),
+            Store({HOME: "from-keyring"}),
+            {},
+            Server(HOME, "from-keyring", True, Origin.PREFERENCES, Origin.KEYRING),
+            id="keyring before preference",
+        ),
+        pytest.param(
+            Known(HOME, "from-preference"),
+            Store({HOME: "from-keyring"}),
+            {"SILO_API_TOKEN": "from-env"},
+            Server(HOME, "from-env", True, Origin.PREFERENCES, Origin.ENVIRONMENT),
+            id="environment before keyring",
+        ),
+        pytest.param(
+            Known(HOME, "from-preference"),
+            Store({HOME: "home", OTHER: "other"}),
+            {"SILO_API_URL": OTHER},
+            Server(OTHER, "other", True, Origin.ENVIRONMENT, Origin.KEYRING),
+            id="the other server's own token",
+        ),
+        pytest.param(
+            Known(HOME, "from-preference"),
+            EMPTY,
+            {"SILO_API_URL": OTHER},
+            Server(OTHER, "", True, Origin.ENVIRONMENT, Origin.NONE),
+            id="a token is sent to no other server",
+        ),
+        pytest.param(
+            Known(HOME, "from-preference"),
+            EMPTY,
+            {"SILO_API_URL": HOME + "/"},
+            Server(HOME + "/", "from-preference", True, Origin.ENVIRONMENT, Origin.PREFERENCES),
+            id="the same server, written otherwise",
+        ),
+        pytest.param(
+            Known(HOME, "t", verify=True),
+            EMPTY,
+            {"SILO_SSL_VERIFY": "false"},
+            Server(HOME, "t", False, Origin.PREFERENCES, Origin.PREFERENCES),
+            id="environment decides about certificates",
+        ),
+    ],
+)
+def test_who_wins(known: Known, store: Store, env: dict[str, str], wanted: Server) -> None:
+    """Environment, then keyring, then preference; a token belongs to its server."""
+    assert choose_server(known, store, env) == wanted
+
+
+def test_the_configuration_file_comes_last() -> None:
+    """What `silo-mod` uses is found, unless the preferences name another server."""
+    file = SimpleNamespace(url=HOME, token="from-file", verify="ca.pem")
+    assert choose_server(Known(), EMPTY, {}, file) == Server(
+        HOME, "from-file", "ca.pem", Origin.FILE, Origin.FILE
+    )
+    chosen = choose_server(Known(OTHER), EMPTY, {}, file)
+    assert (chosen.url, chosen.token) == (OTHER, "")
+
+
+def test_a_certificate_setting_nobody_understands_is_told() -> None:
+    """Neither yes nor no must not mean "do not check"."""
+    with pytest.raises(ConfigError, match="SILO_SSL_VERIFY: wanted true or false, got 'maybe'"):
+        choose_server(Known(HOME), EMPTY, {"SILO_SSL_VERIFY": "maybe"})
+
+
+def test_a_token_is_never_shown() -> None:
+    """Not in a log, not in a test's message."""
+    assert "secret" not in repr(Server(HOME, "secret"))
+
+
+def test_no_address_is_like_no_other() -> None:
+    """Two empty settings are not one server."""
+    assert not same_server("", "")
