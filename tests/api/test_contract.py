@@ -11,7 +11,6 @@ from uuid import uuid4
 import pytest
 
 from silo.api.client import SiloClient
-from silo.api.fake import FakeSilo
 from silo.api.protocol import SiloApi
 from silo.api.wire import MergeEntry, MergeRequest, MergeResult
 from silo.bom.diff import diff_bom
@@ -23,6 +22,7 @@ from silo.bom.errors import (
     RejectedError,
     VersionConflictError,
 )
+from silo.testing import FakeSilo
 
 
 @pytest.fixture(scope="module")

@@ -12,8 +12,8 @@ import pytest
 
 from silo.api.client import SiloClient
 from silo.api.events import Backoff, Connection, ConnectionState, EventListener, ServerEvent
-from silo.api.fake import FakeSilo
 from silo.bom.errors import AuthError, ServerFaultError, UnreachableError
+from silo.testing import FakeSilo
 
 EVENTS = "GET /api/events"
 SSE = {"Content-Type": "text/event-stream; charset=utf-8"}

@@ -18,7 +18,6 @@ import pytest
 
 from silo.api.client import SiloClient
 from silo.api.events import Backoff
-from silo.api.fake import FakeSilo
 from silo.api.outbox import Outbox, State, default_path
 from silo.api.transport import Retries
 from silo.api.wire import MergeEntry, MergeRequest, MergeResult, Revision, SourceDocument
@@ -34,6 +33,7 @@ from silo.bom.errors import (
     SiloError,
     UnreachableError,
 )
+from silo.testing import FakeSilo
 
 
 class Clock:

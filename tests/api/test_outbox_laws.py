@@ -13,11 +13,11 @@ from typing import Any
 from hypothesis import event, given, settings
 from hypothesis import strategies as st
 
-from silo.api.fake import FakeSilo
 from silo.api.outbox import Outbox, State
 from silo.api.outbox_store import OutboxEntry, Store
 from silo.api.wire import MergeEntry, MergeRequest
 from silo.bom.errors import ReadOnlyError, ServerFaultError, UnreachableError
+from silo.testing import FakeSilo
 
 
 class Killed(BaseException):

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from silo.api.fake import FakeSilo
 from silo.api.outbox import Outbox
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.model import BomEntry, Extraction
+from silo.testing import FakeSilo
 from silo.workbench.commit.snapshot import Snapshot
 from silo.workbench.session.jobs import Control
 from silo.workbench.session.sending import Sending, Sent

@@ -8,14 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
-    from silo.api.fake import FakeSilo
 
-__all__ = ["FakeSilo", "SiloClient"]
-
-_HOMES = {"FakeSilo": "silo.api.fake", "SiloClient": "silo.api.client"}
+__all__ = ["SiloClient"]
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
+    if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_HOMES[name]), name)
+    return import_module("silo.api.client").SiloClient

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """What a Silo can do, whoever answers: :class:`silo.api.client.SiloClient` over HTTP, or
-:class:`silo.api.fake.FakeSilo` in memory. One contract suite runs over both.
+:class:`silo.testing.FakeSilo` in memory. One contract suite runs over both.
 """
 
 from __future__ import annotations

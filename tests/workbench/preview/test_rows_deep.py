@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from fcstd_writer import Doc, locals_, part
 
-from silo.api.fake import FakeSilo
 from silo.fcstd import Library
+from silo.testing import FakeSilo
 from silo.workbench.commit.snapshot import take
 from silo.workbench.preview.rows import MOST_ROWS, Kind, Preview, Row, ask, rows
 from silo.workbench.session.jobs import Control

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from silo.api.fake import FakeSilo
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.model import BomEntry, Extraction
+from silo.testing import FakeSilo
 from silo.workbench.register.registering import Candidate, Offer, Seen, State, offer
 from silo.workbench.session.jobs import Control
 

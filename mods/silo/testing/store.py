@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""What :class:`silo.api.fake.FakeSilo` holds, and how it changes: items, revisions, lines, the event log."""
+"""What :class:`silo.testing.FakeSilo` holds, and how it changes: items, revisions, lines, the event log."""
 
 from __future__ import annotations
 

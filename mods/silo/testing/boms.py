@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The pure part of :class:`silo.api.fake.FakeSilo`: checking a merge, and walking BOMs."""
+"""The pure part of :class:`silo.testing.FakeSilo`: checking a merge, and walking BOMs."""
 
 from __future__ import annotations
 

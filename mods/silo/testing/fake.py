@@ -16,8 +16,6 @@ from typing import TYPE_CHECKING, Any, Self
 from uuid import UUID, uuid4
 
 from silo.api.bodies import ItemBody, ItemChanges, LineBody, body
-from silo.api.fake_bom import check_cycle, entries_of, expanded, flat, result_of
-from silo.api.fake_store import CATEGORIES, FakeStore, FakeStream, Stored
 from silo.api.multipart import Progress
 from silo.api.sse import MERGE, STATE
 from silo.api.transport import Cancel, stop_if
@@ -40,6 +38,8 @@ from silo.bom.errors import (
     VersionConflictError,
 )
 from silo.bom.merge import apply_merge, plan_merge, summary
+from silo.testing.boms import check_cycle, entries_of, expanded, flat, result_of
+from silo.testing.store import CATEGORIES, FakeStore, FakeStream, Stored
 
 
 class FakeSilo(FakeStore):
