@@ -4,33 +4,95 @@
 from __future__ import annotations
 
 import sqlite3
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy import inspect
+from sqlalchemy import delete, insert, inspect, select, text
+from sqlalchemy.exc import IntegrityError
 
+from silo.bom.errors import ConfigError
+from silo_server.__main__ import main
 from silo_server.bootstrap import prepare
 from silo_server.db.engine import Database
-from silo_server.db.migrate import alembic_config, upgrade
-from silo_server.db.tables import metadata
+from silo_server.db.migrate import alembic_config, newest_revision, upgrade
+from silo_server.db.tables import events, items, metadata
 from silo_server.services.history import list_changes, state_at
 from silo_server.services.items import get_item
 from silo_server.services.lines import lines_of
 from silo_server.settings import Settings
 
-RELEASED = sorted((Path(__file__).parent / "released").glob("*.sql"))
+FOLDER = Path(__file__).parent / "released"
+RELEASES = sorted({path.name.removesuffix(".sql").rpartition(".")[0] for path in FOLDER.glob("*.sql")})
+
+# A revision as a later version may bring it: two filled tables that refer to each other are made anew.
+REBUILD = '''
+"""rebuild two filled tables"""
+import sqlalchemy as sa
+from silo_server.db.migrate import rebuilt
+
+revision = "9001"
+down_revision = {head!r}
+branch_labels = depends_on = None
+
+
+def upgrade():
+    with rebuilt("items") as batch:
+        batch.add_column(sa.Column("weight_class", sa.String(8), nullable=False, server_default="light"))
+        batch.alter_column("name", existing_type=sa.Text(), type_=sa.String(4000), existing_nullable=False)
+    with rebuilt("events") as batch:
+        batch.alter_column("name", existing_type=sa.String(64), type_=sa.String(80), existing_nullable=False)
+    with rebuilt("bom_lines") as batch:
+        batch.drop_column("reason")
+'''
+
+ORPHANS = '''
+"""lose an item that lines refer to"""
+from alembic import op
+
+revision = "9001"
+down_revision = {head!r}
+branch_labels = depends_on = None
+
+
+def upgrade():
+    op.execute("DELETE FROM items WHERE part_number = 'PRT-400'")
+'''
+
+
+@pytest.fixture(params=RELEASES)
+def released(request: pytest.FixtureRequest, url: str, tmp_path: Path) -> Iterator[Database]:
+    """A database as a released version left it, on the kind of ``url``, not yet brought up to date."""
+    db = Database(Settings(database_url=url, files_dir=tmp_path))
+    kind = "sqlite" if db.settings.is_sqlite else "postgres"
+    dump = (FOLDER / f"{request.param}.{kind}.sql").read_text("utf-8")
+    if db.settings.sqlite_path:
+        with sqlite3.connect(db.settings.sqlite_path) as connection:
+            connection.executescript(dump)
+        connection.close()
+    else:
+        raw = db.engine.raw_connection()
+        raw.driver_connection.execute(dump)
+        raw.commit()
+        raw.invalidate()  # the dump leaves this connection without a search path
+    yield db
+    db.close()
+
+
+def test_there_are_dumps_of_every_release() -> None:
+    """The released schemas are kept here, of both databases; without them the tests below test nothing."""
+    assert RELEASES == ["0.1.0"]
+    assert len(list(FOLDER.iterdir())) == 2 * len(RELEASES)
 
 
 def test_the_migrations_make_the_tables(url: str) -> None:
     """What the migrations build and what the code expects do not differ in anything."""
     db = Database(Settings(database_url=url))
     upgrade(db)
-    with db.engine.connect() as connection:
-        differences = compare_metadata(MigrationContext.configure(connection), metadata)
-        tables = set(inspect(connection).get_table_names())
+    differences, tables = _differences(db)
     db.close()
     assert differences == []
     assert tables == set(metadata.tables) | {"alembic_version"}
@@ -43,37 +105,104 @@ def test_every_step_up_can_be_taken_alone_and_repeated(url: str) -> None:
     for revision in reversed(list(script.walk_revisions())):
         upgrade(db, revision.revision)
     upgrade(db)
-    with db.engine.connect() as connection:
-        heads = MigrationContext.configure(connection).get_current_heads()
+    assert _revision(db) == newest_revision()
     db.close()
-    assert heads == tuple(script.get_heads())
 
 
-@pytest.mark.parametrize("dump", RELEASED, ids=[path.stem for path in RELEASED])
-def test_a_released_database_comes_up_with_its_data(dump: Path, tmp_path: Path) -> None:
-    """A database as version so-and-so left it: items, BOM, history and the token are all there."""
-    path = tmp_path / "old.db"
-    with sqlite3.connect(path) as connection:
-        connection.executescript(dump.read_text("utf-8"))
-    connection.close()
-    db = Database(Settings(database_url=f"sqlite:///{path}", files_dir=tmp_path))
-    prepare(db, "silo_released_token")
-    with db.read() as tx:
-        item = get_item(tx, "ASM-001")
+def test_a_released_database_comes_up_with_its_data(released: Database) -> None:
+    """A database as an earlier version left it: every row is still there, the code works with it."""
+    before = _counts(released)
+    assert min(before.values()) > 0, "a table of the fixture is empty: run scripts/dump_release.py"
+    upgrade(released)
+    after = _counts(released)
+    differences, _ = _differences(released)
+    assert differences == []
+    assert {name: after[name] for name in before} == before
+    prepare(released, "silo_released_token")
+    with released.read() as tx:
+        item = get_item(tx, "asm-001")
         lines = {line.child_part_number: line.state for line in lines_of(tx, item)}
         newest = list_changes(tx, item)[0]
         past = {line.child.part_number: line.state for line in state_at(tx, item, newest.id)}
-    db.close()
     assert {number: state.quantity for number, state in lines.items()} == {
         "PRT-100": 1,
         "F01-0001": 12,
         "PRT-400": 2,
     }
     assert lines["PRT-400"].unreferenced_since is not None
-    assert lines["PRT-100"].source == "manual"
+    assert lines["PRT-100"].override
     assert past == lines
 
 
-def test_there_is_a_dump_of_every_release() -> None:
-    """The released schemas are kept here; without them the test above would test nothing."""
-    assert [path.stem for path in RELEASED] == ["0.1.0"]
+def test_a_revision_that_rebuilds_filled_tables_keeps_their_rows(released: Database, tmp_path: Path) -> None:
+    """Rows, references, and the rule that an id is never given out twice, all outlive a rebuild."""
+    upgrade(released)
+    with released.write() as tx:
+        newest = tx.conn.scalars(select(events.c.id).order_by(events.c.id.desc())).first()
+        tx.conn.execute(delete(events).where(events.c.id == newest))
+        if released.settings.is_sqlite:
+            tx.conn.execute(text("CREATE TRIGGER kept AFTER INSERT ON items BEGIN SELECT 1; END"))
+        before = tx.conn.execute(select(items).order_by(items.c.id)).mappings().all()
+    counts = _counts(released)
+    upgrade(released, more=_revision_file(tmp_path, REBUILD))
+    assert _revision(released) == "9001"
+    assert _counts(released) == counts
+    with released.write() as tx:
+        rows = tx.conn.execute(text("SELECT * FROM items ORDER BY id")).mappings().all()
+        assert [dict(row) for row in rows] == [{**row, "weight_class": "light"} for row in before]
+        tx.conn.execute(insert(events).values(name="new", data="{}", at=tx.stamp))
+        assert tx.conn.scalars(select(events.c.id).order_by(events.c.id.desc())).first() == newest + 1
+        if released.settings.is_sqlite:
+            kept = tx.conn.scalar(text("SELECT count(*) FROM sqlite_master WHERE name = 'kept'"))
+            assert kept == 1
+    # References are enforced again, in the very connection that did the work.
+    with pytest.raises(IntegrityError), released.write() as tx:
+        tx.conn.execute(text("DELETE FROM items WHERE part_number = 'PRT-400'"))
+
+
+def test_a_revision_that_loses_referenced_rows_is_refused(released: Database, tmp_path: Path) -> None:
+    """Nothing is changed, and nothing of the revision stays."""
+    upgrade(released)
+    before = _counts(released)
+    with pytest.raises((ConfigError, IntegrityError), match=r"bom_lines|foreign key"):
+        upgrade(released, more=_revision_file(tmp_path, ORPHANS))
+    assert _revision(released) == newest_revision()
+    assert _counts(released) == before
+
+
+def test_a_database_of_a_newer_version_is_one_sentence(
+    released: Database, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Which schema it has, which one this version knows, what to do; and the database stays as it is."""
+    upgrade(released)
+    upgrade(released, more=_revision_file(tmp_path, REBUILD))
+    assert main(["--port", "0", "--database", released.settings.database_url]) == 2
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert "schema 9001 of a newer silo-mod" in told
+    assert f"up to {newest_revision()}" in told
+    assert _revision(released) == "9001"
+
+
+def _revision_file(folder: Path, template: str) -> Path:
+    versions = folder / "versions"
+    versions.mkdir()
+    (versions / "9001_later.py").write_text(template.format(head=newest_revision()), "utf-8")
+    return versions
+
+
+def _revision(db: Database) -> str | None:
+    with db.engine.connect() as connection:
+        return MigrationContext.configure(connection).get_current_revision()
+
+
+def _differences(db: Database) -> tuple[list[object], set[str]]:
+    with db.engine.connect() as connection:
+        found = compare_metadata(MigrationContext.configure(connection), metadata)
+        return found, set(inspect(connection).get_table_names())
+
+
+def _counts(db: Database) -> dict[str, int]:
+    with db.read() as tx:
+        names = inspect(tx.conn).get_table_names()
+        return {name: tx.conn.scalar(text(f'SELECT count(*) FROM "{name}"')) or 0 for name in names}  # noqa: S608
