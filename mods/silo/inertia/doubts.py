@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from silo.inertia.codes import MassCode
+from silo.inertia.materials.density import DENSEST, LIGHTEST
 from silo.inertia.model import Prototype
 
 ROUNDING_LIMIT = 0.02
@@ -14,12 +15,6 @@ ROUNDING_LIMIT = 0.02
 
 MISMATCH_LIMIT = 0.05
 """Mass against density times volume, and STEP density against the one used: above this share is told."""
-
-DENSEST = 23_000.0
-"""[kg/m^3] nothing that parts are made of is denser (osmium has 22 590)."""
-
-LIGHTEST = 5.0
-"""[kg/m^3] no solid that parts are made of is lighter, and few hollow ones modelled as solid are."""
 
 
 @dataclass(frozen=True, slots=True)

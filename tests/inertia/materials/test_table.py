@@ -199,7 +199,8 @@ def test_a_missing_user_table_is_a_plain_error(tmp_path: Path) -> None:
     [
         ("7900 kg/m^3", 7900),
         ("1200,00 kg/m^3", 1200),
-        ("1.204 kg/m^3", 1.204),
+        ("1.204 kg/m^3", None),  # air
+        ("7,850 kg/m^3", None),
         ("1,19 g/cm³", 1190),
         ("0.2852 lb/in3", 7894.308823),
         ("7850", 7850),
@@ -213,6 +214,57 @@ def test_a_missing_user_table_is_a_plain_error(tmp_path: Path) -> None:
 def test_densities(text: str, value: float | None) -> None:
     """Units of cards and of people; what cannot be read is None."""
     assert parse_density(text) == (pytest.approx(value, rel=1e-5) if value is not None else None)
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("a.csv", 'name,density\nour steel,"7,850 kg/m3"\n'),
+        ("a.csv", "name;density\nour steel;7.850 kg/m3\n"),
+        ("a.csv", 'name,density (kg/m3)\nour steel,"7,850"\n'),
+        ("a.csv", 'name,density\nour steel,"7,850"\n'),
+        ("a.toml", '[materials]\n"our steel" = "7,850 kg/m3"\n'),
+    ],
+)
+def test_a_density_with_two_readings_is_refused_with_both(tmp_path: Path, name: str, text: str) -> None:
+    """“7,850 kg/m3” became 7.85 kg/m³, a thousand times too little, without a word."""
+    path = tmp_path / name
+    path.write_text(text, "utf-8")
+    with pytest.raises(ConfigError, match=r"7850 or 7\.85; write"):
+        load_materials([path], freecad=False)
+
+
+@pytest.mark.parametrize(
+    "text", ["7,850 g/cm3", "7.850 g/cm³", "7,850 t/m^3", "7 850 kg/m³", "7_850", "7.85e3"]
+)
+def test_a_density_that_nature_decides(tmp_path: Path, text: str) -> None:
+    """7850 g/cm³ is denser than any metal, so that one reading is left; spaces leave only one anyway."""
+    path = tmp_path / "a.csv"
+    path.write_text(f'name,density\nour steel,"{text}"\n', "utf-8")
+    hit = load_materials([path], freecad=False).find("our steel")
+    assert isinstance(hit, MaterialHit)
+    assert hit.material.density == pytest.approx(7850)
+
+
+@pytest.mark.parametrize(
+    ("density", "words"),
+    [
+        ("7850 g/cm3", "denser than any metal"),
+        ("78500", "denser than any metal"),
+        ("1.2 kg/m3", "lighter than any solid"),
+        ("0.0027 g/cm3", "lighter than any solid"),
+        ("0 kg/m3", "lighter than any solid"),
+        ("-7850", "lighter than any solid"),
+        ("1e400", "denser than any metal"),
+        ("5² g/cm3", "wanted a number"),
+    ],
+)
+def test_a_density_that_nothing_has(tmp_path: Path, density: str, words: str) -> None:
+    """The plausibility check of masses holds for the tables as well."""
+    path = tmp_path / "a.csv"
+    path.write_text(f"name,density\nour steel,{density}\n", "utf-8")
+    with pytest.raises(ConfigError, match=words):
+        load_materials([path], freecad=False)
 
 
 def test_cards_come_last(materials: Any) -> None:

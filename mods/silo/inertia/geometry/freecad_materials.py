@@ -16,9 +16,8 @@ from typing import Any
 
 from silo.bom.document import own
 from silo.inertia.geometry.freecad_places import material_uuid
-from silo.inertia.geometry.product_materials import MAX_DENSITY
 from silo.inertia.materials.cards import MAX_CARD_BYTES, card_folders
-from silo.inertia.materials.density import LOWEST_SOLID, parse_density
+from silo.inertia.materials.density import DENSEST, LIGHTEST, parse_density
 
 NO_MATERIAL = "7f9fd73b-50c9-41d8-b7b2-575a030c1eeb"
 """FreeCAD's "Default": what every untouched part has. Its 1 kg/m^3 is nobody's density."""
@@ -128,4 +127,4 @@ def _text(path: Path) -> str:
 
 
 def _sane(density: float | None) -> float | None:
-    return density if density is not None and LOWEST_SOLID <= density <= MAX_DENSITY else None
+    return density if density is not None and LIGHTEST <= density <= DENSEST else None

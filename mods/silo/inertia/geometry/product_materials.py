@@ -10,9 +10,7 @@ from __future__ import annotations
 from collections import defaultdict
 
 from silo.inertia.geometry.part21 import Part21, Typed, Value, number, ref, refs, text
-
-MIN_DENSITY, MAX_DENSITY = 1.0, 25_000.0
-"""[kg/m^3] between aerogel and osmium. Outside, the unit was written wrong, and the value is not used."""
+from silo.inertia.materials.density import DENSEST, LIGHTEST
 
 _PREFIXES = {
     ".EXA.": 1e18, ".PETA.": 1e15, ".TERA.": 1e12, ".GIGA.": 1e9, ".MEGA.": 1e6, ".KILO.": 1e3,
@@ -75,7 +73,7 @@ def _density(source: Part21, item: tuple[Value, ...]) -> tuple[float | None, str
     if value is None or factor is None:
         return None, "a density is given, but its unit cannot be read; it is not used"
     density = value * factor
-    if not MIN_DENSITY <= density <= MAX_DENSITY:
+    if not LIGHTEST <= density <= DENSEST:
         return None, (
             f"a density of {density:.4g} kg/m3 is given, which no material has; its unit must be wrong, and "
             "it is not used"

@@ -16,7 +16,7 @@ from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
-from silo.inertia.materials.density import LOWEST_SOLID, parse_density
+from silo.inertia.materials.density import parse_density
 from silo.inertia.materials.table import Material
 
 MAX_CARD_BYTES = 1_000_000
@@ -81,7 +81,7 @@ def read_cards(folders: Iterable[Path]) -> list[Material]:
     found: dict[str, Material] = {}
     for path, text in texts:
         density = _density(text, by_uuid, depth=0)
-        if density is None or density < LOWEST_SOLID:
+        if density is None:
             continue
         name = _NAME.search(text)
         title = name[1] if name else path.stem

@@ -5,42 +5,83 @@ from __future__ import annotations
 
 import math
 import re
-import unicodedata
+from typing import NamedTuple
 
-from silo.bom.numbers import Mark, parse_number
+from silo.bom.numbers import LONGEST, parse_number, plain, plain_text, read_number
 from silo.inertia.bom.masses import MASS_UNITS
 
-LOWEST_SOLID = 5.0
-"""[kg/m^3] below this a card is no engineering material: FreeCAD's "Default" has 1, "None" 0, air 1.2."""
+LIGHTEST = 5.0
+"""[kg/m^3] no solid that parts are made of is lighter. FreeCAD's "Default" card has 1, "None" 0, air 1.2."""
+
+DENSEST = 23_000.0
+"""[kg/m^3] nothing that parts are made of is denser (osmium has 22 590)."""
 
 _VOLUMES = {"m": 1.0, "dm": 1e-3, "cm": 1e-6, "mm": 1e-9, "in": 0.0254**3, "ft": 0.3048**3, "l": 1e-3}
 _SHAPE = re.compile(
-    r"(?P<number>[\d.,\s']+(?:e[+-]?\d+)?)\s*(?P<mass>[a-zµ]+)\s*/\s*(?P<volume>[a-z]+)\s*\^?\s*3?"
+    r"(?P<number>[^a-zµ]+(?:e[+-]?\d+)?)\s*(?P<mass>[a-zµ]+)\s*/\s*(?P<volume>[a-z]+)\s*\^?\s*3?"
 )
+
+
+class DensityCell(NamedTuple):
+    """What a text says: ``value`` [kg/m^3], or why it was refused in words that end a sentence.
+
+    has_unit
+        False where the unit came from elsewhere, or kg/m^3 was assumed.
+    """
+
+    value: float | None
+    problem: str = ""
+    has_unit: bool = False
 
 
 def unit_factor(unit: str) -> float | None:
     """kg/m^3 per ``unit`` ("g/cm^3"); None where it is no unit of density."""
-    return parse_density(f"1 {unit}")
+    found = _SHAPE.fullmatch(f"1 {_plain(unit)}")
+    return _factor(found) if found else None
+
+
+def read_density(text: str, factor: float = 1.0, *, points_are_decimal: bool = False) -> DensityCell:
+    """A density that a person wrote: "7.85 g/cm³", "7850". ``factor``: of a number without a unit.
+
+    "7,850 g/cm3" is 7.85, for nothing is denser than a metal; "7,850 kg/m3" is refused with both readings.
+    What no solid weighs is refused.
+    """
+    cell = _plain(text)
+    found = _SHAPE.fullmatch(cell)
+    if found is not None:
+        own = _factor(found)
+        if own is None:
+            return DensityCell(None, f"wanted a unit such as kg/m3 or g/cm3, got “{text.strip()[:LONGEST]}”")
+        factor, cell = own, found["number"].strip()
+    has_unit = found is not None
+    number = parse_number(cell)
+    if number is not None and number.other is not None and float(number.other) * factor > DENSEST:
+        value = float(number.exact)  # the other reading is denser than any metal
+    else:
+        reading = read_number(cell, points_are_decimal=points_are_decimal)
+        if reading.value is None:
+            return DensityCell(None, reading.problem, has_unit)
+        value = float(reading.value)
+    value *= factor
+    if not LIGHTEST <= value <= DENSEST:
+        than = "lighter than any solid" if value < LIGHTEST else "denser than any metal"
+        shown = f"{plain(value):.6g} kg/m³" if math.isfinite(value) else "that"
+        return DensityCell(None, f"{shown} is {than}; is the unit or the decimal mark wrong?", has_unit)
+    return DensityCell(value, "", has_unit)
 
 
 def parse_density(text: str) -> float | None:
-    """[kg/m^3]; a bare number is kg/m^3 already. None where it cannot be read or is not above zero."""
-    cell = unicodedata.normalize("NFKC", text).strip().strip("\"'").casefold()
-    found = _SHAPE.fullmatch(cell)
-    number = parse_number(found["number"] if found else cell, _mark(found["number"] if found else cell))
-    if number is None:
-        return None
-    factor = 1.0
-    if found is not None:
-        mass, volume = MASS_UNITS.get(found["mass"]), _VOLUMES.get(found["volume"])
-        if mass is None or volume is None:
-            return None
-        factor = mass / volume
-    value = number.value * factor
-    return value if math.isfinite(value) and value > 0 else None
+    """[kg/m^3] of a text that a program wrote, such as a material card; points are decimal marks.
+
+    None where it cannot be read, or no solid weighs that.
+    """
+    return read_density(text, points_are_decimal=True).value
 
 
-def _mark(text: str) -> Mark:
-    # Densities are not written with thousands separators in material cards ("1.204 kg/m^3" is air).
-    return Mark.COMMA if "," in text and "." not in text else Mark.POINT
+def _plain(text: str) -> str:
+    return re.sub(r"³$", "3", plain_text(text).strip("\"'")).casefold().replace("μ", "µ")
+
+
+def _factor(found: re.Match[str]) -> float | None:
+    mass, volume = MASS_UNITS.get(found["mass"]), _VOLUMES.get(found["volume"])
+    return None if mass is None or volume is None else mass / volume

@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from silo.bom.errors import ConfigError
-from silo.inertia.materials.density import parse_density, unit_factor
+from silo.bom.numbers import parse_number
+from silo.inertia.materials.density import read_density, unit_factor
 from silo.inertia.materials.table import Material
 from silo.inertia.materials.words import Words, words
 
@@ -109,17 +110,23 @@ def _toml_rows(text: str, source: str) -> tuple[Material, ...]:
 def _material(
     name: str, density: str, aliases: list[str], source: str, family: str, factor: float | None
 ) -> Material | str:
-    """``factor``: kg/m^3 per unit of the header, None where there is none. What is wrong, in words, else."""
-    value = parse_density(density)
-    if not name or value is None:
-        return f"wanted a name and a density above 0, got “{name}” and “{density}”"
-    bare = re.fullmatch(r"[\d.,eE+\-]+", density) is not None
-    if bare and factor is None and value < UNIT_NEEDED_BELOW:
+    """``factor``: kg/m^3 per unit of the header, None where it states none. What is wrong, in words, else."""
+    if not name:
+        return f"wanted a name, got none for the density “{density}”"
+    cell = read_density(density, factor or 1.0)
+    if not cell.has_unit and factor is None and _is_below(density, UNIT_NEEDED_BELOW):
         return (
             f"“{name}” has the density {density} without a unit; as kg/m³ it would be lighter than a foam. "
             f"Write “{density} g/cm3” or “{density} kg/m3”"
         )
-    return Material(name, value * (factor or 1.0) if bare else value, tuple(aliases), source, family)
+    if cell.value is None:
+        return f"the density of “{name}”: {cell.problem}"
+    return Material(name, cell.value, tuple(aliases), source, family)
+
+
+def _is_below(text: str, limit: float) -> bool:
+    number = parse_number(text)
+    return number is not None and not number.ambiguous and 0 < number.value < limit
 
 
 def _checked(rows: list[Material], problems: list[str], source: str) -> tuple[Material, ...]:
