@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 from silo.api.client import SiloClient
-from silo.api.transport import Retries
+from silo.api.policy import Retries
 
 
 @dataclass
@@ -167,7 +167,7 @@ def pauses() -> list[float]:
 @pytest.fixture
 def client(server: ScriptedServer, pauses: list[float]) -> Iterator[SiloClient]:
     """A client of the scripted server that does not really pause."""
-    retries = Retries(first=0.5, chance=lambda: 0.5, sleep=pauses.append)
+    retries = Retries(first=0.5, chance=lambda: 0.0, sleep=pauses.append)
     with SiloClient(server.url, "silo_secret", timeout=(5, 10), retries=retries) as made:
         yield made
 

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from silo.api.client import SiloClient
-from silo.api.events import Backoff, Connection, ConnectionState, EventListener, ServerEvent
+from silo.api.events import SELDOM, Backoff, Connection, ConnectionState, EventListener, ServerEvent
 from silo.bom.errors import AuthError, ServerFaultError, UnreachableError
 from silo.testing import FakeSilo
 
@@ -178,12 +178,37 @@ def test_a_token_that_is_refused_is_not_tried_again(
         assert watch.event().id == "1"
 
 
-def test_a_server_without_events_is_not_asked_again(server: Any, client: SiloClient, answer: Any) -> None:
-    """An older server."""
-    server.on(EVENTS, answer(404, "404 page not found"))
+def test_a_server_without_events_is_asked_again_but_rarely(
+    server: Any, client: SiloClient, stream: Callable[..., Any], answer: Any
+) -> None:
+    """An older server; it may be updated while FreeCAD runs."""
+    server.on(EVENTS, answer(404, "404 page not found"), stream(frame(1), stay=True))
     with Watch(client) as watch:
-        watch.state(Connection.UNSUPPORTED)
-    assert len(server.seen) == 1
+        assert watch.state(Connection.UNSUPPORTED).retry_in == SELDOM
+        assert watch.event().id == "1"
+
+
+def test_a_web_page_of_a_proxy_is_a_passing_loss(
+    server: Any, client: SiloClient, stream: Callable[..., Any], answer: Any
+) -> None:
+    """A proxy answers 404 with its own page while the server behind it restarts."""
+    page = answer(404, "<html><title>404 Not Found</title></html>", {"Content-Type": "text/html"})
+    server.on(EVENTS, page, page, stream(frame(1), stay=True))
+    with Watch(client) as watch:
+        assert watch.state(Connection.OFFLINE).retry_in == 1.0
+        assert watch.event().id == "1"
+    assert watch.pauses[:2] == [1.0, 2.0]
+
+
+def test_the_pause_that_the_server_named_is_kept(
+    server: Any, client: SiloClient, stream: Callable[..., Any], answer: Any
+) -> None:
+    """And named to the person."""
+    server.on(EVENTS, answer(503, {}, {"Retry-After": "77"}), stream(frame(1), stay=True))
+    with Watch(client) as watch:
+        said = watch.state(Connection.OFFLINE)
+        assert (said.retry_in, "in 77 s" in said.message) == (77.0, True)
+        assert watch.event().id == "1"
 
 
 def test_a_stream_that_falls_silent_is_dead(server: Any, stream: Callable[..., Any]) -> None:

@@ -19,7 +19,7 @@ import pytest
 from silo.api.client import SiloClient
 from silo.api.events import Backoff
 from silo.api.outbox import Outbox, State, default_path
-from silo.api.transport import Retries
+from silo.api.policy import Retries
 from silo.api.wire import MergeEntry, MergeRequest, MergeResult, Revision, SourceDocument
 from silo.bom.errors import (
     AuthError,

@@ -15,6 +15,7 @@ from silo.api.replies import Reply, complaint, error_of
 from silo.api.wire import BomLine, Item
 from silo.bom.errors import (
     AuthError,
+    BusyError,
     ConflictError,
     CycleError,
     ForbiddenError,
@@ -75,7 +76,7 @@ def test_error_bodies_of_every_form_are_read(body: Any, text: str) -> None:
         (413, RejectedError),
         (415, RejectedError),
         (422, RejectedError),
-        (429, UnreachableError),
+        (429, BusyError),
         (500, ServerFaultError),
         (501, RouteMissingError),
         (502, UnreachableError),

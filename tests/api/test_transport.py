@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from silo.api.client import SiloClient
-from silo.api.transport import Retries
+from silo.api.policy import Retries
 from silo.api.wire import MergeEntry, MergeRequest
 from silo.bom.errors import (
     AuthError,

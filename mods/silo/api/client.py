@@ -21,9 +21,10 @@ from silo.api.address import ServerAddress
 from silo.api.boms import BomCalls
 from silo.api.items import ItemCalls
 from silo.api.multipart import Progress
+from silo.api.policy import Retries
 from silo.api.sse import ServerEvent
 from silo.api.stream import SILENCE, HttpEventStream, open_stream
-from silo.api.transport import Call, Cancel, Retries, Timeouts, Transport, stop_if
+from silo.api.transport import Call, Cancel, Timeouts, Transport, stop_if
 from silo.api.wire import Revision, ServerState, User
 
 

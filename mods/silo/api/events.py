@@ -17,7 +17,9 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol, TypeVar
 
+from silo.api.policy import Backoff, told_wait
 from silo.api.protocol import EventStream
+from silo.api.replies import WebPageError
 from silo.api.sse import HEARTBEAT, MERGE, RESET, STATE, ServerEvent, SseParser, parse
 from silo.api.wire import MergeEvent, ServerState
 from silo.bom.errors import AuthError, RejectedError, RouteMissingError, SiloError
@@ -49,9 +51,12 @@ class Connection(StrEnum):
     DEGRADED = "degraded"  # events come in, a part of the server fails
     OFFLINE = "offline"  # no connection; it is tried again
     REFUSED = "refused"  # the token is not accepted; not tried again
-    UNSUPPORTED = "unsupported"  # the server has no events; not tried again
+    UNSUPPORTED = "unsupported"  # the server has no events; tried again rarely, it may be updated
     STOPPED = "stopped"  # by stop()
 
+
+SELDOM = 300.0
+"""Seconds between two attempts at a server that does not know events."""
 
 _MODES = {"read-only": Connection.READ_ONLY, "degraded": Connection.DEGRADED}
 
@@ -67,20 +72,6 @@ class ConnectionState:
     def __str__(self) -> str:
         again = f"; next try in {self.retry_in:.0f} s" if self.retry_in is not None else ""
         return f"{self.kind}: {self.message}{again}" if self.message else str(self.kind)
-
-
-@dataclass(frozen=True)
-class Backoff:
-    """Growing pauses, in seconds."""
-
-    first: float = 1.0
-    factor: float = 2.0
-    longest: float = 60.0
-
-    def pause(self, attempt: int, chance: float) -> float:
-        """The pause after failed attempt ``attempt`` (from 1); ``chance`` in [0, 1) takes off up to half."""
-        full = min(self.longest, self.first * self.factor ** min(attempt - 1, 60))
-        return full * (1.0 - chance / 2.0)
 
 
 @dataclass
@@ -182,12 +173,10 @@ class EventListener:
         failures = 0
         while not stop.is_set():
             self._tell(stop, ConnectionState(Connection.CONNECTING))
-            heard = _Heard()
+            heard, kind, told = _Heard(), Connection.OFFLINE, None
             try:
                 self._listen(stop, heard)
                 reason = "the server ended the connection"
-            except RouteMissingError as error:
-                return self._tell(stop, ConnectionState(Connection.UNSUPPORTED, str(error)))
             except AuthError as error:
                 return self._tell(stop, ConnectionState(Connection.REFUSED, str(error)))
             except RejectedError as error:
@@ -195,13 +184,16 @@ class EventListener:
                 reason = str(error)
                 self._forget_mark(stop)
             except SiloError as error:
-                reason = str(error)
+                reason, told = str(error), told_wait(error)
+                # A proxy answers with a page of its own while the server behind it starts.
+                if isinstance(error, RouteMissingError) and not isinstance(error, WebPageError):
+                    kind, told = Connection.UNSUPPORTED, SELDOM
             if stop.is_set():
                 return None
             # Only what was really received counts as success: a server that greets and drops us is not up.
             failures = 1 if heard.anything else failures + 1
-            pause = self._backoff.pause(failures, self._chance())
-            self._tell(stop, ConnectionState(Connection.OFFLINE, reason, pause))
+            pause = self._backoff.pause(failures, self._chance(), told)
+            self._tell(stop, ConnectionState(kind, reason, pause))
             self._wait(wake, pause)
             if not stop.is_set():
                 wake.clear()

@@ -20,7 +20,14 @@ import requests
 import urllib3.exceptions as u3
 from requests import exceptions as rq
 
-from silo.bom.errors import ConfigError, InputError, ServerFaultError, SiloError, UnreachableError
+from silo.bom.errors import (
+    ConfigError,
+    InputError,
+    NotSentError,
+    ServerFaultError,
+    SiloError,
+    UnreachableError,
+)
 
 FOREIGN: tuple[type[Exception], ...] = (
     rq.RequestException,
@@ -50,20 +57,20 @@ class Where:
 
 
 def _refused(where: Where) -> SiloError:
-    return UnreachableError(
+    return NotSentError(
         f"nothing answers at {where.host}: is the Silo server running, and is the address right? "
         "`silo-mod serve` starts one on this computer"
     )
 
 
 def _unknown_name(where: Where) -> SiloError:
-    return UnreachableError(
+    return NotSentError(
         f"the name in {where.host} is not known here: check the address, the network or the VPN"
     )
 
 
 def _slow_connect(where: Where) -> SiloError:
-    return UnreachableError(
+    return NotSentError(
         f"{where.host} could not be reached within {where.connect:g} s: check the network or the VPN"
     )
 
@@ -79,16 +86,14 @@ def _broken(where: Where) -> SiloError:
 
 
 def _tls(where: Where) -> SiloError:
-    return UnreachableError(
+    return NotSentError(
         f"no secure connection to {where.host}: its certificate is not trusted here, or it speaks no https. "
         "For an own certificate authority give its file in SILO_SSL_VERIFY"
     )
 
 
 def _proxy(where: Where) -> SiloError:
-    return UnreachableError(
-        f"the proxy on the way to {where.host} does not let us through; check its settings"
-    )
+    return NotSentError(f"the proxy on the way to {where.host} does not let us through; check its settings")
 
 
 def _address(where: Where) -> SiloError:

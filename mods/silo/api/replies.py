@@ -10,8 +10,10 @@ from __future__ import annotations
 import html
 import json
 import re
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from email.utils import parsedate_to_datetime
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, TypeAdapter
@@ -19,12 +21,14 @@ from pydantic import BaseModel, TypeAdapter
 from silo.api.failures import Where, translated
 from silo.bom.errors import (
     AuthError,
+    BusyError,
     ConflictError,
     CycleError,
     ForbiddenError,
     NotFoundError,
     ReadOnlyError,
     RejectedError,
+    RemoteError,
     RouteMissingError,
     ServerFaultError,
     SiloError,
@@ -41,6 +45,8 @@ _TITLE = re.compile(r"<title[^>]*>(.{1,200}?)</title>", re.IGNORECASE | re.DOTAL
 _ROUTER_SAYS = {"404 page not found", "Not Found", "Method Not Allowed"}
 # Codes of a 503 that says "I am not well", not "I take no changes".
 _AWAY = {"unavailable", "busy", "degraded", "overloaded"}
+_READ_ONLY = re.compile(r"read.?only", re.IGNORECASE)
+_LATER = (408, 429, 502, 503, 504)
 
 
 class WebPageError(RouteMissingError):
@@ -173,14 +179,47 @@ def error_of(reply: Reply, *, writing: bool = False) -> SiloError:
         return VersionConflictError(
             f"{asked}: somebody changed it meanwhile{told}. Read it again, then repeat"
         )
-    if status == 503 and writing and not reply.is_html and said.code not in _AWAY:
-        return ReadOnlyError(f"{host} takes no changes now{told}. Nothing is lost; it can be sent later")
-    if status in (408, 429, 502, 503, 504):
-        return UnreachableError(f"{host} cannot answer now ({status}){told}. Try again later")
+    later = retry_after(reply) if status in _LATER else None
+    if status == 503 and writing and not reply.is_html and _read_only(said, later):
+        return _put_off(
+            ReadOnlyError(f"{host} takes no changes now{told}. Nothing is lost; it can be sent later"), later
+        )
+    if status == 429 or (status == 503 and later is not None):
+        when = f"in {_duration(later)}" if later is not None else "later"
+        return _put_off(BusyError(f"{host} is busy ({status}){told}. Try again {when}"), later)
+    if status in _LATER:
+        gone = UnreachableError(f"{host} cannot answer now ({status}){told}. Try again later")
+        return _put_off(gone, later)
     if 400 <= status < 500:
         what = "; ".join(said.problems[:10]) or said.text or "no reason given"
         return RejectedError(f"{asked}: not accepted ({status}): {what}", said.problems)
     return ServerFaultError(f"{asked}: the server failed ({status}){told}")
+
+
+def retry_after(reply: Reply) -> float | None:
+    """The pause that the answer asks for, in seconds; None where it names none that can be read."""
+    text = reply.headers.get("Retry-After", "").strip()
+    if text.isascii() and text.isdigit():
+        return float(text[:9])
+    try:
+        return max(0.0, parsedate_to_datetime(text).timestamp() - time.time())
+    except (ValueError, TypeError, OverflowError):
+        return None
+
+
+def _put_off(error: RemoteError, seconds: float | None) -> RemoteError:
+    error.retry_after = seconds
+    return error
+
+
+def _read_only(said: Complaint, later: float | None) -> bool:
+    # A server that names a time is busy, unless it says itself that it is read-only.
+    named = _READ_ONLY.search(f"{said.code} {said.text}") is not None
+    return named or (later is None and said.code not in _AWAY)
+
+
+def _duration(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.0f} min"
 
 
 def _router_speaks(said: Complaint) -> bool:

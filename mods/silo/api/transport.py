@@ -3,7 +3,7 @@
 
 The rules of this module:
 
-* a request is repeated only where that is harmless (``Call.repeatable``), a few times, with growing pauses;
+* a request is repeated only as :mod:`silo.api.policy` allows, a few times, with growing pauses;
 * the token goes to the configured server only, never along a redirect to another, never from https to http;
 * a changing request (POST, PUT) follows a redirect only within the configured server and with its body;
 * an answer has an upper size and an upper duration, however slowly it drips.
@@ -11,12 +11,10 @@ The rules of this module:
 
 from __future__ import annotations
 
-import random
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
-from email.utils import parsedate_to_datetime
 from typing import Any, Protocol
 from urllib.parse import urljoin, urlsplit
 
@@ -27,6 +25,7 @@ from requests.auth import AuthBase
 
 from silo.api.address import Origin, ServerAddress, may_carry_token, origin_of
 from silo.api.failures import Where, translated
+from silo.api.policy import Retries
 from silo.api.replies import Reply, error_of
 from silo.bom.errors import (
     AuthError,
@@ -39,7 +38,6 @@ from silo.bom.errors import (
 
 MAX_REDIRECTS = 5
 MAX_ERROR = 1 << 20
-_BUSY = (408, 429, 502, 503, 504)
 _CAN_UNPACK = hasattr(urllib3.HTTPResponse, "read1")
 _CHUNK = 1 << 16
 
@@ -59,33 +57,6 @@ class Timeouts:
     connect: float = 5.0
     read: float = 30.0
     total: float = 300.0
-
-
-@dataclass(frozen=True)
-class Retries:
-    """How often to try in all, the first pause and the longest one (seconds).
-
-    ``chance`` gives numbers in [0, 1) that spread many clients out; ``sleep`` waits.
-    """
-
-    tries: int = 3
-    first: float = 0.25
-    longest: float = 10.0
-    chance: Callable[[], float] = random.random
-    sleep: Callable[[float], object] = time.sleep
-
-    def pause(self, attempt: int, told: float | None) -> float | None:
-        """Seconds to wait after failed attempt number ``attempt`` (from 1); None means give up.
-
-        ``told`` is the server's own Retry-After.
-        """
-        if attempt >= self.tries or (told is not None and told > self.longest):
-            return None
-        return (
-            told
-            if told is not None
-            else min(self.longest, self.first * 2.0 ** (attempt - 1)) * (0.5 + self.chance())
-        )
 
 
 @dataclass(frozen=True)
@@ -174,26 +145,20 @@ class Transport:
         while True:
             attempt += 1
             stop_if(call.cancelled)
-            error, told = self._attempt(call)
-            if isinstance(error, Reply):
-                return error
-            # A read-only server stays so until a person changes that; waiting here would help nobody.
-            again = call.repeatable and isinstance(error, UnreachableError)
-            wait = self._retries.pause(attempt, told) if again else None
-            if wait is None:
-                raise error
+            try:
+                return self._attempt(call)
+            except SiloError as error:
+                wait = self._retries.pause(attempt, error, harmless=call.repeatable)
+                if wait is None:
+                    raise
             self._rest(wait, call.cancelled)
 
-    def _attempt(self, call: Call) -> tuple[Reply | SiloError, float | None]:
-        try:
-            with self.opened(call) as response:
-                reply = self.reply(response, call)
-        except UnreachableError as error:
-            return error, None
-        if reply.ok:
-            return reply, None
-        told = _retry_after(reply) if reply.status in _BUSY else None
-        return error_of(reply, writing=call.writing), told
+    def _attempt(self, call: Call) -> Reply:
+        with self.opened(call) as response:
+            reply = self.reply(response, call)
+        if not reply.ok:
+            raise error_of(reply, writing=call.writing)
+        return reply
 
     @contextmanager
     def opened(self, call: Call, read_timeout: float | None = None) -> Iterator[requests.Response]:
@@ -319,16 +284,6 @@ def _check_redirect(
             f"{home.host} redirects a change to {shown}: not followed. If that is the Silo server, "
             "set it as the server address"
         )
-
-
-def _retry_after(reply: Reply) -> float | None:
-    text = reply.headers.get("Retry-After", "").strip()
-    if text.isascii() and text.isdigit():
-        return float(text[:9])
-    try:
-        return max(0.0, parsedate_to_datetime(text).timestamp() - time.time())
-    except (ValueError, TypeError, OverflowError):
-        return None
 
 
 def _new_session() -> requests.Session:

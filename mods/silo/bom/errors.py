@@ -9,6 +9,8 @@
     │   └── ConfigError         the configuration is missing or contradicts itself
     ├── RemoteError             the server's, or the way to it
     │   ├── UnreachableError    no answer (no network, refused, timed out)
+    │   │   ├── NotSentError    the request did not leave this computer
+    │   │   └── BusyError       429, 503 with Retry-After: not processed, ask again later
     │   ├── AuthError           401: who are you
     │   │   └── ForbiddenError  403: you may not
     │   ├── NotFoundError       404
@@ -62,7 +64,9 @@ class ConfigError(InputError):
 
 
 class RemoteError(SiloError):
-    """The server's fault, or that of the way to it."""
+    """The server's fault, or that of the way to it. ``retry_after``: the pause it asks for, in seconds."""
+
+    retry_after: float | None = None
 
     status_hint = 502
     code = "remote"
@@ -73,6 +77,19 @@ class UnreachableError(RemoteError):
 
     status_hint = 504
     code = "unreachable"
+
+
+class NotSentError(UnreachableError):
+    """The request did not leave this computer: no such host, refused. Sending again is safe."""
+
+    code = "not_sent"
+
+
+class BusyError(UnreachableError):
+    """429, or 503 with Retry-After: the server did not process the request and wants it later."""
+
+    status_hint = 503
+    code = "busy"
 
 
 class AuthError(RemoteError):
