@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from inertia_step import OURS, ROOT, USUAL, machine, measured, median
 
-sys.path.insert(0, str(ROOT / "tests" / "inertia" / "geometry"))
+sys.path.insert(0, str(ROOT / "tests" / "support"))
 
 PARTS = 20
 

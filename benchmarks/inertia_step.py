@@ -36,9 +36,9 @@ import json, resource, sys, time
 from pathlib import Path
 import numpy as np
 from silo.inertia.core import combine_arrays, place
-from silo.inertia.geometry import occt
+from silo.inertia.geometry.kernel import occt
 from silo.inertia.geometry.options import ReadOptions
-from silo.inertia.geometry.step import read_step
+from silo.inertia.geometry.step.read import read_step
 from silo.inertia.geometry.worker import without
 without("scipy", "networkx")
 import trimesh.triangles
@@ -67,7 +67,7 @@ from OCP.GProp import GProp_GProps
 from OCP.STEPControl import STEPControl_Reader
 from OCP.TopAbs import TopAbs_SOLID
 from OCP.TopExp import TopExp_Explorer
-from silo.inertia.geometry import occt
+from silo.inertia.geometry.kernel import occt
 occt.quiet()
 begin = time.process_time()
 reader = STEPControl_Reader()

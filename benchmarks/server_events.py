@@ -14,12 +14,15 @@ import argparse
 import asyncio
 import json
 import statistics
+import sys
 import tempfile
 import time
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from silo_server.testing import Api, Databases, ServerProcess, bom, merge_body
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
+
+from server_testing import Api, Databases, ServerProcess, bom, merge_body
 
 TOKEN = "silo_benchmark"
 

@@ -4,17 +4,20 @@
     python benchmarks/server_kill.py [sqlite] [postgres] [--kills N] [--seed N]
 
 Ends with an error where a BOM was between old and new, the history did not add up, or a retry got a wrong
-answer (``silo_server.testing.kill`` says what is done).
+answer (``server_testing.kill`` says what is done).
 """
 
 from __future__ import annotations
 
 import argparse
+import sys
 import tempfile
 from pathlib import Path
 
-from silo_server.testing import Databases
-from silo_server.testing.kill import kill_rounds
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
+
+from server_testing import Databases
+from server_testing.kill import kill_rounds
 
 
 def main() -> None:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import statistics
+import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -21,7 +22,10 @@ from pathlib import Path
 from silo_server.db.engine import Database
 from silo_server.services.items import NewItem, create_item
 from silo_server.settings import Settings
-from silo_server.testing import Api, Databases, ServerProcess, bom, merge_body
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
+
+from server_testing import Api, Databases, ServerProcess, bom, merge_body
 
 SIZES = (100, 1_000, 10_000)
 TOKEN = "silo_benchmark"

@@ -15,9 +15,9 @@ from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
+from server_testing import Api
 
 from silo_server.run import RunningServer, running_server
-from silo_server.testing import Api
 
 TOKEN = "silo_" + "browser0" * 5
 SECONDS = 20

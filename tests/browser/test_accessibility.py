@@ -16,8 +16,7 @@ from typing import Any
 
 import pytest
 from playwright.sync_api import Page
-
-from silo_server.testing import Api, bom
+from server_testing import Api, bom
 
 Visit = Callable[..., Page]
 

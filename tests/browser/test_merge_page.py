@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import pytest
 from playwright.sync_api import Page, Route, expect
+from server_testing import Api, bom, wait_until
 
 from silo_server.run import RunningServer
-from silo_server.testing import Api, bom, wait_until
 
 Visit = Callable[..., Page]
 

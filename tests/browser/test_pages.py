@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 from playwright.sync_api import Locator, Page, Route, expect
-
-from silo_server.testing import Api, bom, form_body
+from server_testing import Api, bom, form_body
 
 Visit = Callable[..., Page]
 

@@ -8,8 +8,7 @@ from collections.abc import Callable
 
 import pytest
 from playwright.sync_api import Locator, Page, expect
-
-from silo_server.testing import Api
+from server_testing import Api
 
 Visit = Callable[..., Page]
 

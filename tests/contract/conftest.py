@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
+from server_testing import Api, Databases
 
 from silo_server.run import RunningServer, running_server
-from silo_server.testing import Api, Databases
 
 TOKEN = "silo_" + "0123456789abcdef" * 2
 

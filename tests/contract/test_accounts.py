@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from server_testing import Answer, Api, Databases, bom, merge_body
 from sqlalchemy import select
 
 from silo_server.db.tables import metadata
 from silo_server.run import RunningServer, running_server
 from silo_server.settings import Settings
-from silo_server.testing import Answer, Api, Databases, bom, merge_body
 
 PASSWORD = "correct horse battery"
 

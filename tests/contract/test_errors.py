@@ -7,11 +7,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from server_testing import Api, Databases, bom, form_body, merge_body
 
 from silo.api.wire import ErrorBody
 from silo_server.run import RunningServer, running_server
 from silo_server.settings import Settings
-from silo_server.testing import Api, Databases, bom, form_body, merge_body
 
 
 @pytest.mark.parametrize(

@@ -8,10 +8,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from server_testing import Api, Databases, bom, form_body, wait_until
 
 from silo_server.run import RunningServer, running_server
 from silo_server.settings import Settings
-from silo_server.testing import Api, Databases, bom, form_body, wait_until
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ import uuid
 import zipfile
 from typing import Any
 
-from silo_server.testing import Answer, Api, form_body
+from server_testing import Answer, Api, form_body
 
 PNG = b"\x89PNG\r\n\x1a\n" + b"picture"
 

@@ -7,8 +7,7 @@ import threading
 import uuid
 
 import pytest
-
-from silo_server.testing import Api, bom
+from server_testing import Api, bom
 
 
 def test_an_item_gets_a_number_of_its_category(api: Api) -> None:

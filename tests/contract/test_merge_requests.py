@@ -8,8 +8,7 @@ import threading
 from typing import Any
 
 import pytest
-
-from silo_server.testing import Api, bom, merge_body
+from server_testing import Api, bom, merge_body
 
 
 def test_the_same_request_twice_gives_the_same_state(api: Api) -> None:

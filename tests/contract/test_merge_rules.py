@@ -6,8 +6,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-
-from silo_server.testing import Api, bom
+from server_testing import Api, bom
 
 HUMAN_FIELDS: dict[str, Any] = {
     "notes": "torque 12 Nm",

@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from server_testing import Api
 
 from silo_server.app import create_app
 from silo_server.run import RunningServer
 from silo_server.settings import Settings
-from silo_server.testing import Api
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")

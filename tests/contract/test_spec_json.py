@@ -7,9 +7,9 @@ import re
 from typing import Any
 
 import pytest
+from server_testing import Api, bom
 
 from silo.api.wire import MergeEvent, MergeResult
-from silo_server.testing import Api, bom
 
 REQUEST = {
     "source": "assembly",

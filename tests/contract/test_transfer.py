@@ -8,8 +8,7 @@ import io
 
 import pytest
 from openpyxl import load_workbook
-
-from silo_server.testing import Api, bom, form_body
+from server_testing import Api, bom, form_body
 
 EVIL = ['=HYPERLINK("http://x")', "+1+1", "-2", "@SUM(A1)", "\t=1", "＝1"]
 

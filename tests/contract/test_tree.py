@@ -4,8 +4,7 @@
 from __future__ import annotations
 
 import pytest
-
-from silo_server.testing import Api, bom
+from server_testing import Api, bom
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ from silo.inertia.model import Assembly, GeometryCode
 
 pytestmark = [pytest.mark.freecad, pytest.mark.slow]
 
-PLACES = REPOSITORY / "tests" / "inertia" / "geometry" / "freecad_shapes.py"
+PLACES = REPOSITORY / "tests" / "inertia" / "geometry" / "freecad" / "freecad_shapes.py"
 MATERIALS = Path(__file__).with_name("shape_cases") / "materials.py"
 # Resolved, for FreeCAD names a file that a link leads to by its own place.
 PUBLIC = (REPOSITORY.parent / "shared").resolve() / "data" / "assemblies"

@@ -23,6 +23,7 @@ from hypothesis.stateful import (
     rule,
     run_state_machine_as_test,
 )
+from server_testing import Databases, merge_body
 
 from silo.bom.errors import ConflictError, NotFoundError, RejectedError, VersionConflictError
 from silo_server.bootstrap import prepare
@@ -35,7 +36,6 @@ from silo_server.services.merge import merge_bom, preview_merge
 from silo_server.services.merge_request import read_merge_order
 from silo_server.services.review import Action, Decision, open_conflicts, resolve
 from silo_server.settings import Settings
-from silo_server.testing import Databases, merge_body
 from silo_server.values import Actor, Role
 
 PARTS = ["P-1", "P-2", "P-3", "P-4", "P-5"]

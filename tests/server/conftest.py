@@ -7,11 +7,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from server_testing import Databases
 
 from silo_server.bootstrap import prepare
 from silo_server.db.engine import Database
 from silo_server.settings import Settings
-from silo_server.testing import Databases
 
 KINDS = ["sqlite", pytest.param("postgres", marks=pytest.mark.postgres)]
 

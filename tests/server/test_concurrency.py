@@ -8,8 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-
-from silo_server.testing import Api, ServerProcess, bom, merge_body
+from server_testing import Api, ServerProcess, bom, merge_body
 
 CLIENTS = 50
 

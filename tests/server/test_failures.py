@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from server_testing import Api
 from sqlalchemy.exc import DataError, IntegrityError, OperationalError
 
 from silo_server.app import create_app
@@ -14,7 +15,6 @@ from silo_server.bootstrap import prepare
 from silo_server.db.engine import Database
 from silo_server.run import RunningServer, running_server
 from silo_server.settings import Settings
-from silo_server.testing import Api
 
 
 @pytest.fixture

@@ -9,12 +9,12 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
+from server_testing import Api
 
 from silo_server.db.engine import Database
 from silo_server.events.hub import RING_EVENTS
 from silo_server.run import RunningServer, running_server
 from silo_server.services import events as log
-from silo_server.testing import Api
 from silo_server.values import NewEvent, dumps
 
 TOKEN = "silo_hub"

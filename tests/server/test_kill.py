@@ -6,8 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-
-from silo_server.testing.kill import kill_rounds
+from server_testing.kill import kill_rounds
 
 
 @pytest.mark.slow

@@ -9,12 +9,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from server_testing import Api, Databases, ServerProcess, wait_until
 
 from silo.bom.errors import ConfigError
 from silo_server.__main__ import main
 from silo_server.run import is_loopback, running_server, serve
 from silo_server.settings import Settings
-from silo_server.testing import Api, Databases, ServerProcess, wait_until
 
 TOKEN = "silo_several"
 

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from server_testing import Api
 
 from silo_server.app import create_app
 from silo_server.run import running_server
 from silo_server.settings import Settings
-from silo_server.testing import Api
 
 PUBLIC, VIEWER, EDITOR, ADMIN = "public", "viewer", "editor", "admin"
 ROLES = (VIEWER, EDITOR, ADMIN)

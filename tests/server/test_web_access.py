@@ -9,11 +9,11 @@ from urllib.parse import unquote, urlencode
 
 import pytest
 from fastapi.routing import APIRoute
+from server_testing import Api
 from web_visitor import FORM, HTML, ROLES, Visitor, enter, visitors_of
 
 from silo_server.run import RunningServer, running_server
 from silo_server.settings import Settings
-from silo_server.testing import Api
 from silo_server.web.pages import ROUTERS
 
 TOKEN = "silo_pages"

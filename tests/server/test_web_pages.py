@@ -12,11 +12,11 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from server_testing import Api, bom, form_body
 from web_visitor import HTML, ROLES, Visitor, enter, visitors_of
 
 from silo_server.run import RunningServer, running_server
 from silo_server.settings import Settings
-from silo_server.testing import Api, bom, form_body
 
 TOKEN = "silo_pages"
 VIEWER, EDITOR, ADMIN = ROLES

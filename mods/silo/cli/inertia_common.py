@@ -260,7 +260,7 @@ def _write_files(args: argparse.Namespace, report: InertiaReport, assembly: Asse
         drawn = pages[0].with_suffix(".png")
         pictures.append(drawn)
     for path in pictures:
-        from silo.inertia.geometry.preview import write_preview
+        from silo.inertia.preview.write import write_preview
 
         write_preview(report, assembly, path)
     for name in args.report:

@@ -18,10 +18,10 @@ from silo.inertia.doubts import Note
 from silo.inertia.frames import ASSEMBLY_FRAME, FrameChoice, LinkFrame
 from silo.inertia.groups import Occurrence
 from silo.inertia.links import Claims
-from silo.inertia.masses import Placed
 from silo.inertia.matching import Matching
 from silo.inertia.model import Assembly
 from silo.inertia.names import plain
+from silo.inertia.placed import Placed
 from silo.inertia.products import Product
 from silo.inertia.report import InertiaReport, LinkResult, PartResult, PartWarning, SubAssemblyResult
 

@@ -15,12 +15,12 @@ from silo.inertia.codes import MassCode
 from silo.inertia.core import Floats
 from silo.inertia.frames import FrameChoice, LinkFrame, apart
 from silo.inertia.links import Claims, LinkMap, claim, read_link_map
-from silo.inertia.masses import place_all
 from silo.inertia.massrule import MassRule, Options
 from silo.inertia.matching import match
 from silo.inertia.materials import MaterialHit, MaterialTable, load_materials
 from silo.inertia.model import Assembly, Prototype
 from silo.inertia.names import Suggester
+from silo.inertia.placed import place_all
 from silo.inertia.products import leaf_products, sub_assemblies
 from silo.inertia.report import InertiaReport
 from silo.inertia.types import InertialProperties

@@ -3,24 +3,17 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from step_writer import StepDocument
 
 from silo.inertia.bom import BomTable
 from silo.inertia.calculator import Task, calculate, read_geometry
 from silo.inertia.geometry import ReadOptions
 from silo.inertia.report import InertiaReport
-
-_GEOMETRY = Path(__file__).parents[1] / "geometry"
-if str(_GEOMETRY) not in sys.path:
-    # Test folders are no packages (import mode "importlib"): the writer of STEP files is known by its folder.
-    sys.path.insert(0, str(_GEOMETRY))
-
-from step_writer import StepDocument  # noqa: E402
 
 
 @pytest.fixture(name="step")

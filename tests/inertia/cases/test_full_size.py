@@ -14,7 +14,7 @@ from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 from step_writer import trsf_of
 
 from silo.inertia.core import combine_arrays
-from silo.inertia.geometry import occt
+from silo.inertia.geometry.kernel import occt
 from silo.inertia.model import GeometryCode
 
 Fixture = Callable[..., Any]

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
-from step_writer import trsf_of
+from step_writer import emptied, trsf_of
 
 from silo.inertia.codes import Source
 from silo.inertia.core import TensorProblem
@@ -43,14 +43,6 @@ def _koch(step: Fixture, tmp_path: Path) -> Path:
         part.part(BRepPrimAPI_MakeBox(*size).Shape(), name)
         part.write(tmp_path / f"{name}.STEP")
     return path
-
-
-def emptied(path: Path, *names: str) -> Path:
-    """Take the geometry of these products out of the file, as SolidWorks leaves it out."""
-    from test_split_assembly import emptied as taken_out
-
-    result: Path = taken_out(path, *names)
-    return result
 
 
 def test_case_12_a_split_assembly_is_completed(

@@ -25,7 +25,7 @@ from OCP.TopoDS import TopoDS_Compound
 from step_writer import trsf_of
 
 from silo.inertia.codes import Decided, Rule
-from silo.inertia.geometry import occt
+from silo.inertia.geometry.kernel import occt
 from silo.inertia.model import GeometryCode
 
 Fixture = Callable[..., Any]

@@ -11,18 +11,17 @@ from typing import Any
 import pytest
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 from OCP.gp import gp_Pnt
+from step_writer import StepDocument, trsf_of
 
 from silo.inertia.geometry import ReadOptions, read
 from silo.inertia.model import Assembly, GeometryProblem
 
 _TESTS = Path(__file__).parents[2]
-for _folder in (_TESTS / "fcstd", _TESTS / "freecad", Path(__file__).parent):
-    # Test folders are no packages (import mode "importlib"): the writers of STEP and FCStd files and the list
-    # of this machine's FreeCADs are made known by their folders.
+for _folder in (_TESTS / "fcstd", _TESTS / "freecad"):
+    # Test folders are no packages (import mode "importlib"): the writer of FCStd files and the list of this
+    # machine's FreeCADs are found through their folders.
     if str(_folder) not in sys.path:
         sys.path.insert(0, str(_folder))
-
-from step_writer import StepDocument, trsf_of  # noqa: E402
 
 
 @pytest.fixture(name="step")

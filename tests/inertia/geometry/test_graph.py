@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from silo.bom.errors import InputError
 from silo.inertia.geometry.graph import Child, Node, bottom_up, count_instances, unfold, unique_names
-from silo.inertia.geometry.names import clean, has_lost_characters, is_generic
-from silo.inertia.geometry.part21 import Ref, Typed, decoded, scan
-from silo.inertia.geometry.products import WANTED
+from silo.inertia.geometry.labels import clean, has_lost_characters, is_generic
+from silo.inertia.geometry.step.part21 import Ref, Typed, decoded, scan
+from silo.inertia.geometry.step.product_text import WANTED
 
 
 def moved(x: float) -> np.ndarray:

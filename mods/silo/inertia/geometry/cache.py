@@ -21,9 +21,9 @@ from silo.bom.errors import InputError
 from silo.durable import replacing
 from silo.folders import cache_folder
 from silo.inertia.geometry import store
-from silo.inertia.geometry.folder import step_files
-from silo.inertia.geometry.names import file_key
+from silo.inertia.geometry.labels import file_key
 from silo.inertia.geometry.options import Reading, ReadOptions
+from silo.inertia.geometry.step.folder import step_files
 from silo.inertia.model import Assembly
 
 KERNELS = ("cadquery-ocp-novtk", "cadquery-ocp", "trimesh")

@@ -33,7 +33,7 @@ def read(path: str | Path, *, options: ReadOptions | None = None) -> Assembly:
     kind = detect(path)
     if not options.isolate:
         if not detect(path).is_mesh:
-            from silo.inertia.geometry import occt
+            from silo.inertia.geometry.kernel import occt
 
             occt.quiet()
         return read_here(path, options, _reporter(path, options)).assembly
@@ -60,18 +60,18 @@ def read_here(path: Path, options: ReadOptions, report: Report) -> Reading:
     """Read in this process: what the child does; also for hosts that bring their own process."""
     kind = detect(path)
     if kind is Kind.STEP:
-        from silo.inertia.geometry.step import read_step
+        from silo.inertia.geometry.step.read import read_step
 
         return read_step(path, options, report)
     if kind.is_mesh:
-        from silo.inertia.geometry.meshfile import read_mesh
+        from silo.inertia.geometry.meshes.meshfile import read_mesh
 
         return read_mesh(path, kind, options, report)
     if kind is Kind.BREP:
-        from silo.inertia.geometry.brep import read_brep
+        from silo.inertia.geometry.kernel.brep import read_brep
 
         return read_brep(path, options, report)
-    from silo.inertia.geometry.freecad import read_freecad
+    from silo.inertia.geometry.freecad.files import read_freecad
 
     return read_freecad(path, options, report)
 

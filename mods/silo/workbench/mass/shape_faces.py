@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from silo.inertia.geometry.quadrature import Curve, Face, Floats, Surface
-from silo.inertia.geometry.surfaces import Asked, Basis, Elementary, Nurbs
+from silo.inertia.geometry.exact.quadrature import Curve, Face, Floats, Surface
+from silo.inertia.geometry.exact.surfaces import Asked, Basis, Elementary, Nurbs
 
 _ELEMENTARY = {
     "Plane": (Basis.LINEAR, Basis.LINEAR),

@@ -17,16 +17,17 @@ import numpy as np
 from silo.bom.document import LinkProblem, own
 from silo.bom.errors import DocumentError
 from silo.inertia.core import place
-from silo.inertia.geometry.freecad_assembly import assembled
-from silo.inertia.geometry.freecad_materials import (
+from silo.inertia.geometry.exact.quadrature import Moments, integrate
+from silo.inertia.geometry.freecad.assembly import assembled
+from silo.inertia.geometry.freecad.members import top_object
+from silo.inertia.geometry.freecad.stated_materials import (
     NO_MATERIAL,
     NOTHING,
     Material,
     linked_material,
     told_material,
 )
-from silo.inertia.geometry.freecad_members import top_object
-from silo.inertia.geometry.freecad_walk import Leaf, Walk
+from silo.inertia.geometry.freecad.walk import Leaf, Walk
 from silo.inertia.geometry.measured import (
     INVALID,
     NO_VOLUME,
@@ -38,7 +39,6 @@ from silo.inertia.geometry.measured import (
 )
 from silo.inertia.geometry.mesh import PICTURE_TRIANGLES, Floats, Mesh, joined, simplified
 from silo.inertia.geometry.options import ReadOptions, Report
-from silo.inertia.geometry.quadrature import Moments, integrate
 from silo.inertia.model import Assembly, GeometryCode, GeometryProblem, SolidProps
 from silo.workbench.freecad import live
 from silo.workbench.mass.shape_faces import face_of, faces_of
@@ -76,7 +76,7 @@ def read_live(document: Any, options: ReadOptions, report: Report) -> Assembly:
 
 
 class LiveFacts:
-    """The facts of :class:`silo.inertia.geometry.freecad_facts.Facts` from FreeCAD itself."""
+    """The facts of :class:`silo.inertia.geometry.freecad.facts.Facts` from FreeCAD itself."""
 
     def __init__(self) -> None:
         self._inspect = live.LinkInspector()

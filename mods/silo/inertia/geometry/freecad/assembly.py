@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""From the walk over FreeCAD objects to an assembly, whoever measures the shapes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from silo.bom.errors import DocumentError, InputError
+from silo.inertia.geometry.checks import name_problems, scaled_problems
+from silo.inertia.geometry.freecad.walk import Leaf, Walk
+from silo.inertia.geometry.graph import Child, unfold
+from silo.inertia.geometry.measured import Measured, no_solid
+from silo.inertia.geometry.options import ReadOptions, Report
+from silo.inertia.model import Assembly, GeometryCode, GeometryProblem, Prototype
+
+Measure = Callable[[Leaf], Measured]
+"""Measures one product; DocumentError where its shapes cannot be had."""
+
+
+def assembled(
+    walk: Walk, top: str, source: str, options: ReadOptions, measure: Measure, report: Report
+) -> Assembly:
+    """The assembly that the walk found below the product ``top``. Raises DocumentError for ``source``."""
+    node = walk.nodes[top]
+    try:
+        unfolded = unfold(walk.nodes, [Child(node.name, top)], options.max_instances)
+    except InputError as error:
+        raise DocumentError(source, str(error)) from error
+    used = list(dict.fromkeys(instance.prototype for instance in unfolded.instances))
+    prototypes = {}
+    for number, key in enumerate(used, start=1):
+        report("measuring", number, len(used))
+        prototypes[key] = _prototype(walk, key, measure)
+    problems = [GeometryProblem(code, message) for code, listed in walk.notes.items() for message in listed]
+    problems += scaled_problems(unfolded.instances)
+    return Assembly(
+        name=node.name,
+        prototypes=prototypes,
+        instances=tuple(unfolded.instances),
+        problems=tuple(problems),
+        source=source,
+        unit="mm",
+        frames=unfolded.frames,
+    )
+
+
+def _prototype(walk: Walk, key: str, measure: Measure) -> Prototype:
+    node, leaf = walk.nodes[key], walk.leaves[key]
+    problems = name_problems(node.name, unnamed=False)
+    measured = Measured((), (), None, False)
+    try:
+        measured = measure(leaf)
+    except DocumentError as error:
+        problems.append(GeometryProblem(GeometryCode.NO_GEOMETRY, error.reason))
+    problems += measured.problems
+    if leaf.broken:
+        problems.append(GeometryProblem(GeometryCode.NO_GEOMETRY, leaf.broken))
+    elif not measured.solids:
+        problems.append(no_solid(measured))
+    if leaf.material.problem:
+        problems.append(GeometryProblem("material", leaf.material.problem))
+    volume, com, inertia = measured.total
+    return Prototype(
+        key=key,
+        name=node.name,
+        solids=measured.solids,
+        volume_m3=volume,
+        com_m=com,
+        inertia_unit=inertia,
+        has_solid=bool(measured.solids),
+        problems=tuple(problems),
+        step_density=leaf.material.density,
+        step_material=leaf.material.name,
+        mesh=measured.mesh,
+    )

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What an FCStd file says of an object's material.
+
+Two ways: FreeCAD >= 1.0 gives each shape a ``ShapeMaterial``, of which the file holds the id only, so that
+the density is in the cards of an installed FreeCAD; and any version may link a material object
+(``Material``), which carries name and density itself.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from silo.bom.document import own
+from silo.inertia.geometry.freecad.places import material_uuid
+from silo.inertia.materials.cards import MAX_CARD_BYTES, card_folders
+from silo.inertia.materials.density import DENSEST, LIGHTEST, parse_density
+
+NO_MATERIAL = "7f9fd73b-50c9-41d8-b7b2-575a030c1eeb"
+"""FreeCAD's "Default": what every untouched part has. Its 1 kg/m^3 is nobody's density."""
+
+
+@dataclass(frozen=True)
+class Material:
+    """Name and density [kg/m^3] as far as they are known; ``problem`` says what is not."""
+
+    name: str | None = None
+    density: float | None = None
+    problem: str = ""
+
+
+NOTHING = Material()
+
+
+def material_of(obj: Any) -> Material:
+    """The material of one stored object; one that is linked to it goes before its ``ShapeMaterial``."""
+    linked = linked_material(obj)
+    if linked is not None:
+        return linked
+    uuid = material_uuid(obj)
+    if uuid is None or uuid == NO_MATERIAL:
+        return NOTHING
+    return _from_card(uuid)
+
+
+def linked_material(obj: Any) -> Material | None:
+    """The material object that is linked to an object, stored or live; None where there is none."""
+    linked = own(obj, "Material")
+    linked = linked[0] if isinstance(linked, tuple) and linked else linked
+    told = own(linked, "Material") if linked is not None and not isinstance(linked, dict) else None
+    return _from_map(told) if isinstance(told, dict) and told else None
+
+
+def told_material(name: str, density: float | None) -> Material:
+    """A material by name and density [kg/m^3], of which only a sane one counts."""
+    sane = _sane(density)
+    if sane is None:
+        return Material(name, problem=f"its material '{name}' has no density that can be used")
+    return Material(name, sane)
+
+
+def _from_map(told: dict[str, str]) -> Material:
+    name = next((told[key].strip() for key in ("Name", "CardName") if told.get(key, "").strip()), None)
+    text = told.get("Density", "").strip()
+    if not text:
+        return Material(name)
+    density = _sane(parse_density(text))
+    problem = "" if density is not None else f"the density '{text}' of its material cannot be used"
+    return Material(name, density, problem)
+
+
+@cache
+def _from_card(uuid: str) -> Material:
+    text = _card(uuid)
+    if text is None:
+        return Material(
+            problem=f"its material (id {uuid}) is in no material library found on this machine; install "
+            "FreeCAD, or name the folder of its cards in FREECAD_MATERIALS"
+        )
+    name = _NAME.search(text)
+    density = _inherited_density(text, depth=0)
+    title = name[1] if name else None
+    if density is None:
+        return Material(title, problem=f"the card of its material '{title}' has no density that can be used")
+    return Material(title, density)
+
+
+_NAME = re.compile(r"^\s*Name\s*:\s*[\"']?(.+?)[\"']?\s*$", re.MULTILINE)
+_DENSITY = re.compile(r"^\s*Density\s*:\s*[\"']?([^\"'\n]+?)[\"']?\s*$", re.MULTILINE)
+_OWN_UUID = re.compile(r"UUID\s*:\s*[\"']?([0-9a-fA-F-]{36})")
+_PARENT = re.compile(r"^Inherits:\s*\n(?:\s+.*\n)*?\s+UUID:\s*[\"']?([0-9a-fA-F-]{36})", re.MULTILINE)
+
+
+def _inherited_density(text: str, depth: int) -> float | None:
+    found = _DENSITY.search(text)
+    if found is not None:
+        return _sane(parse_density(found[1]))
+    parent = _PARENT.search(text)
+    above = _card(parent[1].lower()) if parent is not None and depth < 8 else None
+    return _inherited_density(above, depth + 1) if above is not None else None
+
+
+def _card(uuid: str) -> str | None:
+    return _cards().get(uuid)
+
+
+@cache
+def _cards() -> dict[str, str]:
+    """The YAML cards of all installed FreeCADs, by id; the first of an id wins."""
+    found: dict[str, str] = {}
+    for path in (path for folder in card_folders() for path in sorted(folder.rglob("*.FCMat"))):
+        text = _text(path)
+        own_id = _OWN_UUID.search(text.partition("Inherits:")[0])
+        if own_id is not None:
+            found.setdefault(own_id[1].lower(), text)
+    return found
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text("utf-8", errors="replace") if path.stat().st_size <= MAX_CARD_BYTES else ""
+    except OSError:
+        return ""
+
+
+def _sane(density: float | None) -> float | None:
+    return density if density is not None and LIGHTEST <= density <= DENSEST else None

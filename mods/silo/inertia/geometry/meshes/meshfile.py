@@ -1,0 +1,253 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Mesh files: STL, OBJ, PLY, GLB and 3MF, through trimesh.
+
+A mesh has a volume only where it is closed and its triangles agree on what is outside. What is not so is
+computed all the same and said: a number from an open mesh looks like any other number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from silo.bom.errors import ConfigError, DocumentError
+from silo.inertia.core import combine_arrays
+from silo.inertia.geometry.checks import implausible_size, name_problems, scaled_problems
+from silo.inertia.geometry.detect import Kind
+from silo.inertia.geometry.graph import MAX_DEPTH, Child, Floats, Node, unfold
+from silo.inertia.geometry.mesh import Indices, Mesh, components, is_inside, mesh_solid
+from silo.inertia.geometry.options import MESH_UNITS, Reading, ReadOptions, Report
+from silo.inertia.model import Assembly, GeometryCode, GeometryProblem, Prototype, SolidProps
+
+MAX_COMPONENTS = 500
+"""Meshes in more pieces than this are measured as a whole: scans come in thousands of crumbs."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeshScene:
+    """Meshes by name in file units, their placed uses, and the file's unit [m], None where it states none."""
+
+    meshes: Mapping[str, Mesh]
+    nodes: Mapping[str, Node]
+    roots: tuple[Child, ...]
+    unit_name: str
+    unit_m: float | None
+
+
+def read_mesh(path: Path, kind: Kind, options: ReadOptions, report: Report) -> Reading:
+    """The assembly of a mesh file: one instance, or those of its scene. Raises DocumentError."""
+    report("reading", 0, 0)
+    scene = _scene(path, kind)
+    unit, unit_name, problems = _unit(scene, options)
+    prototypes = {}
+    for number, (key, mesh) in enumerate(scene.meshes.items(), start=1):
+        report("measuring", number, len(scene.meshes))
+        prototypes[key] = _prototype(key, scene.nodes[key].name, Mesh(mesh.vertices * unit, mesh.faces))
+    roots = [Child(r.name, r.product, _in_metres(r.transform, unit)) for r in scene.roots]
+    nodes = {
+        key: Node(
+            key,
+            node.name,
+            tuple(Child(c.name, c.product, _in_metres(c.transform, unit)) for c in node.children),
+            node.has_geometry,
+        )
+        for key, node in scene.nodes.items()
+    }
+    unfolded = unfold(nodes, roots, options.max_instances)
+    problems += implausible_size(prototypes, unit_name)
+    problems += scaled_problems(unfolded.instances)
+    used = dict.fromkeys(instance.prototype for instance in unfolded.instances)
+    assembly = Assembly(
+        name=path.stem,
+        prototypes={key: prototypes[key] for key in used},
+        instances=tuple(unfolded.instances),
+        problems=tuple(problems),
+        source=str(path),
+        unit=unit_name,
+        frames=unfolded.frames,
+    )
+    return Reading(assembly)
+
+
+def _scene(path: Path, kind: Kind) -> MeshScene:
+    if kind is Kind.THREEMF:
+        from silo.inertia.geometry.meshes.threemf import read_3mf
+
+        return read_3mf(path)
+    try:
+        import trimesh
+    except ImportError as error:  # pragma: no cover - the development environment always has it
+        raise ConfigError(
+            'mesh files need trimesh, which is not installed: pip install "silo-mod[inertia]"'
+        ) from error
+    try:
+        with path.open("rb") as stream:
+            # Unprocessed: what trimesh would mend in silence is what we have to tell.
+            loaded = trimesh.load_scene(stream, file_type=kind.value, process=False)
+    except MemoryError:
+        raise
+    except Exception as error:
+        raise DocumentError(str(path), f"cannot be read as {kind.value}: {error}") from error
+    return _from_trimesh(path, kind, loaded)
+
+
+def _from_trimesh(path: Path, kind: Kind, loaded: Any) -> MeshScene:
+    meshes: dict[str, Mesh] = {}
+    nodes: dict[str, Node] = {}
+    for name, geometry in loaded.geometry.items():
+        faces = getattr(geometry, "faces", None)
+        if faces is None or not len(faces):
+            continue
+        vertices = np.asarray(geometry.vertices, dtype=np.float64)
+        if not np.isfinite(vertices).all():
+            raise DocumentError(str(path), f"the mesh '{name}' has coordinates that are no numbers")
+        meshes[name] = merged(vertices, np.asarray(faces, dtype=np.int64))
+        nodes[name] = Node(name, path.stem if len(loaded.geometry) == 1 else name, (), True)
+    if not meshes:
+        raise DocumentError(str(path), "holds no triangles")
+    roots = _tree(loaded.graph, nodes)
+    glb = kind is Kind.GLB
+    return MeshScene(meshes, nodes, roots, "m" if glb else "", 1.0 if glb else None)
+
+
+def _tree(graph: Any, nodes: dict[str, Node]) -> tuple[Child, ...]:
+    """The scene's own tree as nodes; a branch with neither meshes nor branches is left out."""
+    children: Mapping[str, list[str]] = graph.transforms.children
+
+    def use(name: str, parent: str, above: tuple[str, ...]) -> Child | None:
+        if name in above or len(above) > MAX_DEPTH:
+            return None
+        edge = graph.transforms.edge_data[(parent, name)]
+        matrix = np.asarray(edge.get("matrix", np.eye(4)), dtype=np.float64)
+        below = [use(child, name, (*above, name)) for child in children.get(name, ())]
+        inside = [child for child in below if child is not None]
+        mesh = graph.transforms.node_data[name].get("geometry")
+        if mesh in nodes:
+            if not inside:
+                return Child(str(name), mesh, matrix)
+            inside.insert(0, Child(nodes[mesh].name, mesh))
+        if not inside:
+            return None
+        nodes[f"node:{name}"] = Node(f"node:{name}", str(name), tuple(inside))
+        return Child(str(name), f"node:{name}", matrix)
+
+    top = graph.base_frame
+    roots = [use(child, top, (top,)) for child in children.get(top, ())]
+    found = [root for root in roots if root is not None]
+    mesh = graph.transforms.node_data.get(top, {}).get("geometry")
+    return tuple([Child(nodes[mesh].name, mesh)] if mesh in nodes else []) + tuple(found)
+
+
+def merged(vertices: Floats, faces: Indices) -> Mesh:
+    """Equal vertices made one (an STL repeats each six times), triangles without area taken out."""
+    unique, place = np.unique(vertices, axis=0, return_inverse=True)
+    faces = place.reshape(-1)[faces]
+    flat = (faces[:, 0] == faces[:, 1]) | (faces[:, 1] == faces[:, 2]) | (faces[:, 2] == faces[:, 0])
+    return Mesh(unique, faces[~flat])
+
+
+def _unit(scene: MeshScene, options: ReadOptions) -> tuple[float, str, list[GeometryProblem]]:
+    if options.mesh_unit is not None:
+        if options.mesh_unit not in MESH_UNITS:
+            raise ConfigError(f"mesh_unit: wanted one of {', '.join(MESH_UNITS)}, got '{options.mesh_unit}'")
+        return MESH_UNITS[options.mesh_unit], options.mesh_unit, []
+    if scene.unit_m is not None:
+        return scene.unit_m, scene.unit_name, []
+    problem = GeometryProblem(
+        GeometryCode.UNITS,
+        "the format states no unit of length; read as mm. Name the unit where it is another",
+    )
+    return MESH_UNITS["mm"], "mm", [problem]
+
+
+def _in_metres(matrix: Floats, unit: float) -> Floats:
+    result = np.array(matrix, dtype=np.float64)
+    result[:3, 3] *= unit
+    return result
+
+
+def _prototype(key: str, name: str, mesh: Mesh) -> Prototype:
+    problems = name_problems(name, unnamed=False)
+    solid = None
+    if len(mesh):
+        solid = _measured(mesh, problems)
+    if solid is None or solid.volume_m3 == 0.0:
+        problems.append(GeometryProblem(GeometryCode.NO_SOLID, "its triangles enclose no volume"))
+        return Prototype(key, name, has_solid=False, problems=tuple(problems), mesh=mesh)
+    return Prototype(
+        key=key,
+        name=name,
+        solids=(solid,),
+        volume_m3=solid.volume_m3,
+        com_m=solid.com_m,
+        inertia_unit=solid.inertia_unit,
+        problems=tuple(problems),
+        mesh=mesh,
+    )
+
+
+def _measured(mesh: Mesh, problems: list[GeometryProblem]) -> SolidProps:
+    import trimesh
+
+    body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    closed, agreed = bool(body.is_watertight), bool(body.is_winding_consistent)
+    if not closed:
+        problems.append(
+            GeometryProblem(
+                GeometryCode.NOT_WATERTIGHT,
+                f"the mesh is open ({_open_edges(mesh)} free or shared edges), so it has no exact volume",
+            )
+        )
+    if not agreed:
+        problems.append(
+            GeometryProblem(
+                GeometryCode.WINDING,
+                "its triangles do not agree on what is outside; its volume cannot be trusted",
+            )
+        )
+    if closed and agreed:
+        return _oriented(mesh, problems)
+    return mesh_solid(mesh)
+
+
+def _open_edges(mesh: Mesh) -> int:
+    edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    counts = np.unique(edges, axis=0, return_counts=True)[1]
+    return int((counts != 2).sum())
+
+
+def _oriented(mesh: Mesh, problems: list[GeometryProblem]) -> SolidProps:
+    """A closed mesh, piece by piece: a piece inside out is a cavity inside another one, else it is turned."""
+    pieces = components(mesh, MAX_COMPONENTS)
+    if len(pieces) == 1:
+        solid = mesh_solid(mesh)
+        turned = int(solid.reversed)
+    else:
+        solid, turned = _sum(pieces)
+    if turned:
+        which = "the mesh is" if len(pieces) == 1 else f"{turned} of its {len(pieces)} pieces are"
+        problems.append(
+            GeometryProblem(GeometryCode.NEGATIVE_VOLUME, f"{which} inside out; the sign was turned")
+        )
+    return solid
+
+
+def _sum(pieces: list[Mesh]) -> tuple[SolidProps, int]:
+    solids = [mesh_solid(piece) for piece in pieces]
+    outward = [piece for piece, solid in zip(pieces, solids, strict=True) if not solid.reversed]
+    signs, turned = [], 0
+    for piece, solid in zip(pieces, solids, strict=True):
+        cavity = solid.reversed and any(is_inside(piece, other) for other in outward)
+        turned += int(solid.reversed and not cavity)
+        signs.append(-1.0 if cavity else 1.0)
+    sign = np.array(signs)
+    whole = combine_arrays(
+        sign * np.array([s.volume_m3 for s in solids]),
+        np.array([s.com_m for s in solids]),
+        sign[:, None, None] * np.array([s.inertia_unit for s in solids]),
+    )
+    return SolidProps(whole.mass, whole.com, whole.inertia, reversed=turned > 0), turned

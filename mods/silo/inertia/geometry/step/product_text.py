@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What the text of a STEP file says of its products: part number, material, density, files outside.
+
+The way from a piece of geometry to its product, as AP203, AP214 and AP242 all have it::
+
+    MANIFOLD_SOLID_BREP ← …SHAPE_REPRESENTATION (← SHAPE_REPRESENTATION_RELATIONSHIP) ←
+    SHAPE_DEFINITION_REPRESENTATION → PRODUCT_DEFINITION_SHAPE → PRODUCT_DEFINITION → … → PRODUCT
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+from silo.inertia.geometry.graph import IDENTITY, Child, Node, bottom_up, count_instances
+from silo.inertia.geometry.step.part21 import Part21, number, ref, refs, text
+from silo.inertia.geometry.step.stated_materials import names_of, stated_materials
+
+_DEFINITIONS = (
+    "PRODUCT_DEFINITION",
+    "PRODUCT_DEFINITION_WITH_ASSOCIATED_DOCUMENTS",
+)
+_FORMATIONS = (
+    "PRODUCT_DEFINITION_FORMATION",
+    "PRODUCT_DEFINITION_FORMATION_WITH_SPECIFIED_SOURCE",
+)
+_PROPERTIES = ("PROPERTY_DEFINITION", "PRODUCT_DEFINITION_SHAPE")
+_ITEMS = (
+    "MANIFOLD_SOLID_BREP",
+    "BREP_WITH_VOIDS",
+    "FACETED_BREP",
+    "SHELL_BASED_SURFACE_MODEL",
+    "FACE_BASED_SURFACE_MODEL",
+    "GEOMETRIC_CURVE_SET",
+    "GEOMETRIC_SET",
+    "TESSELLATED_SOLID",
+    "TESSELLATED_SHELL",
+)
+WANTED = frozenset(
+    (
+        *_DEFINITIONS,
+        *_FORMATIONS,
+        *_PROPERTIES,
+        *_ITEMS,
+        "PRODUCT",
+        "PROPERTY_DEFINITION_REPRESENTATION",
+        "SHAPE_DEFINITION_REPRESENTATION",
+        "SHAPE_REPRESENTATION_RELATIONSHIP",
+        "REPRESENTATION",
+        "MEASURE_REPRESENTATION_ITEM",
+        "DESCRIPTIVE_REPRESENTATION_ITEM",
+        "DERIVED_UNIT",
+        "DERIVED_UNIT_ELEMENT",
+        "LENGTH_MEASURE_WITH_UNIT",
+        "MASS_MEASURE_WITH_UNIT",
+        "MAKE_FROM_USAGE_OPTION",
+        "APPLIED_DOCUMENT_REFERENCE",
+        "DOCUMENT_PRODUCT_EQUIVALENCE",
+        "DOCUMENT_FILE",
+        "APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT",
+        "CARTESIAN_TRANSFORMATION_OPERATOR_3D",
+        "NEXT_ASSEMBLY_USAGE_OCCURRENCE",
+    )
+)
+
+
+@dataclass(frozen=True)
+class ProductFacts:
+    """One PRODUCT_DEFINITION.
+
+    part_number, name
+        PRODUCT.id and PRODUCT.name.
+    density
+        [kg/m^3], None where the file gives none that can be used; ``density_problem`` says why.
+    documents
+        names of the files that the product's geometry is said to be in.
+    """
+
+    part_number: str = ""
+    name: str = ""
+    material: str | None = None
+    density: float | None = None
+    density_problem: str = ""
+    documents: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Products:
+    """All products of a file. ``by_ordinal``: entity position in the file → PRODUCT_DEFINITION id.
+
+    ``count`` is the number of entities: positions only mean something to a reader that counts as many.
+    ``stretched`` counts the transformations that scale or mirror; ``uses`` are (assembly, part) as
+    PRODUCT_DEFINITION ids.
+    """
+
+    facts: dict[int, ProductFacts] = field(default_factory=dict)
+    by_ordinal: dict[int, int] = field(default_factory=dict)
+    count: int = 0
+    stretched: int = 0
+    uses: tuple[tuple[int, int], ...] = ()
+
+    def named(self, name: str) -> ProductFacts | None:
+        """The facts of the only product with this name; None where there is none, or several."""
+        found = [f for f in self.facts.values() if f.name == name or (not f.name and f.part_number == name)]
+        return found[0] if len(found) == 1 else None
+
+
+def read_products(source: Part21) -> Products:
+    """Everything the text says of products."""
+    facts = {pd: ProductFacts(*names_of(source, a)) for pd, a in source.of(*_DEFINITIONS)}
+    for pd, material, density, problem in stated_materials(source):
+        if pd in facts:
+            old = facts[pd]
+            facts[pd] = replace(
+                old,
+                material=material or old.material,
+                density=density if density is not None else old.density,
+                density_problem=problem or old.density_problem,
+            )
+    for pd, documents in _documents(source).items():
+        if pd in facts:
+            facts[pd] = replace(facts[pd], documents=documents)
+    return Products(
+        facts,
+        by_ordinal=_by_ordinal(source, facts),
+        count=source.count,
+        stretched=_stretched(source),
+        uses=tuple(_uses(source, facts)),
+    )
+
+
+def _by_ordinal(source: Part21, facts: dict[int, ProductFacts]) -> dict[int, int]:
+    owner = _representation_owners(source)
+    result = {source.ordinals[pd]: pd for pd in facts}
+    for number_, keyword in source.keywords.items():
+        if keyword.endswith("SHAPE_REPRESENTATION") and number_ in owner:
+            arguments = source.arguments(number_)
+            for item in refs(arguments[1]) if len(arguments) > 1 else ():
+                if item in source.ordinals:
+                    result[source.ordinals[item]] = owner[number_]
+    return result
+
+
+def _representation_owners(source: Part21) -> dict[int, int]:
+    """Representation id → PRODUCT_DEFINITION id, also over SHAPE_REPRESENTATION_RELATIONSHIPs."""
+    shapes = {n: next(iter(source.references(n)), 0) for n in source.listed("PRODUCT_DEFINITION_SHAPE")}
+    owner: dict[int, int] = {}
+    for _, arguments in source.of("SHAPE_DEFINITION_REPRESENTATION"):
+        pd = shapes.get(ref(arguments, 0) or 0)
+        representation = ref(arguments, 1)
+        if pd is not None and representation is not None:
+            owner[representation] = pd
+    for _, arguments in source.of("SHAPE_REPRESENTATION_RELATIONSHIP"):
+        one, two = ref(arguments, 2), ref(arguments, 3)
+        if one is not None and two is not None:
+            if one in owner:
+                owner.setdefault(two, owner[one])
+            elif two in owner:
+                owner.setdefault(one, owner[two])
+    return owner
+
+
+def _uses(source: Part21, facts: dict[int, ProductFacts]) -> Iterator[tuple[int, int]]:
+    for number_ in source.listed("NEXT_ASSEMBLY_USAGE_OCCURRENCE"):
+        ends = source.references(number_)
+        if len(ends) >= 2 and ends[0] in facts and ends[1] in facts:
+            yield ends[0], ends[1]
+
+
+def count_placed(products: Products) -> int:
+    """How many placed parts the file's structure amounts to. InputError where a product contains itself."""
+    children: dict[int, list[Child]] = {pd: [] for pd in products.facts}
+    for assembly, part in products.uses:
+        children[assembly].append(Child("", str(part), IDENTITY))
+    nodes = {
+        str(pd): Node(str(pd), products.facts[pd].name, tuple(found), not found)
+        for pd, found in children.items()
+    }
+    used = {str(part) for _, part in products.uses}
+    tops = [key for key in nodes if key not in used] or list(nodes)[:1]
+    return sum(count_instances(nodes, bottom_up(nodes, top)) for top in tops)
+
+
+def _stretched(source: Part21) -> int:
+    """Transformation operators whose scale is not 1; a mirror is written as a negative one."""
+    operators = (arguments for _, arguments in source.of("CARTESIAN_TRANSFORMATION_OPERATOR_3D"))
+    scales = (number(arguments[6]) for arguments in operators if len(arguments) > 6)
+    return sum(scale is not None and abs(scale - 1) > 1e-9 for scale in scales)
+
+
+# --- split assemblies -------------------------------------------------------------------------------------
+
+
+def _documents(source: Part21) -> dict[int, tuple[str, ...]]:
+    """PRODUCT_DEFINITION id → names of the files said to hold its geometry (AP214 external references)."""
+    files = {n: text(a, 0) or text(a, 1) for n, a in source.of("DOCUMENT_FILE")}
+    if not files:
+        return {}
+    by_formation = {
+        ref(a, 2): tuple(files[d] for d in refs(a[4]) if d in files)
+        for _, a in source.of("PRODUCT_DEFINITION_WITH_ASSOCIATED_DOCUMENTS")
+        if len(a) > 4
+    }
+    by_document = {
+        ref(a, 2): by_formation.get(ref(a, 3), ()) for _, a in source.of("DOCUMENT_PRODUCT_EQUIVALENCE")
+    }
+    result: dict[int, tuple[str, ...]] = {}
+    for _, arguments in source.of("APPLIED_DOCUMENT_REFERENCE"):
+        names = by_document.get(ref(arguments, 0), ())
+        for pd in refs(arguments[2]) if len(arguments) > 2 else ():
+            result[pd] = result.get(pd, ()) + names
+    return result

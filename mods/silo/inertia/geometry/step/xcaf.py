@@ -1,0 +1,287 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""One STEP file as the geometry kernel reads it: products, their uses, and their shapes.
+
+Products are kept as the kernel's document (XCAF) has them, with two corrections that real files need. The
+kernel splits a product with mixed bodies into an assembly of unnamed leaves; those are given back to the
+product around them. And it opens files that a STEP file names, wherever they are; a copy without those names
+is read instead, and :mod:`siblings` looks for the files by our rules.
+"""
+
+from __future__ import annotations
+
+import mmap
+import re
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from OCP.IFSelect import IFSelect_RetDone
+from OCP.STEPCAFControl import STEPCAFControl_Reader
+from OCP.TCollection import TCollection_ExtendedString
+from OCP.TDocStd import TDocStd_Document
+from OCP.XCAFDoc import XCAFDoc_Centroid, XCAFDoc_DocumentTool, XCAFDoc_Volume
+
+from silo.bom.errors import DocumentError, InputError
+from silo.inertia.geometry.graph import Child, Node
+from silo.inertia.geometry.kernel import occt
+from silo.inertia.geometry.kernel.tessellate import MM, in_metres, trsf_matrix
+from silo.inertia.geometry.labels import clean, is_generic
+from silo.inertia.geometry.step.part21 import scan
+from silo.inertia.geometry.step.product_text import (
+    WANTED,
+    ProductFacts,
+    Products,
+    count_placed,
+    read_products,
+)
+from silo.inertia.geometry.step.regroup import MARK, regrouped
+
+
+@dataclass(frozen=True, eq=False)
+class Stated:
+    """Validation properties that the file gives for a product: [m^3] and (x, y, z) [m], None where absent."""
+
+    volume_m3: float | None = None
+    centroid_m: tuple[float, float, float] | None = None
+
+
+@dataclass(eq=False)
+class StepFile:
+    """The content of one file; keys are unique over all files of a split assembly.
+
+    ``stretched``: how many transformations the text has that scale or mirror.
+    """
+
+    path: Path
+    unit: str = ""
+    stretched: int = 0
+    nodes: dict[str, Node] = field(default_factory=dict)
+    shapes: dict[str, list[Any]] = field(default_factory=dict)
+    facts: dict[str, ProductFacts] = field(default_factory=dict)
+    stated: dict[str, Stated] = field(default_factory=dict)
+    unnamed: set[str] = field(default_factory=set)
+    roots: list[Child] = field(default_factory=list)
+
+    def take_in(self, other: StepFile) -> None:
+        """Add another file's products; its keys must be its own."""
+        self.nodes.update(other.nodes)
+        self.shapes.update(other.shapes)
+        self.facts.update(other.facts)
+        self.stated.update(other.stated)
+        self.unnamed.update(other.unnamed)
+        self.stretched += other.stretched
+
+
+def load(path: Path, prefix: str = "", max_instances: int = 1_000_000) -> StepFile:
+    """Read one STEP file. ``prefix`` goes before every key. DocumentError where it cannot be read."""
+    with path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        products, documents = _text(path, data)
+        _refuse_bombs(path, products, max_instances)
+        changed = regrouped(data, products)
+        if changed is not None:
+            products = read_products(scan(changed, WANTED))
+        if documents:
+            # The kernel would open the files that are named, in any folder, without asking.
+            changed = _EXTERNAL.sub(rb"\1'silo-looks-for-it'", data[:] if changed is None else changed)
+    with tempfile.TemporaryDirectory(prefix="silo-step-") as folder:
+        source = path
+        if changed is not None:
+            source = Path(folder) / "part.step"
+            source.write_bytes(changed)
+            del changed
+        document, reader = _transferred(source, path)
+    return _Walk(path, prefix, document, reader, products).run()
+
+
+def _text(path: Path, data: mmap.mmap) -> tuple[Products, bool]:
+    text = scan(data, WANTED)
+    if not text.complete:
+        raise DocumentError(
+            str(path), "the file ends in the middle (no END-ISO-10303-21); export or copy it again"
+        )
+    return read_products(text), "DOCUMENT_FILE" in text.keywords.values()
+
+
+def _refuse_bombs(path: Path, products: Products, most: int) -> None:
+    # Before the kernel sees it: a kilobyte of assemblies of assemblies keeps it busy for ever.
+    try:
+        count = count_placed(products)
+    except InputError as error:
+        raise DocumentError(str(path), str(error)) from error
+    if count > most:
+        raise DocumentError(str(path), f"it unfolds to {count} placed parts, more than the {most} allowed")
+
+
+_EXTERNAL = re.compile(
+    rb"((?:DOCUMENT_FILE|APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT|EXTERNALLY_DEFINED\w*)\s*\(\s*)'(?:[^']|'')*'"
+)
+
+
+def _transferred(source: Path, named: Path) -> tuple[Any, Any]:
+    document = TDocStd_Document(TCollection_ExtendedString("XmlXCAF"))
+    reader = STEPCAFControl_Reader()
+    reader.SetNameMode(True)
+    reader.SetColorMode(False)
+    reader.SetLayerMode(False)
+    reader.SetPropsMode(True)
+    if reader.ReadFile(str(source)) != IFSelect_RetDone:
+        raise DocumentError(str(named), "the geometry kernel cannot read it as STEP; export it again")
+    if not reader.Transfer(document):
+        raise DocumentError(str(named), "holds no geometry that the kernel can transfer")
+    return document, reader
+
+
+class _Walk:
+    """From the kernel's document to nodes; lives for one file."""
+
+    def __init__(self, path: Path, prefix: str, document: Any, reader: Any, products: Products) -> None:
+        self._tool = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
+        self._transfer = reader.Reader().WS().TransferReader()
+        self._prefix = prefix
+        self._products = products
+        self._owners = _owners(reader, products)
+        self._known: dict[str, ProductFacts | None] = {}
+        self._file = StepFile(path, unit=_unit(reader), stretched=products.stretched)
+        self._fallback = clean(path.stem) or "part"
+
+    def run(self) -> StepFile:
+        free = occt.LabelSequence()
+        self._tool.GetFreeShapes(free)
+        for label in occt.labels(free):
+            key = self._key(label)
+            self._visit_all(label, self._fallback)
+            self._file.roots.append(Child(self._file.nodes[key].name, key))
+        if not self._file.roots:
+            raise DocumentError(str(self._file.path), "holds no product and no shape")
+        return self._file
+
+    def _key(self, label: Any) -> str:
+        return self._prefix + occt.entry(label)
+
+    def _visit_all(self, top: Any, fallback: str) -> None:
+        waiting = [(top, fallback)]
+        while waiting:
+            label, around = waiting.pop()
+            key = self._key(label)
+            if key in self._file.nodes:
+                continue
+            node, inside = self._node(label, key, around)
+            self._file.nodes[key] = node
+            waiting.extend((child, node.name) for child in inside)
+
+    def _node(self, label: Any, key: str, around: str) -> tuple[Node, list[Any]]:
+        children, inside, own, facts = self._inside(label)
+        if not self._tool.IsAssembly_s(label):
+            own, facts = [self._tool.GetShape_s(label)], self._facts(label)
+        name = clean(occt.name_of(label))
+        if is_generic(name) and (facts is None or facts.name != name):
+            name = around
+            self._file.unnamed.add(key)
+        if own:
+            self._file.shapes[key] = own
+        self._file.facts[key] = facts or self._products.named(name) or ProductFacts()
+        self._file.stated[key] = _stated(label)
+        return Node(key, name, tuple(children), has_geometry=bool(own)), inside
+
+    def _inside(self, label: Any) -> tuple[list[Child], list[Any], list[Any], ProductFacts | None]:
+        """Uses of products, the products' labels, the shapes that are the label's own, and their facts."""
+        children: list[Child] = []
+        inside: list[Any] = []
+        own: list[Any] = []
+        known: ProductFacts | None = None
+        for component, target in self._components(label):
+            facts = self._facts(target)
+            if self._is_made_up(target, facts):
+                own.append(self._tool.GetShape_s(component))
+                known = known or facts
+            else:
+                children.append(self._child(component, target))
+                inside.append(target)
+        return children, inside, own, known
+
+    def _components(self, label: Any) -> Iterator[tuple[Any, Any]]:
+        """Uses and what they use; groups of our own making are seen through."""
+        components = occt.LabelSequence()
+        if self._tool.IsAssembly_s(label):
+            self._tool.GetComponents_s(label, components)
+        for component in occt.labels(components):
+            target = occt.new_label()
+            self._tool.GetReferredShape_s(component, target)
+            if occt.name_of(target).startswith(MARK):
+                yield from self._components(target)
+            else:
+                yield component, target
+
+    def _is_made_up(self, target: Any, facts: ProductFacts | None) -> bool:
+        """True for a leaf that the kernel made of a product's mixed bodies, and that is no product itself."""
+        name = clean(occt.name_of(target))
+        return (
+            is_generic(name) and not self._tool.IsAssembly_s(target) and (facts is None or facts.name != name)
+        )
+
+    def _child(self, component: Any, target: Any) -> Child:
+        name = clean(occt.name_of(component))
+        if is_generic(name):
+            product = clean(occt.name_of(target))
+            name = self._fallback if is_generic(product) else product
+        matrix = in_metres(trsf_matrix(self._tool.GetLocation_s(component).Transformation()))
+        return Child(name, self._key(target), matrix)
+
+    def _facts(self, label: Any) -> ProductFacts | None:
+        # Asked once for every use of a product, and slow to answer.
+        key = occt.entry(label)
+        if key not in self._known:
+            self._known[key] = self._found(label)
+        return self._known[key]
+
+    def _found(self, label: Any) -> ProductFacts | None:
+        shape = self._tool.GetShape_s(label)
+        if shape is None or shape.IsNull():
+            return None
+        entity = self._transfer.EntityFromShapeResult(shape, 1)
+        if entity is None:
+            return None
+        found = self._owners.get(id(entity))
+        return self._products.facts.get(found[1]) if found is not None else None
+
+
+def _owners(reader: Any, products: Products) -> dict[int, tuple[Any, int]]:
+    """id of the kernel's entity object → that object (kept alive, so that the id stays its own), product."""
+    model = reader.Reader().StepModel()
+    if model.NbEntities() != products.count:
+        # The kernel left an entity out; from there on its numbers are not ours. Names must do.
+        return {}
+    entities = ((model.Entity(ordinal), pd) for ordinal, pd in products.by_ordinal.items())
+    return {id(entity): (entity, pd) for entity, pd in entities}
+
+
+def _stated(label: Any) -> Stated:
+    volume = occt.attribute_of(label, XCAFDoc_Volume)
+    centroid = occt.attribute_of(label, XCAFDoc_Centroid)
+    point = centroid.Get() if centroid is not None else None
+    return Stated(
+        volume.Get() * MM**3 if volume is not None else None,
+        (point.X() * MM, point.Y() * MM, point.Z() * MM) if point is not None else None,
+    )
+
+
+_UNITS = {
+    "millimetre": "mm",
+    "millimeter": "mm",
+    "metre": "m",
+    "meter": "m",
+    "centimetre": "cm",
+    "centimeter": "cm",
+    "micrometre": "um",
+    "inch": "inch",
+    "foot": "foot",
+}
+
+
+def _unit(reader: Any) -> str:
+    lengths, angles, solid_angles = (occt.AsciiStrings() for _ in range(3))
+    reader.Reader().FileUnits(lengths, angles, solid_angles)
+    names = {str(lengths.Value(i).ToCString()).strip().lower() for i in range(1, lengths.Length() + 1)}
+    return " and ".join(sorted(_UNITS.get(name, name) for name in names))

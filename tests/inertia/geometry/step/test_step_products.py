@@ -1,0 +1,270 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Products, instances and names in STEP files (inertia-facts §9, cases 4, 5, 8, 9 and 14)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from OCP.BRep import BRep_Builder
+from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakeWire
+from OCP.BRepTools import BRepTools
+from OCP.gp import gp_Ax2, gp_Dir, gp_Pln, gp_Pnt, gp_Trsf
+from OCP.TopoDS import TopoDS_Compound, TopoDS_Shell, TopoDS_Solid
+
+from silo.bom.errors import DocumentError
+from silo.inertia.core import place
+from silo.inertia.geometry.graph import Child, Node
+from silo.inertia.geometry.kernel import occt
+from silo.inertia.geometry.step.checks import lost_stretches
+from silo.inertia.geometry.step.xcaf import StepFile
+from silo.inertia.model import GeometryCode
+
+
+def compound(*shapes: Any) -> Any:
+    """Several shapes as one."""
+    builder, result = BRep_Builder(), TopoDS_Compound()
+    builder.MakeCompound(result)
+    for shape in shapes:
+        builder.Add(result, shape)
+    return result
+
+
+def wire() -> Any:
+    """A wire without a face."""
+    edge = BRepBuilderAPI_MakeEdge(gp_Pnt(0, 0, 50), gp_Pnt(30, 0, 50)).Edge()
+    return BRepBuilderAPI_MakeWire(edge).Wire()
+
+
+def face() -> Any:
+    """A surface without a solid."""
+    return BRepBuilderAPI_MakeFace(gp_Pln(gp_Pnt(0, 0, 40), gp_Dir(0, 0, 1)), 0, 10, 0, 10).Face()
+
+
+def test_a_product_is_kept_once_however_often_it_is_placed(
+    box: Any, trsf: Any, step: Any, tmp_path: Path, read_in: Any
+) -> None:
+    """Two uses of a sub-assembly of three uses of a part: one prototype, six instances, paths in full."""
+    document = step()
+    bolt = document.part(box(1, 1, 5), "bolt")
+    sub, top = document.assembly("sub"), document.assembly("top")
+    for n in (1, 2, 3):
+        document.place(sub, bolt, trsf((10 * n, 0, 0)), f"bolt:{n}")
+    document.place(top, sub, trsf((0, 0, 0)), "sub:1")
+    document.place(top, sub, trsf((0, 500, 0)), "sub:2")
+    assembly = read_in(document.write(tmp_path / "nested.step"))
+    assert [p.name for p in assembly.prototypes.values()] == ["bolt"]
+    assert [i.name for i in assembly.instances] == [f"sub:{s}/bolt:{n}" for s in (1, 2) for n in (1, 2, 3)]
+    assert assembly.instances[0].product_path == ("sub", "bolt")
+    assert assembly.name == "top"
+    np.testing.assert_allclose(assembly.instances[4].transform[:3, 3], [0.02, 0.5, 0.0])
+    np.testing.assert_allclose(assembly.frames[("sub:2",)][:3, 3], [0.0, 0.5, 0.0])
+
+
+def test_repeated_instance_names_become_unique_paths(
+    box: Any, trsf: Any, step: Any, tmp_path: Path, read_in: Any
+) -> None:
+    """Onshape calls each use like its product: the second and third are marked ``<2>``, ``<3>``."""
+    document = step()
+    part, top = document.part(box(1, 1, 1), "Part 1"), document.assembly("top")
+    for n in range(3):
+        document.place(top, part, trsf((n, 0, 0)), "Part 1")
+    assembly = read_in(document.write(tmp_path / "repeated.step"))
+    assert [i.name for i in assembly.instances] == ["Part 1", "Part 1<2>", "Part 1<3>"]
+
+
+def test_different_products_with_one_name_stay_different(
+    box: Any, step: Any, tmp_path: Path, read_in: Any
+) -> None:
+    """Names are not unique in real exports: three products "Part 1" are three prototypes."""
+    document = step()
+    top = document.assembly("top")
+    for size in (1, 2, 3):
+        document.place(top, document.part(box(size, size, size), "Part 1"), name="Part 1")
+    assembly = read_in(document.write(tmp_path / "same_names.step"))
+    assert [p.name for p in assembly.prototypes.values()] == ["Part 1"] * 3
+    assert sorted(p.volume_m3 * 1e9 for p in assembly.prototypes.values()) == pytest.approx([1, 8, 27])
+
+
+def test_instance_names_are_kept_beside_product_names(
+    box: Any, step: Any, tmp_path: Path, read_in: Any
+) -> None:
+    """An instance that is called otherwise than its product keeps both names."""
+    document = step()
+    top = document.assembly("top")
+    document.place(top, document.part(box(1, 2, 3), "42-0815"), name="left hinge")
+    (instance,) = read_in(document.write(tmp_path / "names.step")).instances
+    assert (instance.path, instance.product_path) == (("left hinge",), ("42-0815",))
+
+
+def test_a_lone_part_is_its_own_instance(box: Any, step_part: Any, read_in: Any) -> None:
+    """A file with one part has one instance, called like the part."""
+    assembly = read_in(step_part(box(1, 2, 3), "bracket"))
+    assert [i.path for i in assembly.instances] == [("bracket",)]
+    assert assembly.name == "bracket"
+
+
+def test_solid_and_wire_of_one_product_are_one_product(
+    box: Any, step: Any, tmp_path: Path, read_in: Any
+) -> None:
+    """The kernel makes leaves 'SOLID' and 'COMPOUND' of a mixed product; it is one product all the same."""
+    document = step()
+    top = document.assembly("top")
+    document.place(top, document.part(compound(box(10, 10, 10), wire()), "mixed"), name="mixed_1")
+    document.place(top, document.part(box(1, 1, 1), "plain"), name="plain_1")
+    assembly = read_in(document.write(tmp_path / "mixed.step"))
+    assert sorted(p.name for p in assembly.prototypes.values()) == ["mixed", "plain"]
+    assert {i.path[0] for i in assembly.instances} == {"mixed_1", "plain_1"}
+    mixed = next(p for p in assembly.prototypes.values() if p.name == "mixed")
+    assert mixed.volume_m3 == pytest.approx(1e-6)
+
+
+def test_a_product_of_surfaces_has_no_volume_and_says_so(
+    box: Any, step: Any, tmp_path: Path, read_in: Any, codes_of: Any
+) -> None:
+    """A surface product before a solid one: no name moves to its neighbour, and the surface is reported."""
+    document = step()
+    top = document.assembly("top")
+    document.place(top, document.part(face(), "label"), name="label")
+    document.place(top, document.part(box(2, 2, 2), "block"), name="block")
+    by_name = {p.name: p for p in read_in(document.write(tmp_path / "surface.step")).prototypes.values()}
+    assert by_name["block"].volume_m3 == pytest.approx(8e-9)
+    assert not by_name["label"].has_solid
+    assert codes_of(by_name["label"]) == [GeometryCode.NO_SOLID]
+    assert len(by_name["label"].mesh) > 0
+
+
+def test_lost_characters_are_kept_and_marked(box: Any, step_part: Any, read_in: Any, codes_of: Any) -> None:
+    """A name that the exporter damaged stays as it is, and is marked for the matching."""
+    (part,) = read_in(step_part(box(1, 1, 1), "Pe?a 3")).prototypes.values()
+    assert part.name == "Pe?a 3"
+    assert GeometryCode.NAME in codes_of(part)
+
+
+def test_names_beyond_ascii_survive(box: Any, step: Any, tmp_path: Path, read_in: Any, codes_of: Any) -> None:
+    """What the file encodes rightly is read rightly, and not marked."""
+    document = step()
+    document.part(box(1, 1, 1), "Peça Ø5 – 漢字")
+    (part,) = read_in(document.write(tmp_path / "unicode.step")).prototypes.values()
+    assert part.name == "Peça Ø5 – 漢字"
+    assert codes_of(part) == []
+
+
+def test_the_part_number_is_the_product_s_id(box: Any, step_part: Any, read_in: Any) -> None:
+    """PRODUCT(id, name): the kernel gives the name only, the text has both."""
+    path = step_part(box(1, 1, 1), "bracket")
+    text = path.read_text("ascii").replace("PRODUCT('bracket','bracket'", "PRODUCT('F01-0042','bracket'")
+    path.write_text(text, "ascii")
+    (part,) = read_in(path).prototypes.values()
+    assert (part.name, part.part_number) == ("bracket", "F01-0042")
+
+
+def test_mirrored_and_scaled_placements_are_exact_or_refused_aloud(
+    box: Any, step: Any, tmp_path: Path, read_in: Any, codes_of: Any
+) -> None:
+    """A mirror moves the centre to the other side; a scale of 2 has eight times the volume."""
+    if int(occt.VERSION.split(".")[0]) < 8:
+        pytest.skip(f"the kernel {occt.VERSION} neither writes nor reads such placements")
+    mirror, double = gp_Trsf(), gp_Trsf()
+    mirror.SetMirror(gp_Ax2(gp_Pnt(0, 0, 0), gp_Dir(1, 0, 0)))
+    double.SetScale(gp_Pnt(0, 0, 0), 2.0)
+    document = step()
+    part, top = document.part(box(10, 20, 30), "part"), document.assembly("top")
+    document.place(top, part, mirror, "mirrored")
+    document.place(top, part, double, "doubled")
+    assembly = read_in(document.write(tmp_path / "stretched.step"))
+    assert codes_of(assembly) == [GeometryCode.SCALED]
+    prototype = next(iter(assembly.prototypes.values()))
+    volumes, coms, units = place(
+        [prototype.volume_m3] * 2,
+        [prototype.com_m] * 2,
+        [prototype.inertia_unit] * 2,
+        [i.transform for i in assembly.instances],
+    )
+    np.testing.assert_allclose(volumes, [6e-6, 48e-6], rtol=1e-12)
+    np.testing.assert_allclose(coms, [[-0.005, 0.010, 0.015], [0.010, 0.020, 0.030]], atol=1e-15)
+    np.testing.assert_allclose(units[1], units[0] * 32, rtol=1e-12, atol=1e-20)
+    assert np.linalg.det(assembly.instances[0].transform[:3, :3]) == pytest.approx(-1)
+
+
+def test_stretches_that_the_kernel_drops_are_told() -> None:
+    """Kernels before version 8 read a mirror as a turn and a scale as nothing; the text gives it away."""
+    plain = {"top": Node("top", "top", (Child("part", "part"),)), "part": Node("part", "part", (), True)}
+    (problem,) = lost_stretches(StepFile(Path("x.step"), stretched=2, nodes=plain))
+    assert "scales or mirrors parts in 2 places" in problem.message
+    mirrored = {**plain, "top": Node("top", "top", (Child("part", "part", np.diag([-1.0, 1, 1, 1])),))}
+    assert lost_stretches(StepFile(Path("x.step"), stretched=2, nodes=mirrored)) == []
+    assert lost_stretches(StepFile(Path("x.step"), stretched=0, nodes=plain)) == []
+
+
+def test_a_solid_inside_out_is_turned_and_said(box: Any, tmp_path: Path, read_in: Any, codes_of: Any) -> None:
+    """A reversed shell has a negative volume in every kernel, in silence; one real part in 100 has it."""
+    path = tmp_path / "reversed.brep"
+    assert BRepTools.Write_s(box(10, 20, 30).Reversed(), str(path))
+    (part,) = read_in(path).prototypes.values()
+    assert part.volume_m3 == pytest.approx(6e-6, rel=1e-9)
+    assert np.linalg.eigvalsh(part.inertia_unit).min() > 0
+    assert part.solids[0].reversed
+    assert codes_of(part) == [GeometryCode.NEGATIVE_VOLUME]
+
+
+def test_a_reversed_solid_inside_another_is_a_cavity(box: Any, tmp_path: Path, read_in: Any) -> None:
+    """Where the reversed solid lies in the material of another one, it is taken off; beside it, it counts."""
+    for name, at, volume in (("inside", (5, 5, 5), 7000), ("beside", (50, 0, 0), 9000)):
+        path = tmp_path / f"{name}.brep"
+        assert BRepTools.Write_s(compound(box(20, 20, 20), box(10, 10, 10, at).Reversed()), str(path))
+        (part,) = read_in(path).prototypes.values()
+        assert part.volume_m3 * 1e9 == pytest.approx(volume)
+        assert "some are not" in part.problems[-1].message
+
+
+def test_an_open_solid_is_invalid_and_its_mesh_disagrees(
+    box: Any, tmp_path: Path, read_in: Any, codes_of: Any
+) -> None:
+    """A box with a face missing, sold as a solid: the kernel computes a volume; nobody should believe it."""
+    builder, shell, solid = BRep_Builder(), TopoDS_Shell(), TopoDS_Solid()
+    builder.MakeShell(shell)
+    for part in occt.faces_of(box(20, 20, 20))[:5]:
+        builder.Add(shell, part)
+    builder.MakeSolid(solid)
+    builder.Add(solid, shell)
+    path = tmp_path / "open.brep"
+    assert BRepTools.Write_s(solid, str(path))
+    (prototype,) = read_in(path).prototypes.values()
+    assert codes_of(prototype) == [GeometryCode.INVALID_SHAPE, GeometryCode.MESH_MISMATCH]
+
+
+def test_a_nesting_bomb_is_refused_before_the_kernel_sees_it(tmp_path: Path, read_in: Any) -> None:
+    """Forty levels of two uses each name a million million parts in 20 kB; the count is made on the text."""
+    levels = 40
+    lines = []
+    for n in range(levels + 1):
+        lines.append(f"#{10 * n + 1}=PRODUCT('p{n}','p{n}','',());")
+        lines.append(f"#{10 * n + 2}=PRODUCT_DEFINITION_FORMATION('','',#{10 * n + 1});")
+        lines.append(f"#{10 * n + 3}=PRODUCT_DEFINITION('','',#{10 * n + 2},$);")
+    for n in range(levels):
+        for use in (4, 5):
+            lines.append(
+                f"#{10 * n + use}=NEXT_ASSEMBLY_USAGE_OCCURRENCE('','','',#{10 * n + 3},#{10 * n + 13},$);"
+            )
+    path = tmp_path / "bomb.step"
+    path.write_text(
+        "ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\n" + "\n".join(lines) + "\nENDSEC;\nEND-ISO-10303-21;\n"
+    )
+    with pytest.raises(DocumentError, match="1099511627776 placed parts, more than the 1000000 allowed"):
+        read_in(path)
+
+
+def test_a_product_that_contains_itself_is_refused(tmp_path: Path, read_in: Any) -> None:
+    """A ring of uses is an error with the product's name, not a hang."""
+    path = tmp_path / "ring.step"
+    path.write_text(
+        "ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\n"
+        "#1=PRODUCT('ring','ring','',());\n#2=PRODUCT_DEFINITION_FORMATION('','',#1);\n"
+        "#3=PRODUCT_DEFINITION('','',#2,$);\n#4=NEXT_ASSEMBLY_USAGE_OCCURRENCE('','','',#3,#3,$);\n"
+        "ENDSEC;\nEND-ISO-10303-21;\n"
+    )
+    with pytest.raises(DocumentError, match="the product 'ring' contains itself"):
+        read_in(path)

@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""For tests and benchmarks: a private PostgreSQL, empty databases, a server process, and a small caller."""
+
+from server_testing.caller import (
+    Answer,
+    Api,
+    Event,
+    EventReader,
+    bom,
+    form_body,
+    merge_body,
+    wait_until,
+)
+from server_testing.databases import Databases, empty_database, postgres
+from server_testing.process import ServerProcess
+
+__all__ = [
+    "Answer",
+    "Api",
+    "Databases",
+    "Event",
+    "EventReader",
+    "ServerProcess",
+    "bom",
+    "empty_database",
+    "form_body",
+    "merge_body",
+    "postgres",
+    "wait_until",
+]
