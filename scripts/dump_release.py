@@ -18,7 +18,10 @@ from pathlib import Path
 
 from silo_server.run import running_server
 from silo_server.settings import Settings
-from silo_server.testing import Api, Databases, bom, form_body
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
+
+from server_testing import Api, Databases, bom, form_body  # noqa: E402
 
 RELEASED = Path(__file__).resolve().parents[1] / "tests" / "server" / "released"
 PNG = b"\x89PNG\r\n\x1a\n" + b"\x00" * 40

@@ -26,7 +26,7 @@ class Case:
     tests: tuple[str, ...]
 
 
-ANALYTIC = "geometry/test_analytic.py::"
+ANALYTIC = "geometry/kernel/test_analytic.py::"
 PRODUCTS = "geometry/test_step_products.py::"
 REAL = "geometry/test_real_step.py::"
 STAND_IN = "cases/test_stand_ins.py::"

@@ -267,7 +267,7 @@ def test_what_does_not_converge_is_told() -> None:
 
 # --- where the geometry kernel gives up ---------------------------------------------------------------------
 
-WAVY = Path(__file__).parents[2] / "data" / "inertia" / "wavy.brep"
+WAVY = Path(__file__).parents[3] / "data" / "inertia" / "wavy.brep"
 WAVY_MM3 = 115.26410015893795
 """Seven times the outline's area, which was summed over 200 000 strips of its spline."""
 

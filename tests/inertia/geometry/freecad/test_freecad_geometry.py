@@ -105,7 +105,7 @@ def test_public_assemblies(
 @pytest.fixture(name="public_assemblies", scope="module")
 def _public_assemblies() -> Path:
     """The public FreeCAD assemblies; without them the test is skipped, loudly."""
-    found = Path(__file__).parents[3] / "../shared/data/assemblies"
+    found = Path(__file__).parents[4] / "../shared/data/assemblies"
     if not found.is_dir():
         pytest.skip(f"the FreeCAD test data is not at {found}")
     return found.resolve()
