@@ -21,7 +21,7 @@ from silo_server.settings import Settings
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
 
-from server_testing import Api, Databases, bom, form_body  # noqa: E402
+from server_testing import Api, Databases, bom, form_body
 
 RELEASED = Path(__file__).resolve().parents[1] / "tests" / "server" / "released"
 PNG = b"\x89PNG\r\n\x1a\n" + b"\x00" * 40

@@ -27,8 +27,8 @@ class Case:
 
 
 ANALYTIC = "geometry/kernel/test_analytic.py::"
-PRODUCTS = "geometry/test_step_products.py::"
-REAL = "geometry/test_real_step.py::"
+PRODUCTS = "geometry/step/test_step_products.py::"
+REAL = "geometry/step/test_real_step.py::"
 STAND_IN = "cases/test_stand_ins.py::"
 SPLIT = "cases/test_split_files.py::"
 MATCHING = "test_matching_cases.py::"
@@ -96,7 +96,7 @@ CASES: dict[int, Case] = {
     12: Case(
         "split files, nested", "stand-in for the koch arms and s1-c5-214",
         (SPLIT + "test_case_12_a_split_assembly_is_completed",
-         "geometry/test_split_assembly.py::test_a_sibling_may_be_split_itself"),
+         "geometry/step/test_split_assembly.py::test_a_sibling_may_be_split_itself"),
     ),
     13: Case(
         "the same without siblings", "stand-in, and real: so101_wrist_roll_pitch.step",
