@@ -42,6 +42,23 @@ class FileStore:
         key = self._write([thumbnail])[0] if thumbnail else None
         return StoredFile(clean_name(name), checksum, size, key)
 
+    def holds(self, checksum: str) -> bool:
+        """True where the file with this hash is here and undamaged; reads all of it."""
+        try:
+            with self._place(checksum).open("rb") as file:
+                return hashlib.file_digest(file, "sha256").hexdigest() == checksum
+        except OSError:
+            return False
+
+    def copy_from(self, other: FileStore, checksum: str) -> bool:
+        """Take a file over from another store; False where it does not have it, or has it damaged."""
+        try:
+            source = other._place(checksum).open("rb")
+        except OSError:
+            return False
+        with source:
+            return self._write(iter(lambda: source.read(CHUNK), b""), wanted=checksum)[0] == checksum
+
     def healthy(self) -> bool:
         """True where the store can be written to."""
         try:
@@ -53,7 +70,8 @@ class FileStore:
     def _place(self, checksum: str) -> Path:
         return self.root / checksum[:2] / checksum[2:4] / checksum
 
-    def _write(self, chunks: Iterable[bytes]) -> tuple[str, int]:
+    def _write(self, chunks: Iterable[bytes], wanted: str | None = None) -> tuple[str, int]:
+        """(hash, size); a content whose hash is not the one ``wanted`` is not kept."""
         self.root.mkdir(parents=True, exist_ok=True)
         digest, size = hashlib.sha256(), 0
         handle, name = tempfile.mkstemp(dir=self.root, prefix="upload-")
@@ -66,6 +84,8 @@ class FileStore:
                     out.write(chunk)
                 out.flush()
                 os.fsync(out.fileno())
+            if wanted not in (None, digest.hexdigest()):
+                return digest.hexdigest(), size
             target = self._place(digest.hexdigest())
             target.parent.mkdir(parents=True, exist_ok=True)
             os.replace(temporary, target)

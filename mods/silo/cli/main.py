@@ -25,6 +25,7 @@ _COMMANDS = (
     "sync",
     "register",
     "serve",
+    "backup",
     "watch",
     "inertia",
     "mass",

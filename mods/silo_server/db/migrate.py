@@ -111,19 +111,25 @@ def rebuilt(table: str) -> Iterator[BatchOperations]:
             connection.exec_driver_sql(sql)
 
 
+def check_revision(revision: str, more: Path | None = None) -> None:
+    """Raise ConfigError for the schema of a newer version."""
+    known = {
+        script.revision for script in ScriptDirectory.from_config(alembic_config(more=more)).walk_revisions()
+    }
+    if revision not in known:
+        raise ConfigError(
+            f"the database has the schema {revision} of a newer silo-mod, and this version knows schemas up "
+            f"to {max(known)}; nothing was changed. Start the newer version or restore a backup"
+        )
+
+
 def _apply(connection: Connection, revision: str, more: Path | None) -> bool:
     """True where something was applied."""
-    config = alembic_config(connection, more)
-    before = MigrationContext.configure(connection).get_current_heads()
-    known = {script.revision for script in ScriptDirectory.from_config(config).walk_revisions()}
-    if unknown := set(before) - known:
-        raise ConfigError(
-            f"the database has the schema {', '.join(sorted(unknown))} of a newer silo-mod, and this version "
-            f"knows schemas up to {max(known)}; nothing was changed. Start the newer version or restore a "
-            "backup"
-        )
-    command.upgrade(config, revision)
-    return MigrationContext.configure(connection).get_current_heads() != before
+    before = MigrationContext.configure(connection).get_current_revision()
+    if before is not None:
+        check_revision(before, more)
+    command.upgrade(alembic_config(connection, more), revision)
+    return MigrationContext.configure(connection).get_current_revision() != before
 
 
 def _check_foreign_keys(connection: Connection) -> None:

@@ -160,7 +160,13 @@ class Hub:
 
     async def _read_news(self) -> None:
         while True:
-            page = await asyncio.to_thread(self._read_page, self.head)
+            horizon, page = await asyncio.to_thread(self._read_page, self.head)
+            if horizon > self.head:
+                # The log was trimmed beyond what was read here, or a backup was restored: a gap.
+                self._ring.clear()
+                self._ring_bytes = 0
+                self.head = self._ring_start = horizon
+                self._wake()
             if not page:
                 return
             for frame in page:
@@ -186,9 +192,10 @@ class Hub:
             self._news.set()
         news.set()
 
-    def _read_page(self, after: int) -> list[Frame]:
+    def _read_page(self, after: int) -> tuple[int, list[Frame]]:
         with self._db.read() as tx:
-            return [to_frame(event) for event in log.read_after(tx, after, PAGE)]
+            horizon = log.horizon_of(tx)
+            return horizon, [to_frame(event) for event in log.read_after(tx, max(after, horizon), PAGE)]
 
     def _read_bounds(self) -> tuple[int, int]:
         with self._db.read() as tx:

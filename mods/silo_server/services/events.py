@@ -108,9 +108,14 @@ def newest(tx: Tx, limit: int, after: int = 0) -> list[DatedEvent]:
     return [DatedEvent(row.id, row.name, row.at, json.loads(row.data)) for row in rows]
 
 
+def horizon_of(tx: Tx) -> int:
+    """The newest id that was trimmed away."""
+    return int(get_state(tx, HORIZON) or 0)
+
+
 def bounds(tx: Tx) -> tuple[int, int]:
     """(horizon, head): the newest id that was trimmed away, and the newest id there is."""
-    horizon = int(get_state(tx, HORIZON) or 0)
+    horizon = horizon_of(tx)
     head = tx.conn.scalar(select(func.max(events.c.id))) or 0
     return horizon, max(head, horizon)
 

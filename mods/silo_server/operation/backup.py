@@ -1,0 +1,313 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Backup and restore of a server, database and files, while it serves.
+
+A backup is a folder::
+
+    manifest.json   format, schema, time, rows per table, SHA-256 of the database
+    silo.db         all tables of one snapshot, as SQLite, whichever database they are from
+    files/          every uploaded file and thumbnail that a revision refers to, by hash
+
+As the form is the same for both databases, a backup of SQLite can be restored to PostgreSQL and the other way
+round. The database is read before the files: those are written once, before the row that refers to them, and
+never deleted while a row does.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import sqlite3
+import tempfile
+from collections.abc import Callable, Collection, Iterator
+from contextlib import closing, contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import Connection, MetaData, Select, Table, column, func, insert, inspect, select, table, text
+from sqlalchemy.exc import SQLAlchemyError
+
+from silo.bom.errors import ConfigError
+from silo.durable import replacing, sync_folder
+from silo_server.clock import stamp, utc_now
+from silo_server.db.engine import EVENT_CHANNEL, MIGRATION_LOCK, Database, Tx, mode_of
+from silo_server.db.migrate import check_revision, upgrade
+from silo_server.db.state import put_state
+from silo_server.db.tables import events, items, metadata, revisions
+from silo_server.files import FileStore
+from silo_server.services import audit
+from silo_server.services.events import HORIZON
+from silo_server.settings import Settings
+from silo_server.values import SYSTEM, dumps
+
+FORMAT = 1
+PAGE = 5000
+CHUNK = 1024 * 1024
+# A restored server gives its events ids that none had before, so that every listener, even one that saw more
+# than the backup has, gets a reset and reads everything again.
+EVENT_ID_STEP = 1_000_000_000
+
+Report = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Manifest:
+    """What a backup says of itself. ``missing_files``: hashes that the server itself had lost."""
+
+    format: int
+    schema: str
+    made_at: str
+    database_sha256: str
+    rows: dict[str, int]
+    files: int
+    missing_files: list[str]
+
+
+def back_up(settings: Settings, target: Path, report: Report = lambda _: None) -> Manifest:
+    """Write a backup to the new folder ``target``; it is whole and verified, or it is not there.
+
+    Files that a revision refers to and that the store lost or damaged are named in the manifest; the rest is
+    saved all the same. Raises ConfigError.
+    """
+    if target.exists():
+        raise ConfigError(f"backup: {target} exists already; name a folder that does not exist")
+    if not target.parent.is_dir():
+        raise ConfigError(f"backup: there is no folder {target.parent}")
+    if settings.sqlite_path is not None and not settings.sqlite_path.is_file():
+        raise ConfigError(f"backup: there is no database {settings.sqlite_path}")
+    try:
+        part = Path(tempfile.mkdtemp(prefix=f".{target.name[:50]}.", suffix=".part", dir=target.parent))
+        try:
+            schema, rows = _save_tables(settings, part / "silo.db", report)
+            wanted = _checksums(part / "silo.db")
+            report(f"files: {len(wanted)}")
+            missing = _copy_files(FileStore(settings.storage), FileStore(part / "files"), wanted)
+            made = Manifest(
+                format=FORMAT,
+                schema=schema,
+                made_at=stamp(utc_now()),
+                database_sha256=_sha256(part / "silo.db"),
+                rows=rows,
+                files=len(wanted) - len(missing),
+                missing_files=missing,
+            )
+            with replacing(part / "manifest.json") as out:
+                out.write(json.dumps(asdict(made), indent=2).encode())
+            os.rename(part, target)
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
+        sync_folder(target.parent)
+    except OSError as error:
+        raise ConfigError(f"backup: {target} cannot be written: {error.strerror or error}") from error
+    return made
+
+
+def verify(source: Path) -> Manifest:
+    """The manifest of a backup that is whole: the database and all files are as they were written.
+
+    Raises ConfigError.
+    """
+    made = _read_manifest(source)
+    path = source / "silo.db"
+    if not path.is_file() or _sha256(path) != made.database_sha256:
+        raise ConfigError(f"restore: {path} is missing or damaged; use another backup")
+    store = FileStore(source / "files")
+    bad = [c for c in sorted(_checksums(path) - set(made.missing_files)) if not store.holds(c)]
+    if bad:
+        named = ", ".join(bad[:5]) + (" …" if len(bad) > 5 else "")
+        raise ConfigError(f"restore: {len(bad)} files of the backup are missing or damaged: {named}")
+    return made
+
+
+def restore(
+    settings: Settings, source: Path, *, replace: bool = False, report: Report = lambda _: None
+) -> Manifest:
+    """Make database and files those of the backup, in one transaction: all of it or nothing.
+
+    The backup is verified, and brought to the newest schema in a copy, before anything is touched. A server
+    may run meanwhile: it answers from the old state until the new one is committed; then its listeners get a
+    ``reset``. Files that the backup does not have stay in the store.
+
+    replace
+        needed where the database has items already.
+    """
+    made = verify(source)
+    report("the backup is whole")
+    try:
+        settings.storage.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix="restore-", dir=settings.storage) as folder:
+            copy = Path(folder) / "silo.db"
+            shutil.copyfile(source / "silo.db", copy)
+            with _open(Settings(database_url=f"sqlite:///{copy}")) as old, _open(settings) as db:
+                upgrade(old)
+                upgrade(db)
+                with db.read() as tx:
+                    present = tx.conn.scalar(select(func.count()).select_from(items)) or 0
+                if present and not replace:
+                    raise ConfigError(
+                        f"restore: the database has {present} items already; --replace replaces all of it by "
+                        "the backup"
+                    )
+                _copy_files(FileStore(source / "files"), FileStore(settings.storage), _checksums(copy))
+                with old.engine.connect() as reader, _exclusive(db) as writer:
+                    _replace_rows(reader, Tx(writer, SYSTEM, utc_now(), settings), made, report)
+    except OSError as error:
+        raise ConfigError(
+            f"restore: {settings.storage} cannot be written: {error.strerror or error}"
+        ) from error
+    return made
+
+
+@contextmanager
+def _open(settings: Settings) -> Iterator[Database]:
+    db = Database(settings)
+    try:
+        yield db
+    except SQLAlchemyError as error:
+        cause = str(getattr(error, "orig", None) or error).strip().partition("\n")[0]
+        raise ConfigError(f"the database cannot be used: {cause}") from error
+    finally:
+        db.close()
+
+
+@contextmanager
+def _exclusive(db: Database) -> Iterator[Connection]:
+    """A transaction that keeps all other writers, and migrations, waiting; readers go on."""
+    with db.engine.execution_options(silo_write=True).connect() as connection, connection.begin():
+        if connection.dialect.name == "postgresql":
+            connection.execute(text("SET LOCAL statement_timeout = 0"))
+            connection.execute(select(func.pg_advisory_xact_lock(MIGRATION_LOCK)))
+            names = ", ".join(sorted(metadata.tables))
+            connection.execute(text(f"LOCK TABLE {names} IN EXCLUSIVE MODE"))
+        yield connection
+
+
+def _save_tables(settings: Settings, path: Path, report: Report) -> tuple[str, dict[str, int]]:
+    rows: dict[str, int] = {}
+    with _open(settings) as db, _open(Settings(database_url=f"sqlite:///{path}")) as new, db.read() as tx:
+        if tx.postgres:
+            tx.conn.execute(text("SET LOCAL statement_timeout = 0"))
+        if not inspect(tx.conn).has_table("alembic_version"):
+            raise ConfigError("backup: this is no database of a Silo server")
+        schema = str(tx.conn.scalar(text("SELECT version_num FROM alembic_version")))
+        # The backup has the schema that the database has, also where that is older than this version's.
+        check_revision(schema)
+        upgrade(new, schema)
+        with new.engine.execution_options(silo_write=True).connect() as writer, writer.begin():
+            tables = MetaData()
+            tables.reflect(writer, only=lambda name, _: name in metadata.tables)
+            for target in reversed(tables.sorted_tables):
+                writer.execute(target.delete())
+            for target in tables.sorted_tables:
+                names = [c.name for c in target.columns]
+                origin = table(target.name, *[column(name) for name in names])
+                rows[target.name] = _copy_rows(tx.conn, select(*origin.columns), writer, target)
+                report(f"{target.name}: {rows[target.name]} rows")
+            _set_highest_ids(writer, _highest_ids(tx.conn, tables.tables.values()))
+    with closing(sqlite3.connect(path)) as saved:
+        saved.execute("PRAGMA journal_mode = DELETE")  # one file, with nothing beside it
+        if saved.execute("PRAGMA integrity_check").fetchall() != [("ok",)]:
+            raise ConfigError("backup: the copy of the database is damaged; is the disk sound?")
+        if saved.execute("PRAGMA foreign_key_check").fetchall():
+            raise ConfigError("backup: the database refers to rows that it does not have")
+    return schema, rows
+
+
+def _replace_rows(reader: Connection, tx: Tx, made: Manifest, report: Report) -> None:
+    highest = _highest_ids(tx.conn, metadata.sorted_tables)
+    for target in reversed(metadata.sorted_tables):
+        tx.conn.execute(target.delete())
+    for target in metadata.sorted_tables:
+        count = _copy_rows(reader, select(target), tx.conn, target)
+        report(f"{target.name}: {count} rows")
+    for name, value in _highest_ids(reader, metadata.sorted_tables).items():
+        highest[name] = max(highest.get(name, 0), value)
+    horizon = highest.get("events", 0) + EVENT_ID_STEP
+    put_state(tx, HORIZON, str(horizon))
+    # Servers that run look for events above the newest they know, and find by this one that all is new.
+    tx.conn.execute(
+        insert(events).values(
+            id=horizon + 1, name="server.state", data=dumps({"mode": mode_of(tx)}), at=tx.stamp
+        )
+    )
+    _set_highest_ids(tx.conn, {**highest, "events": horizon + 1})
+    audit.note(tx, "server.restored", detail=f"backup of {made.made_at}")
+    if tx.postgres:
+        tx.conn.execute(select(func.pg_notify(EVENT_CHANNEL, "")))
+
+
+def _copy_rows(reader: Connection, query: Select[Any], writer: Connection, target: Table) -> int:
+    count = 0
+    names = [c.name for c in target.columns]
+    with reader.execution_options(yield_per=PAGE).execute(query) as found:
+        for page in found.partitions(PAGE):
+            writer.execute(insert(target), [dict(zip(names, row, strict=True)) for row in page])
+            count += len(page)
+    return count
+
+
+def _counted(tables: Collection[Table]) -> list[str]:
+    """The tables whose ids the database counts up."""
+    return [t.name for t in tables if "id" in t.c and t.c["id"].type.python_type is int]
+
+
+def _highest_ids(connection: Connection, tables: Collection[Table]) -> dict[str, int]:
+    """The highest id that was ever given out, by table."""
+    names = _counted(tables)
+    if connection.dialect.name == "sqlite":
+        found = connection.execute(text("SELECT name, seq FROM sqlite_sequence")).all()
+        return {name: seq for name, seq in found if name in names}
+    highest = {}
+    for name in names:
+        sequence = connection.scalar(select(func.pg_get_serial_sequence(name, "id")))
+        called, last = connection.execute(text(f"SELECT is_called, last_value FROM {sequence}")).one()  # noqa: S608
+        if called:
+            highest[name] = int(last)
+    return highest
+
+
+def _set_highest_ids(connection: Connection, highest: dict[str, int]) -> None:
+    for name, value in highest.items():
+        if connection.dialect.name == "sqlite":
+            values = {"name": name, "seq": value}
+            connection.execute(text("DELETE FROM sqlite_sequence WHERE name = :name"), values)
+            connection.execute(text("INSERT INTO sqlite_sequence (name, seq) VALUES (:name, :seq)"), values)
+        else:
+            connection.execute(select(func.setval(func.pg_get_serial_sequence(name, "id"), value)))
+
+
+def _checksums(path: Path) -> set[str]:
+    """Every file that the saved database refers to."""
+    found: set[str] = set()
+    with closing(sqlite3.connect(path)) as saved:
+        for query in (
+            select(revisions.c.file_checksum),
+            select(revisions.c.thumbnail_key),
+            select(items.c.thumbnail_key),
+        ):
+            found.update(row[0] for row in saved.execute(f"{query.distinct()}") if row[0])
+    return found
+
+
+def _copy_files(source: FileStore, target: FileStore, wanted: Collection[str]) -> list[str]:
+    """Copy what the target lacks; the hashes that the source does not have, or has damaged."""
+    return [c for c in sorted(wanted) if not target.holds(c) and not target.copy_from(source, c)]
+
+
+def _read_manifest(source: Path) -> Manifest:
+    try:
+        made = Manifest(**json.loads((source / "manifest.json").read_text("utf-8")))
+    except (OSError, ValueError, TypeError) as error:
+        raise ConfigError(f"restore: {source} is no backup: its manifest.json cannot be read") from error
+    if made.format != FORMAT:
+        raise ConfigError(
+            f"restore: the backup has the format {made.format}, this version knows {FORMAT}; use a newer one"
+        )
+    return made
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
