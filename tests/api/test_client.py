@@ -141,7 +141,7 @@ def test_a_missing_route_is_not_a_missing_assembly(
 
 def test_the_version_goes_along_as_a_tag(server: Any, client: SiloClient) -> None:
     """If-Match, quoted once whatever was given; the BOM's version is read from ETag or body."""
-    server.on(MERGE, {"status": "merged"})
+    server.on(MERGE, {"status": "merged", "diff": {"added": []}})
     for version in (7, "7", '"7"'):
         client.merge_bom("A01-0001", REQUEST, if_match=version)
     assert [seen.headers["If-Match"] for seen in server.seen] == ['"7"'] * 3

@@ -499,7 +499,10 @@ def test_a_killed_process_leaves_everything_to_the_next(
     sha256 = hashlib.sha256(model.read_bytes()).hexdigest()
     server.on("GET /api/items/A01-0001/revisions", [])
     server.on("POST /api/items/A01-0001/file", answer(201, {"revision_number": 1}, before=uploaded))
-    server.on("POST /api/items/A01-0001/bom/merge", answer(200, {"status": "merged"}, before=merged))
+    server.on(
+        "POST /api/items/A01-0001/bom/merge",
+        answer(200, {"status": "merged", "diff": {"added": []}}, before=merged),
+    )
     outbox.add(server.url, TOP, file=model, comment="c1", bom=bom(4))
     command = [sys.executable, "-c", SENDER, str(outbox.path), server.url]
     process = subprocess.Popen(command)

@@ -136,7 +136,7 @@ def test_a_change_is_not_repeated(
 
 def test_a_merge_with_a_sync_id_is_repeated_as_it_is(server: Any, client: SiloClient, answer: Any) -> None:
     """The server knows the sync_id, so a repeat is harmless."""
-    server.on(MERGE, answer(drop=True), answer(502), {"status": "merged", "diff": {}})
+    server.on(MERGE, answer(drop=True), answer(502), {"status": "merged", "diff": {"added": []}})
     assert client.merge_bom("A01-0001", merge_request()).status == "merged"
     assert [seen.json()["sync_id"] for seen in server.seen] == ["sync-1"] * 3
     assert len({seen.body for seen in server.seen}) == 1
@@ -144,7 +144,7 @@ def test_a_merge_with_a_sync_id_is_repeated_as_it_is(server: Any, client: SiloCl
 
 def test_the_merge_request_is_the_one_of_the_spec(server: Any, client: SiloClient) -> None:
     """Spec §5, byte for byte in meaning: no further keys, whole numbers as integers."""
-    server.on(MERGE, {"status": "merged"})
+    server.on(MERGE, {"status": "merged", "diff": {"added": []}})
     client.merge_bom("A01-0001", merge_request(None))
     assert server.seen[0].body.replace(b" ", b"") == (
         b'{"source":"assembly","entries":[{"child_part_number":"F01-0001","quantity":2,"source":"assembly"}]}'
@@ -243,7 +243,7 @@ def test_a_change_follows_within_the_server_with_its_body(
 ) -> None:
     """308 keeps method and body."""
     server.on(MERGE, answer(308, headers={"Location": "/v2/merge"}))
-    server.on("POST /v2/merge", {"status": "merged"})
+    server.on("POST /v2/merge", {"status": "merged", "diff": {"added": []}})
     client.merge_bom("A01-0001", merge_request())
     assert server.seen[0].body == server.seen[1].body
 

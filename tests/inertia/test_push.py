@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from silo.bom.errors import NotFoundError
+from silo.bom.errors import AuthError, NotFoundError, ServerFaultError, SiloError
 from silo.inertia.bodies import box
 from silo.inertia.massrule import Options
 from silo.inertia.push import describe, plan_push, push
@@ -30,11 +30,16 @@ class MemoryItems:
 
     items: dict[str, StoredItem]
     revisions: list[tuple[str, str]] = field(default_factory=list)
+    asked: list[str] = field(default_factory=list)
+    trouble: SiloError | None = None
 
-    def get_item(self, part_number: str, /) -> StoredItem:
+    def get_properties(self, part_number: str, /) -> Mapping[str, Any]:
+        self.asked.append(part_number)
+        if self.trouble is not None:
+            raise self.trouble
         if part_number not in self.items:
             raise NotFoundError(f"no item {part_number}")
-        return self.items[part_number]
+        return self.items[part_number].properties
 
     def update_item(self, part_number: str, /, **changes: Any) -> StoredItem:
         self.revisions.append((part_number, changes["comment"]))
@@ -83,6 +88,21 @@ def test_push_keeps_other_properties_and_runs_once(report: Any) -> None:
     again = push(items, plan_push(report))
     assert (again.written, again.unchanged) == ((), ("F01-0001",))
     assert items.revisions == [("F01-0001", "Mass properties from arm.step and bom.csv")]
+
+
+def test_properties_that_cannot_be_read_are_not_written_over(report: Any) -> None:
+    """Each such item is named; the others are tried."""
+    items = MemoryItems({}, trouble=ServerFaultError("cannot be read"))
+    done = push(items, plan_push(report))
+    assert [number for number, _ in done.failed] == ["F01-0001", "F01-0002"]
+    assert (items.revisions, len(items.asked)) == ([], 2)
+
+
+def test_a_refused_token_ends_the_run(report: Any) -> None:
+    """Asked once, and reported for every item that was left."""
+    items = MemoryItems({}, trouble=AuthError("no"))
+    assert [number for number, _ in push(items, plan_push(report)).failed] == ["F01-0001", "F01-0002"]
+    assert len(items.asked) == 1
 
 
 def test_identities_of_the_document_give_numbers(report: Any) -> None:

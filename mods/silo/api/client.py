@@ -26,6 +26,7 @@ from silo.api.sse import ServerEvent
 from silo.api.stream import SILENCE, HttpEventStream, open_stream
 from silo.api.transport import Call, Cancel, Timeouts, Transport, stop_if
 from silo.api.wire import Revision, ServerState, User
+from silo.bom.errors import RouteMissingError, ServerFaultError
 
 
 class SiloClient(ItemCalls, BomCalls):
@@ -126,6 +127,31 @@ class SiloClient(ItemCalls, BomCalls):
         found = reply.models(Revision, "revisions", "items", "data")
         return sorted(found, key=lambda revision: revision.revision_number, reverse=True)
 
+    def get_properties(self, part_number: str, /) -> dict[str, Any]:
+        """All properties of an item, from its newest revision where the item's own answer carries none.
+
+        Raises :class:`silo.bom.errors.ServerFaultError` where they cannot be read: no answer is not "none".
+        """
+        item = self.get_item(part_number)
+        if item.properties:
+            return dict(item.properties)
+        try:
+            newest = next(iter(self.revisions(part_number)), None)
+        except RouteMissingError:
+            newest = None
+        if newest is None and ("properties" in item.model_fields_set or not item.current_revision):
+            return {}
+        number = newest.revision_number if newest is not None else item.current_revision
+        if newest is not None and "properties" in newest.model_fields_set:
+            return dict(newest.properties)
+        asked = self._get(f"revision {number} of {part_number}", *_revision(part_number, number)).mapping()
+        if "properties" not in asked or not isinstance(asked["properties"], dict | None):
+            raise ServerFaultError(
+                f"{self._address.host} does not show the properties of {part_number}; nothing was written: "
+                "it would replace properties that are not known here"
+            )
+        return dict(asked["properties"] or {})
+
     def upload_file(
         self,
         part_number: str,
@@ -187,6 +213,10 @@ class SiloClient(ItemCalls, BomCalls):
             for event in stream:
                 stop_if(cancelled)
                 yield event
+
+
+def _revision(part_number: str, number: int) -> tuple[str, ...]:
+    return ("items", part_number, "revisions", str(number))
 
 
 if TYPE_CHECKING:

@@ -310,8 +310,10 @@ def push_report(
     _say(f"Silo: {written} written, {len(done.unchanged)} had these numbers already.")
     if done.unknown:
         _say(f"Unknown to the server: {', '.join(done.unknown)}")
+    for number, error in done.failed:
+        _say(f"Not written: {number}: {error}")
     _tell_skipped(plan)
-    return 1 if done.unknown else 0
+    return 3 if done.failed else 1 if done.unknown else 0
 
 
 def _tell_plan(plan: PushPlan) -> None:

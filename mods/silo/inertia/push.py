@@ -13,7 +13,8 @@ from collections.abc import Callable, Mapping, Set
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from silo.bom.errors import NotFoundError
+from silo.api.policy import Scope, judge
+from silo.bom.errors import NotFoundError, SiloError
 from silo.inertia.bom.rows import BomCode
 from silo.inertia.codes import MassCode, Source
 from silo.inertia.model import GeometryCode
@@ -33,20 +34,11 @@ DOUBTS = (
 VOUCHED = (Source.BOM_MASS, Source.MATERIAL, Source.STEP_DENSITY)
 
 
-class ItemLike(Protocol):
-    """An item of the server."""
-
-    @property
-    def part_number(self) -> str: ...
-    @property
-    def properties(self) -> Mapping[str, Any]: ...
-
-
 class Items(Protocol):
     """What a push needs of a server; :class:`silo.api.client.SiloClient` has it."""
 
-    def get_item(self, part_number: str, /) -> ItemLike: ...
-    def update_item(self, part_number: str, /, **changes: Any) -> ItemLike: ...
+    def get_properties(self, part_number: str, /) -> Mapping[str, Any]: ...
+    def update_item(self, part_number: str, /, **changes: Any) -> object: ...
 
 
 @dataclass(frozen=True)
@@ -77,11 +69,12 @@ class PushPlan:
 
 @dataclass(frozen=True)
 class Pushed:
-    """What was done: part numbers by outcome."""
+    """What was done: part numbers by outcome. ``failed``: not written, and why."""
 
     written: tuple[str, ...] = ()
     unchanged: tuple[str, ...] = ()
     unknown: tuple[str, ...] = ()
+    failed: tuple[tuple[str, SiloError], ...] = ()
     plan: PushPlan = field(default_factory=lambda: PushPlan(()))
 
 
@@ -127,23 +120,40 @@ def plan_push(
 
 
 def push(items: Items, plan: PushPlan, told: Callable[[str], None] = lambda part_number: None) -> Pushed:
-    """Write a plan. Other properties of an item stay; an item that has the numbers already is left alone."""
-    written, unchanged, unknown = [], [], []
+    """Write a plan. Other properties of an item stay; an item that has the numbers already is left alone.
+
+    An item whose properties cannot be read is not written. An error that concerns all items ends the run: the
+    items that are left have it as their reason.
+    """
+    written: list[str] = []
+    unchanged: list[str] = []
+    unknown: list[str] = []
+    failed: list[tuple[str, SiloError]] = []
+    stopped: SiloError | None = None
     for wanted in plan.items:
+        if stopped is not None:
+            failed.append((wanted.part_number, stopped))
+            continue
         told(wanted.part_number)
         try:
-            item = items.get_item(wanted.part_number)
+            (written if _write(items, wanted, plan.comment) else unchanged).append(wanted.part_number)
         except NotFoundError:
             unknown.append(wanted.part_number)
-            continue
-        # The server replaces properties as a whole, so that what others wrote goes along.
-        merged = {**item.properties, **wanted.properties}
-        if merged == dict(item.properties):
-            unchanged.append(wanted.part_number)
-            continue
-        items.update_item(wanted.part_number, properties=merged, comment=plan.comment)
-        written.append(wanted.part_number)
-    return Pushed(tuple(written), tuple(unchanged), tuple(unknown), plan)
+        except SiloError as error:
+            failed.append((wanted.part_number, error))
+            stopped = error if judge(error).scope is not Scope.ENTRY else None
+    return Pushed(tuple(written), tuple(unchanged), tuple(unknown), tuple(failed), plan)
+
+
+def _write(items: Items, wanted: PushItem, comment: str) -> bool:
+    """False where the item has these numbers already."""
+    known = items.get_properties(wanted.part_number)
+    # The server replaces properties as a whole, so that what others wrote goes along.
+    merged = {**known, **wanted.properties}
+    if merged == dict(known):
+        return False
+    items.update_item(wanted.part_number, properties=merged, comment=comment)
+    return True
 
 
 def _gap(part: PartResult) -> str | None:

@@ -99,6 +99,9 @@ class FakeSilo(FakeStore):
     def get_item(self, part_number: str, /) -> Item:
         return self._stored(part_number).item
 
+    def get_properties(self, part_number: str, /) -> dict[str, Any]:
+        return dict(self._stored(part_number).item.properties)
+
     def search_items(
         self, query: str = "", *, item_type: str | None = None, limit: int = 50, offset: int = 0
     ) -> list[Item]:
