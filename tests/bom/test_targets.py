@@ -386,7 +386,10 @@ def test_a_broken_link_does_not_hide_the_others(top: Doc, bolt: Any) -> None:
     """What can be counted is counted; the finding says the rest."""
     asm = top.assembly(broken(top, "X", FindingCode.MISSING_FILE, "b.FCStd"), top.link("L", bolt))
     found = extract(asm)
-    assert [entry.quantity for entry in found.entries] == [1]
+    assert [(entry.doc_path, entry.missing) for entry in found.entries] == [
+        ("/v/b.FCStd", True),
+        ("/v/bolt.FCStd", False),
+    ]
     assert found.blocked
 
 

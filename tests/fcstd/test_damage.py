@@ -86,7 +86,9 @@ def test_a_target_that_cannot_say_what_it_is_is_the_problem_of_its_links(
     found = walk(tmp_path, damaged(sub_assembly().xml(), obj, prop))
     finding = the_only(found)
     assert finding.where == tuple(Place(str(tmp_path / "top.FCStd"), name) for name in ("One", "Two"))
-    assert quantities(found) == {"plate.FCStd": 1}
+    assert quantities(found) == {"sub.FCStd": 2, "plate.FCStd": 1}
+    assert [entry.missing for entry in found.entries] == [True, False]
+    assert found.entries[0].children == ()
 
 
 def test_a_damaged_inner_group_leaves_the_other_members(tmp_path: Path) -> None:

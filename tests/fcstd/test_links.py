@@ -113,7 +113,7 @@ def test_the_walker_reports_each_missing_file_once(tmp_path: Path) -> None:
     )
     doc.add("App::Part", "A", Group=_members("L1", "L2", "L3"))
     found = extract(open_document(doc.save(tmp_path / "top.FCStd")).getObject("A"))
-    assert [entry.quantity for entry in found.entries] == [1]
+    assert [(entry.quantity, entry.missing) for entry in found.entries] == [(2, True), (1, False)]
     assert [f.code for f in found.findings] == [FindingCode.MISSING_FILE]
     assert found.blocked
     assert "L1" in found.findings[0].message

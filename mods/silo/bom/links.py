@@ -14,6 +14,7 @@ together. It walks live FreeCAD objects, objects read from FCStd files and the t
 
 from __future__ import annotations
 
+import os.path
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -23,7 +24,7 @@ from silo.bom.findings import Finding, FindingCode, Place
 from silo.bom.identity import identity_findings, identity_of
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.roots import links_beside
-from silo.bom.walk.contents import Count, Key, Reader
+from silo.bom.walk.contents import Count, Key, Lost, Reader
 from silo.bom.walk.kinds import is_container, is_named_assembly
 from silo.bom.walk.notes import Notes
 from silo.bom.walk.rings import Rings
@@ -99,6 +100,8 @@ class _Walker:
         Nameless ones are told apart by the order in which their document showed them, so that two documents
         made of one file agree.
         """
+        if isinstance(obj, Lost):
+            return (self._canonical_path(obj.file), obj.name)
         path, name = key = self.key(obj)
         if not path or not name.startswith(NAMELESS):
             return key
@@ -109,7 +112,9 @@ class _Walker:
         return (path, f"{NAMELESS}{place + 1}" if place else "")
 
     def _path(self, obj: Any) -> str:
-        path = getattr(getattr(obj, "Document", None), "FileName", "") or ""
+        return self._canonical_path(getattr(getattr(obj, "Document", None), "FileName", "") or "")
+
+    def _canonical_path(self, path: str) -> str:
         if not path or self._canonical is None:
             return path
         if path not in self._paths:
@@ -119,6 +124,9 @@ class _Walker:
     def entry_for(self, obj: Any) -> BomEntry:
         """What an object says of itself, wherever it is used."""
         path, name = key = self.component(obj)
+        if isinstance(obj, Lost):
+            stem = os.path.splitext(os.path.basename(path.replace("\\", "/")))[0]
+            return BomEntry(path, object_name=name, missing=True, label=obj.label, document_label=stem)
         if key not in self._heads:
             self._heads[key] = BomEntry(
                 doc_path=path,
@@ -152,7 +160,7 @@ class _Walker:
 
     def _is_container(self, key: Key, target: Any) -> bool:
         if key not in self._containers:
-            self._containers[key] = is_container(target)
+            self._containers[key] = not isinstance(target, Lost) and is_container(target)
         return self._containers[key]
 
     def _assembly(self, container: Any, level: int, depth: int, entry: Key) -> tuple[BomEntry, ...]:

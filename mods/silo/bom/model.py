@@ -58,6 +58,9 @@ class BomEntry:
         FreeCAD ``Name`` (with ``doc_path`` the component's key) and ``Label`` (for people only).
     is_assembly
         True for a sub-assembly, also for an empty one.
+    missing
+        the component's file or object is not there (or cannot be read). ``doc_path`` and ``object_name``
+        are then what the link records, and nothing is known of its children.
     individual_links, link_objects
         plain ``App::Link`` objects (no array), and all ``App::Link`` objects, that were counted.
     document_label
@@ -75,6 +78,7 @@ class BomEntry:
     children: tuple[BomEntry, ...] = ()
     consolidation_warning: bool = False
     object_name: str = ""
+    missing: bool = False
     label: str = field(default="", compare=False)
     is_assembly: bool = field(default=False, compare=False)
     individual_links: int = field(default=0, compare=False)

@@ -18,7 +18,9 @@ from silo.bom.snapshot import to_plain
 
 
 def component(entry: BomEntry, base: str) -> str:
-    return str(Place(os.path.relpath(entry.doc_path, base), entry.object_name))
+    """``file#object``; a missing one is marked."""
+    place = str(Place(os.path.relpath(entry.doc_path, base), entry.object_name))
+    return f"{place} (missing)" if entry.missing else place
 
 
 def bom_of(entries: Iterable[BomEntry], base: str) -> dict[str, Any]:

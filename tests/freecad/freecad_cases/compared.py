@@ -61,7 +61,8 @@ def our_rows(entries: Iterable[BomEntry], index: str = "") -> Iterator[list[str]
     """Our BOM in the same shape as FreeCAD's."""
     for number, entry in enumerate(entries, start=1):
         here = f"{index}{number}"
-        yield [here, entry.label, os.path.basename(entry.doc_path), str(entry.quantity)]
+        name = f"{entry.label} (missing)" if entry.missing else entry.label
+        yield [here, name, os.path.basename(entry.doc_path), str(entry.quantity)]
         yield from our_rows(entry.children, f"{here}.")
 
 

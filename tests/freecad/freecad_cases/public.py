@@ -35,9 +35,7 @@ def public_assemblies() -> list[PublicAssembly]:
             # An Assembly4 "Parts" group beside the model holds spares and is no root of the BOM.
             if root["name"] != "Parts":
                 for one in root["instance_counts"]:
-                    # A link into a missing file stands in the truth, but nobody can know what it holds.
-                    if one["file"] not in told["missing_files"]:
-                        counts[one["file"], one["object"]] += one["external"]
+                    counts[one["file"], one["object"]] += one["external"]
         found.append(
             PublicAssembly(
                 file.name.removesuffix(".fc100.json"),

@@ -21,6 +21,7 @@ UUID_3 = "33333333-4444-4555-8666-777777777777"
 
 BOLT, PLATE, WASHER = "bolt.FCStd#Bolt", "plate.FCStd#Plate", "washer.FCStd#Washer"
 SUB = "sub.FCStd#Sub"
+LOST = "bad.FCStd#Bad (missing)"
 SUB_CONTENT = {BOLT: 2, PLATE: 1}
 
 
@@ -126,7 +127,7 @@ TRUTH: dict[str, Truth] = {
     ),
     "assembly_link_never_recomputed": _is({SUB: (1, SUB_CONTENT)}, consolidated=(BOLT,)),
     "assembly_below_a_part": _is(
-        {SUB: (1, {BOLT: 2}), BOLT: 1}, live_0_20=_is({BOLT: 1}, lost_assembly=("top.FCStd#SubLink",))
+        {SUB: (1, {BOLT: 2}), BOLT: 1}, live_0_20=_is({f"{SUB} (missing)": 1, BOLT: 1}, lost_assembly=("top.FCStd#SubLink",))
     ),
     "joints_and_sheets": _is({BOLT: 2}, consolidated=(BOLT,)),
     "sheets_sketches_datums": _is({BOLT: 1}),
@@ -163,10 +164,18 @@ TRUTH: dict[str, Truth] = {
     "assembly3_container": _is({BOLT: 2}, consolidated=(BOLT,)),
     "two_models_in_one_file": Truth({}, error="holds 2 assemblies: Top (Top), Second (Second)"),
     # --- files ------------------------------------------------------------------------------------------
-    "missing_file": _is({BOLT: 1}, missing_file=("top.FCStd#Lost1", "top.FCStd#Lost2")),
-    "missing_file_below": _is({SUB: (1, {BOLT: 2})}, consolidated=(BOLT,), missing_file=("sub.FCStd#Plate",)),
-    "target_deleted": _is({"kit.FCStd#Plate": 1}, missing_object=("top.FCStd#Lost",)),
-    "sub_object_deleted": _is({BOLT: 1}, missing_object=("top.FCStd#Lost",)),
+    "missing_file": _is({BOLT: 1, "gone.FCStd#Gone (missing)": 2}, missing_file=("top.FCStd#Lost1", "top.FCStd#Lost2")),
+    "missing_file_below": _is(
+        {SUB: (1, {BOLT: 2, f"{PLATE} (missing)": 1})},
+        consolidated=(BOLT,),
+        missing_file=("sub.FCStd#Plate",),
+    ),
+    "target_deleted": _is(
+        {"kit.FCStd#Bolt (missing)": 1, "kit.FCStd#Plate": 1}, missing_object=("top.FCStd#Lost",)
+    ),
+    "sub_object_deleted": _is(
+        {BOLT: 1, "frame.FCStd#Inner (missing)": 1}, missing_object=("top.FCStd#Lost",)
+    ),
     "object_cycle": _is({BOLT: 1}, in_document_link=("top.FCStd#ToTwo", "top.FCStd#ToOne")),
     "document_cycle": _is({"other.FCStd#Other": (1, {BOLT: 1})}, cycle=("other.FCStd#ToTop",)),
     "awkward_names": _is(
@@ -175,7 +184,7 @@ TRUTH: dict[str, Truth] = {
     "parent_path": _is({"parts/bolt.FCStd#Bolt": 1}, top="assemblies/deep/top.FCStd"),
     "symlinked_folder": _is({"real/bolt.FCStd#Bolt": 2}, consolidated=("real/bolt.FCStd#Bolt",)),
     "saved_elsewhere": _is(
-        {},
+        {"new/deeper/parts/bolt.FCStd#Bolt (missing)": 1, "new/deeper/parts/plate.FCStd#Plate (missing)": 1},
         top="new/deeper/top.FCStd",
         missing_file=("new/deeper/top.FCStd#Bolt", "new/deeper/top.FCStd#Plate"),
     ),
@@ -185,12 +194,12 @@ TRUTH: dict[str, Truth] = {
     "expression_only": _is({BOLT: 1}),
     # FreeCAD (with its fix of CVE-2026-73235) ignores the declaration; our reader refuses such a file.
     "doctype": _is(
-        {BOLT: 1}, unreadable_file=("top.FCStd#BadLink",), live=_is({BOLT: 1, "bad.FCStd#Bad": 1})
+        {BOLT: 1, LOST: 1}, unreadable_file=("top.FCStd#BadLink",), live=_is({BOLT: 1, "bad.FCStd#Bad": 1})
     ),
-    "truncated_zip": _is({BOLT: 1}, unreadable_file=("top.FCStd#BadLink",)),
-    "no_document_xml": _is({BOLT: 1}, unreadable_file=("top.FCStd#BadLink",)),
-    "lfs_pointer": _is({BOLT: 1}, lfs_pointer=("top.FCStd#BadLink",)),
-    "empty_file": _is({BOLT: 1}, unreadable_file=("top.FCStd#BadLink",)),
+    "truncated_zip": _is({BOLT: 1, LOST: 1}, unreadable_file=("top.FCStd#BadLink",)),
+    "no_document_xml": _is({BOLT: 1, LOST: 1}, unreadable_file=("top.FCStd#BadLink",)),
+    "lfs_pointer": _is({BOLT: 1, LOST: 1}, lfs_pointer=("top.FCStd#BadLink",)),
+    "empty_file": _is({BOLT: 1, LOST: 1}, unreadable_file=("top.FCStd#BadLink",)),
     # --- identity ---------------------------------------------------------------------------------------
     "identity_in_meta": _is({BOLT: 1}, uuids={BOLT: UUID_1}),
     "identity_in_document_property": _is({BOLT: 1}, uuids={BOLT: UUID_1}),

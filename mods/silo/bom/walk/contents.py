@@ -9,6 +9,7 @@ The rules of this module:
 * a Draft array counts its original, which is not counted again beside it;
 * a link to a link group of the same file is one more instance of all that the group bundles; any other link
   into the same file is construction geometry;
+* a broken link brings a :class:`Lost` component with its quantity, and a finding that blocks;
 * what a damaged file does not tell is a finding that blocks; the rest is counted.
 
 Nothing here depends on where the assembly is used, so each is read once.
@@ -20,8 +21,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from silo.bom.document import derived, own, same_document
+from silo.bom.document import derived, label_of, own, same_document
 from silo.bom.errors import DocumentError
+from silo.bom.findings import FindingCode
 from silo.bom.walk.copies import stale_copies
 from silo.bom.walk.kinds import COMPONENTS, INLINE, Kind, flattened, is_container, kind_of, no_component
 from silo.bom.walk.notes import Notes
@@ -41,9 +43,29 @@ KeyOf = Callable[[Any], Key]
 # Groups that link to groups: a file does not need many of these, an attack does.
 _MAX_NESTING = 32
 
+# A link without a target, and one that leads back to itself, stand for no component.
+_NO_COMPONENT_LOST = (FindingCode.UNSET_LINK, FindingCode.CYCLE)
+
 _COUNTABLE = COMPONENTS | {Kind.DRAFT_ARRAY}
 _REPEATABLE = _COUNTABLE | INLINE
 _WIDER = _REPEATABLE - COMPONENTS
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """What a broken link stands for: a component that nobody can look at.
+
+    ``file`` and ``name`` as the link records them, the file in full. ``label`` is for people.
+    """
+
+    file: str
+    name: str
+    label: str
+
+    @property
+    def key(self) -> Key:
+        """The key that the component would have, were it there."""
+        return (self.file, self.name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +74,8 @@ class Count:
 
     shown
         the object that a person sees in the tree.
+    target
+        the component: a document object, or :class:`Lost`.
     link
         True where that object is itself an ``App::Link`` to the component.
     """
@@ -275,7 +299,8 @@ class _Reading:
         if target.obj is None:
             self._holds_components = True
             self._notes.broken(link, target.problem)
-        elif target.element:
+            return self._lost(link, target)
+        if target.element:
             self._notes.sub_element(link, target.element)
         elif target.excluded:
             self._holds_components = True
@@ -283,6 +308,14 @@ class _Reading:
         else:
             return self._whole_object(key, link, target)
         return {}
+
+    def _lost(self, link: Any, target: Target) -> _Worth:
+        """A broken link counts like any other where it says what it stood for; else its finding must do."""
+        problem = target.problem
+        if problem is None or not problem.file or problem.code in _NO_COMPONENT_LOST:
+            return {}
+        lost = Lost(problem.file, problem.obj, label_of(link))
+        return {lost.key: (lost, target.instances)}
 
     def _whole_object(self, key: Key, link: Any, target: Target) -> _Worth:
         name = self._key(target.obj)
