@@ -184,8 +184,9 @@ def sync(
 def merge_request(resolved: Resolved, sync_id: str, document: SourceDocument | None = None) -> MergeRequest:
     """The request of spec §5: the direct children only."""
     entries = [
-        MergeEntry(child_part_number=entry.part_number or "", quantity=entry.quantity)
+        MergeEntry(child_part_number=entry.part_number, quantity=entry.quantity)
         for entry in resolved.entries
+        if entry.part_number is not None
     ]
     return MergeRequest(entries=entries, sync_id=sync_id, document=document)
 

@@ -9,6 +9,7 @@ import pytest
 from fakes import Doc, edit
 
 from silo.bom import FindingCode, Severity, extract, extract_bom_links
+from silo.bom.document import LinkProblem
 from silo.bom.findings import Finding
 from silo.bom.model import Extraction
 
@@ -547,3 +548,28 @@ def test_a_chain_through_another_file_back_home_is_construction_geometry(top: Do
     found = extract(top.assembly(top.link("L1", there)))
     assert found.entries == ()
     assert found.findings_of(FindingCode.IN_DOCUMENT_LINK)
+
+
+@pytest.mark.parametrize(
+    ("code", "file", "lines"),
+    [
+        (FindingCode.MISSING_FILE, "parts/gone.FCStd", {("/v/parts/gone.FCStd", "Body"): 8}),
+        (FindingCode.LFS_POINTER, "gone.FCStd", {("/v/gone.FCStd", "Body"): 8}),
+        (FindingCode.UNSET_LINK, "", {}),
+        (FindingCode.BROKEN_LINK, "", {}),
+    ],
+)
+def test_a_missing_component_is_counted_like_any_other(
+    code: FindingCode, file: str, lines: dict[tuple[str, str], int]
+) -> None:
+    """Its arrays multiply, its group counts; only a link that records no file has no line."""
+    top = Doc("/v/top.FCStd")
+    lost = top.link("Lost", None, ElementCount=3, LinkProblem=LinkProblem(code, file, "Body"))
+    again = top.link("Again", None, LinkProblem=LinkProblem(code, file, "Body"))
+    array = top.add("Part::FeaturePython", "Array", Base=lost, Count=2)
+    group = top.link_group("Group", again)
+    twin = top.link("Twin", group)
+    found = extract(top.assembly(array, lost, group, twin))
+    assert {entry.key: entry.quantity for entry in found.entries} == lines
+    assert all(entry.missing and not entry.consolidation_warning for entry in found.entries)
+    assert found.blocked == (code is not FindingCode.UNSET_LINK)

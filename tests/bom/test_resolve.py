@@ -17,6 +17,7 @@ from silo.bom.resolve import (
     consolidation_message,
     merge_lines,
     numbered_findings,
+    resolve_with,
     unregistered_findings,
 )
 
@@ -242,3 +243,19 @@ def test_an_identity_is_told_by_the_number_that_people_know() -> None:
     told = numbered_findings((finding, other), {"U-1": {"part_number": "M01-0001"}, "u-2": None})
     assert told[0].message == "2 files carry the same Silo identity, that of M01-0001: a, b. Which?"
     assert told[1] == other
+
+
+def test_missing_components_stay_in_place_without_a_number() -> None:
+    """Nobody can look them up, and nobody can register what is not there; two of them stay two lines."""
+    lost = [BomEntry(f"/v/{name}.FCStd", object_name="Body", quantity=2, missing=True) for name in "ab"]
+    held = BomEntry("/v/sub.FCStd", silo_uuid="u-sub", children=(lost[0],))
+    known = {"u-sub": {"part_number": "S-1"}}
+    resolved, unresolved = resolve_with([held, *lost], known)
+    assert [(entry.part_number, entry.missing, entry.quantity) for entry in resolved] == [
+        ("S-1", False, 1),
+        (None, True, 2),
+        (None, True, 2),
+    ]
+    assert resolved[0].children == (lost[0],)
+    assert unresolved == []
+    assert unregistered_findings(unresolved) == ()

@@ -36,6 +36,7 @@ def test_bom_prints_the_json_that_is_documented(run: Any, gearbox: Path) -> None
         "part_number",
         "name",
         "quantity",
+        "missing",
         "level",
         "consolidation_warning",
         "children",

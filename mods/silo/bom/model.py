@@ -67,6 +67,8 @@ class BomEntry:
         ``Label`` of the component's document (the spec pre-fills names from it).
     instances
         names of the objects in the parent's document that were counted, to select them on screen.
+    also
+        keys of the other components that have the same part number and were added to this line.
     """
 
     doc_path: str
@@ -85,9 +87,10 @@ class BomEntry:
     link_objects: int = field(default=0, compare=False)
     instances: tuple[str, ...] = field(default=(), compare=False, repr=False)
     document_label: str = field(default="", compare=False, repr=False)
+    also: tuple[tuple[str, str], ...] = field(default=(), compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        _freeze(self, "children", "instances")
+        _freeze(self, "children", "instances", "also")
 
     @property
     def key(self) -> tuple[str, str]:

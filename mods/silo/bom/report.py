@@ -40,6 +40,7 @@ def entry_json(entry: BomEntry, base: str) -> dict[str, Any]:
         "part_number": entry.part_number,
         "name": entry.name,
         "quantity": entry.quantity,
+        "missing": entry.missing,
         "level": entry.level,
         "consolidation_warning": entry.consolidation_warning,
         "children": [entry_json(child, base) for child in entry.children],

@@ -52,7 +52,8 @@ def resolve_part_numbers(
 
     Returns (resolved, unresolved): resolved entries in order, with resolved children, several with one part
     number summed into one line; unresolved components of every level, each once. An unresolved sub-assembly
-    keeps its (resolved) children.
+    keeps its (resolved) children. Missing components stay in place without a number: nobody can look up what
+    they are, and they are not there to be registered.
     """
     known = look_up((e.silo_uuid for e in walk_entries(entries) if e.silo_uuid), api_client)
     return resolve_with(entries, known)
@@ -67,6 +68,9 @@ def resolve_with(entries: Sequence[BomEntry], known: Known) -> tuple[list[BomEnt
         # Nested assemblies share their values; each distinct value is resolved once.
         if (before := done.get(id(entry))) is not None:
             return before
+        if entry.missing:
+            done[id(entry)] = (entry, True)
+            return done[id(entry)]
         item = known.get(entry.silo_uuid) if entry.silo_uuid else None
         number = item.get("part_number") if item is not None else None
         name = (item.get("name") or item.get("description") or number) if item is not None else None
@@ -106,16 +110,20 @@ def _numbered(message: str, numbers: Mapping[str, str]) -> str:
 
 
 def merge_lines(entries: Iterable[BomEntry]) -> list[BomEntry]:
-    """Entries of one parent with one part number become one line with the summed quantity."""
-    lines: dict[str, BomEntry] = {}
+    """Entries of one parent with one part number become one line with the summed quantity.
+
+    Entries without a number stay apart.
+    """
+    lines: dict[str | tuple[str, str], BomEntry] = {}
     for entry in entries:
-        number = entry.part_number or ""
-        before = lines.get(number)
+        name = entry.part_number or entry.key
+        before = lines.get(name)
         if before is None:
-            lines[number] = entry
+            lines[name] = entry
             continue
-        lines[number] = replace(
+        lines[name] = replace(
             before,
+            also=(*before.also, entry.key, *entry.also),
             quantity=before.quantity + entry.quantity,
             is_assembly=before.is_assembly or entry.is_assembly,
             children=before.children or entry.children,

@@ -127,7 +127,8 @@ TRUTH: dict[str, Truth] = {
     ),
     "assembly_link_never_recomputed": _is({SUB: (1, SUB_CONTENT)}, consolidated=(BOLT,)),
     "assembly_below_a_part": _is(
-        {SUB: (1, {BOLT: 2}), BOLT: 1}, live_0_20=_is({f"{SUB} (missing)": 1, BOLT: 1}, lost_assembly=("top.FCStd#SubLink",))
+        {SUB: (1, {BOLT: 2}), BOLT: 1},
+        live_0_20=_is({f"{SUB} (missing)": 1, BOLT: 1}, lost_assembly=("top.FCStd#SubLink",)),
     ),
     "joints_and_sheets": _is({BOLT: 2}, consolidated=(BOLT,)),
     "sheets_sketches_datums": _is({BOLT: 1}),
@@ -164,7 +165,9 @@ TRUTH: dict[str, Truth] = {
     "assembly3_container": _is({BOLT: 2}, consolidated=(BOLT,)),
     "two_models_in_one_file": Truth({}, error="holds 2 assemblies: Top (Top), Second (Second)"),
     # --- files ------------------------------------------------------------------------------------------
-    "missing_file": _is({BOLT: 1, "gone.FCStd#Gone (missing)": 2}, missing_file=("top.FCStd#Lost1", "top.FCStd#Lost2")),
+    "missing_file": _is(
+        {BOLT: 1, "gone.FCStd#Gone (missing)": 2}, missing_file=("top.FCStd#Lost1", "top.FCStd#Lost2")
+    ),
     "missing_file_below": _is(
         {SUB: (1, {BOLT: 2, f"{PLATE} (missing)": 1})},
         consolidated=(BOLT,),
