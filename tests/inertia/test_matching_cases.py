@@ -228,13 +228,50 @@ def test_case_30_no_value_is_zero_with_a_warning(
 
 
 def test_case_30_zero_kg_is_told(assemble: Fixture, compute: Fixture, part: Fixture, codes: Fixture) -> None:
-    """ "0 kg" is a mass by the rule, and stands for tiny parts as well as for zeroed ones."""
+    """ "0 kg" is a mass by the rule where no material says more."""
     report = compute(
-        assemble(("l/a", cube("a")), ("l/b", cube("b"))), HEAD + "1,1,,steel,0 kg,a\n2,1,,,0.125 kg,b\n"
+        assemble(("l/a", cube("a")), ("l/b", cube("b"))), HEAD + "1,1,,,0 kg,a\n2,1,,,0.125 kg,b\n"
     )
     assert part(report, "a").mass == 0
     assert codes(report, "a") == ["bom_zero_mass"]
     assert "0.0005" in report.warnings[0].message
+
+
+@pytest.mark.parametrize(
+    ("size", "mass", "kg", "code", "words"),
+    [
+        (0.003, "0 kg", 0.21195e-3, "bom_zero_mass", "shows ± 0.0005 kg only"),
+        (0.01, "0 kg", 7.85e-3, "bom_zero_mass", "Was the mass set to zero?"),
+        (0.1, "0 kg", 7.85, "mass_implausible", "Was the mass set to zero?"),
+        (0.1, "0 kg*", 0.0, "bom_zero_mass", "it was zeroed"),
+    ],
+)
+def test_zero_kg_of_a_known_material(
+    assemble: Fixture,
+    compute: Fixture,
+    part: Fixture,
+    codes: Fixture,
+    size: float,
+    mass: str,
+    kg: float,
+    code: str,
+    words: str,
+) -> None:
+    """Less than the BOM shows is not nothing: the material's mass, warned; a zero set by hand is kept."""
+    asm = assemble(("l/a", cube("a", size)), ("l/b", cube("b")))
+    report = compute(asm, HEAD + f"1,1,,steel,{mass},a\n2,1,,,0.125 kg,b\n")
+    assert part(report, "a").mass == pytest.approx(kg)
+    assert codes(report, "a") == [code]
+    assert words in report.warnings[0].message
+
+
+def test_zero_kg_of_a_material_that_is_not_known(
+    assemble: Fixture, compute: Fixture, part: Fixture, codes: Fixture
+) -> None:
+    """A default density is no better than the BOM's zero."""
+    report = compute(assemble(("l/a", cube("a"))), HEAD + "1,1,,unobtainium,0 kg,a\n")
+    assert part(report, "a").mass == 0
+    assert codes(report, "a") == ["bom_zero_mass"]
 
 
 def test_case_31_mass_and_material_that_disagree(assemble: Fixture, compute: Fixture, part: Fixture) -> None:

@@ -137,8 +137,9 @@ def _with_stated_densities(assembly: Assembly, materials: MaterialTable) -> Asse
         if prototype.step_density is not None or not prototype.step_material:
             return prototype
         answer = materials.find(prototype.step_material)
-        density = answer.material.density if isinstance(answer, MaterialHit) else None
-        return replace(prototype, step_density=density)
+        if isinstance(answer, MaterialHit) and not answer.doubt:
+            return replace(prototype, step_density=answer.material.density)
+        return prototype
 
     return replace(assembly, prototypes={key: complete(p) for key, p in assembly.prototypes.items()})
 

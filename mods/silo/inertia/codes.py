@@ -18,7 +18,8 @@ class MassCode(StrEnum):
     NOT_IN_BOM = "not_in_bom"  # default density
     NO_BOM = "no_bom"  # no BOM was given: default density throughout
     UNKNOWN_MATERIAL = "unknown_material"  # default density
-    ZERO_MASS = "bom_zero_mass"  # the BOM says 0 kg
+    GUESSED_MATERIAL = "material_guessed"  # a word in the material's name is not understood
+    ZERO_MASS = "bom_zero_mass"  # the BOM says 0 kg; the material's mass is used where it is known
     NO_VOLUME = "no_volume"  # a material, but no solid to take a volume from: zero
     POINT_MASS = "point_mass"  # a BOM mass without a solid: mass at one point, no inertia
     # a mass that other data contradict

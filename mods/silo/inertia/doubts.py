@@ -84,6 +84,19 @@ def _rounding(given: GivenMass) -> Iterator[Note]:
         )
 
 
+def zero_doubt(given: GivenMass, volume: float, density: float, material: str) -> Note:
+    """A BOM mass of 0 kg of a part whose material is known; the material's mass is used."""
+    weight = density * volume
+    used = f"{material} times the volume gives {weight:.6g} kg, which was used"
+    if weight <= given.quantum:
+        return Note(
+            MassCode.ZERO_MASS, f"the BOM says 0 kg, for it shows ± {given.quantum:.3g} kg only; {used}"
+        )
+    code = MassCode.ZERO_MASS if given.quantum >= LIGHTEST * volume else MassCode.IMPLAUSIBLE
+    words = f"the BOM says 0 kg (± {given.quantum:.3g} kg), but {used}. Was the mass set to zero? "
+    return Note(code, words + "A mass that is marked as set by hand (“0 kg*”) is kept")
+
+
 def _against(given: GivenMass, volume: float, expected: Expectation) -> Iterator[Note]:
     weight = expected.density * volume
     allowed = max(given.quantum, MISMATCH_LIMIT * given.kg)

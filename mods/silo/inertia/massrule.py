@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 from silo.inertia.bom.rows import BomCode, BOMEntry
 from silo.inertia.codes import Decided, MassCode, Rule, Source
-from silo.inertia.doubts import GivenMass, Note, density_doubts, expectation, mass_doubts
+from silo.inertia.doubts import GivenMass, Note, density_doubts, expectation, mass_doubts, zero_doubt
 from silo.inertia.matching import Match
 from silo.inertia.materials import MaterialHit, MaterialTable
 from silo.inertia.model import Prototype
@@ -115,6 +115,8 @@ class MassRule:
         mass = row.mass_kg or 0.0
         material = self.materials.find(row.material) if row.material is not None else None
         known = material.material if isinstance(material, MaterialHit) else None
+        if mass == 0 and known and prototype.volume_m3 > 0 and not row.overridden and row.material:
+            return self._zero_of_known_material(base, prototype, row)
         given = GivenMass(mass, row.quantum_kg, match.bundle.quantities)
         expected = expectation(prototype, row.material, known.density if known else None)
         return _with(
@@ -128,20 +130,30 @@ class MassRule:
             notes=(*base.notes, *two_ways(row), *mass_doubts(given, prototype, expected)),
         )
 
+    def _zero_of_known_material(self, base: Decision, prototype: Prototype, row: BOMEntry) -> Decision:
+        """ "0 kg" of steel is less than the BOM shows, and not nothing."""
+        decision = self._material(base, prototype, row.material or "")
+        given = GivenMass(0.0, row.quantum_kg)
+        note = zero_doubt(given, prototype.volume_m3, decision.density or 0.0, row.material or "")
+        return _with(decision, quantum_kg=0.0, notes=(*decision.notes, note))
+
     def _material(self, base: Decision, prototype: Prototype, text: str) -> Decision:
         answer = self.materials.find(text)
         if isinstance(answer, MaterialHit):
             found = answer.material
             density, name, source = found.density, found.name, found.source
             notes = [*base.notes, *density_doubts(prototype, density, name)]
+            if answer.doubt:
+                words = f"'{text}' was taken for {name} ({density:g} kg/m³): {answer.doubt}"
+                notes.append(Note(MassCode.GUESSED_MATERIAL, words))
         elif self.options.step_density and prototype.step_density is not None:
             density, name, source = prototype.step_density, None, "the geometry file"
             why = f"the density in the file ({density:g} kg/m³) was used"
-            notes = [*base.notes, _unknown(text, answer.reason, why)]
+            notes = [*base.notes, _unknown(text, answer.advice, why)]
         else:
             density, name, source = self.options.default_density, None, "default"
             why = f"the default density ({density:g} kg/m³) was used"
-            notes = [*base.notes, _unknown(text, answer.reason, why)]
+            notes = [*base.notes, _unknown(text, answer.advice, why)]
         if not prototype.volume_m3:
             notes.append(_no_volume(prototype))
         known = isinstance(answer, MaterialHit)

@@ -25,6 +25,7 @@ DOUBTS = (
     MassCode.AMBIGUOUS,
     MassCode.ROW_TOTAL,
     MassCode.IMPLAUSIBLE,
+    MassCode.GUESSED_MATERIAL,
     BomCode.AMBIGUOUS_MASS,
     GeometryCode.INVALID_SHAPE,
     GeometryCode.MESH_MISMATCH,

@@ -67,6 +67,24 @@ def test_the_specs_materials(materials: MaterialTable, name: str) -> None:
         ("ＡＢＳ", 1050),
         ("Ti-6Al-4V", 4430),
         ("pa12-cf", 1200),
+        ("Powder-coated aluminum", 2700),
+        ("brass, nickel plated", 8500),
+        ("Steel with black oxide finish", 7850),
+        ("verzinkter Stahl", 7850),
+        ("Zinc plated steel grade 8.8", 7850),
+        ("Aluminum 6061-T6, black anodized", 2700),
+        ("AISI 1020 Steel, Cold Rolled", 7850),
+        ("Steel, Carbon", 7850),
+        ("Steel - Plain Carbon", 7850),
+        ("Iron, Cast", 7200),
+        ("Silicon rubber", 1100),
+        ("Wood (Oak)", 720),
+        ("Glass, Soda-Lime", 2500),
+        ("Plastic, Acetal, Black", 1410),
+        ("Titanium - Grade 5", 4430),
+        ("Cold rolled steel sheet 2 mm", 7850),
+        ("Silicone, Shore A 40", 1100),
+        ("Steel S235 JR", 7850),
     ],
 )
 def test_texts_that_name_a_material(materials: MaterialTable, text: str, density: float) -> None:
@@ -74,6 +92,7 @@ def test_texts_that_name_a_material(materials: MaterialTable, text: str, density
     hit = materials.find(text)
     assert isinstance(hit, MaterialHit), hit
     assert hit.material.density == density
+    assert not hit.doubt
 
 
 @pytest.mark.parametrize(
@@ -96,6 +115,29 @@ def test_texts_that_name_a_material(materials: MaterialTable, text: str, density
         "Steel wire rope",
         "Copper cable",
         "Titanium dioxide",
+        "Zinc plated",
+        "Nickel-plated",
+        "Titanium coated",
+        "Galvanized",
+        "Black oxide",
+        "Hard anodized",
+        "Iron-on vinyl",
+        "Tungsten polymer",
+        "Steel 50 % fill",
+        "20 % PLA",
+        "PLA 20%",
+        "PA 6 %",
+        "PLA, 20 percent",
+        "Bronzefill PLA",
+        "Copperfill",
+        "PP-T20",
+        "PA6 30GF",
+        "Copper clad aluminum",
+        "Alu-Dibond",
+        "PLA wood",
+        "Lead crystal",
+        "Glass ceramic",
+        "Steel core",
         "Unobtainium",
         "Default",
         "---",
@@ -106,6 +148,43 @@ def test_texts_that_only_look_like_one(materials: MaterialTable, text: str) -> N
     miss = materials.find(text)
     assert isinstance(miss, MaterialMiss), miss
     assert miss.reason
+
+
+@pytest.mark.parametrize(
+    ("text", "density"),
+    [("Tin can", 7290), ("Glass bead", 2500), ("Iron pipe fitting", 7870), ("ACME PLA", 1250)],
+)
+def test_texts_with_a_word_that_is_not_understood(
+    materials: MaterialTable, text: str, density: float
+) -> None:
+    """Used, and said: an unknown word may make another material of it."""
+    hit = materials.find(text)
+    assert isinstance(hit, MaterialHit)
+    assert (hit.material.density, bool(hit.doubt)) == (density, True)
+
+
+@pytest.mark.parametrize(
+    ("text", "nearest"),
+    [("20 % PLA", "pla"), ("Zinc plated", "steel"), ("Iron-on vinyl", "iron"), ("Aluminim 6061", None),
+     ("Alumnium", "aluminum"), ("6062 aluminum fill", "aluminum"), ("Unobtainium", None)],
+)  # fmt: skip
+def test_the_nearest_guess_is_named(materials: MaterialTable, text: str, nearest: str | None) -> None:
+    """For a person to decide; it decides nothing by itself."""
+    answer = materials.find(text)
+    if isinstance(answer, MaterialMiss):
+        assert (answer.nearest.name if answer.nearest else None) == nearest
+        assert nearest is None or nearest in answer.advice
+    else:
+        assert (nearest, bool(answer.doubt)) == (None, True)
+
+
+def test_a_users_row_is_no_reason_to_overlook_a_better_one(materials: MaterialTable) -> None:
+    """With "steel" in the user's table, "stainless steel 316, brushed" is still stainless."""
+    table = materials.with_layer([Material("steel", 7700)])
+    for text, density in (("Stainless steel 316, brushed", 8000), ("Steel, brushed", 7700), ("steel", 7700)):
+        hit = table.find(text)
+        assert isinstance(hit, MaterialHit)
+        assert hit.material.density == density
 
 
 def test_rows_of_the_package_are_sound() -> None:
@@ -277,3 +356,19 @@ def test_cards_come_last(materials: Any) -> None:
     assert steel.material.density == 7850
     assert harry.found is Found.CARD
     assert isinstance(table.find("Wood screw thing"), MaterialMiss)
+
+
+def test_an_installed_freecad_changes_no_result_without_a_word(materials: MaterialTable) -> None:
+    """A card with the whole name beats a guess, and says so; what the table knows stays as it is."""
+    cards = (Material("Aluminum 6061-T6", 2600), Material("ACME PLA", 1333), Material("PLA wood", 1150))
+    with_cards = MaterialTable(materials.layers, lambda: cards)
+    known = with_cards.find("Aluminum 6061-T6")
+    assert known == materials.find("Aluminum 6061-T6")
+    guess = with_cards.find("ACME PLA")
+    assert isinstance(guess, MaterialHit)
+    assert guess.material.density == 1333
+    assert "1250" in guess.doubt
+    assert "FreeCAD card" in guess.doubt
+    gap = with_cards.find("PLA wood")
+    assert isinstance(gap, MaterialHit)
+    assert gap.found is Found.CARD

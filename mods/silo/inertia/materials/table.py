@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import difflib
+import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
 
-from silo.inertia.materials.words import Words, find, turned, uncovered, words
+from silo.inertia.materials.words import Words, compound, find, not_understood, uncovered, words
 
 
 class Found(StrEnum):
@@ -32,17 +34,30 @@ class Material:
 
 @dataclass(frozen=True)
 class MaterialHit:
-    """A material text that was understood."""
+    """A material text that was understood; ``doubt`` says why it may mean another material, or is empty."""
 
     material: Material
     found: Found
+    doubt: str = ""
 
 
 @dataclass(frozen=True)
 class MaterialMiss:
-    """A material text that was not understood, and why, in words that end a sentence."""
+    """A material text that was not understood, and why, in words that end a sentence.
+
+    nearest
+        the material that it may mean, for a person to decide; None where nothing is near.
+    """
 
     reason: str
+    nearest: Material | None = None
+
+    @property
+    def advice(self) -> str:
+        """The reason, with the nearest material where there is one."""
+        if self.nearest is None:
+            return self.reason
+        return f"{self.reason} (the nearest is {self.nearest.name}, {self.nearest.density:g} kg/m³)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +71,8 @@ class MaterialTable:
     def find(self, text: str) -> MaterialHit | MaterialMiss:
         """The material that ``text`` names: equal first, then whole words, then FreeCAD's cards by name.
 
-        Never by parts of words, and never by likeness.
+        Never by parts of words, and never by likeness. A card fills a gap of the tables; it replaces a guess
+        with a word, and never what the tables know.
         """
         if text not in self._known:
             self._known[text] = self._look_up(text)
@@ -66,71 +82,98 @@ class MaterialTable:
         tokens = words(text)
         if not tokens:
             return MaterialMiss("it names nothing")
-        for layer in self._layers:
-            hit = layer.exact.get(tokens)
-            if hit is not None:
-                return MaterialHit(hit, Found.NAME)
-        card = self._card(tokens)
-        if card is not None:
+        answer = self._index.find(tokens)
+        if isinstance(answer, MaterialHit) and not answer.doubt:
+            return answer
+        card = self._cards_by_words.get(tokens)
+        if card is None:
+            return answer
+        if isinstance(answer, MaterialMiss) or card.density == answer.material.density:
             return MaterialHit(card, Found.CARD)
-        miss: MaterialMiss | None = None
-        for layer in self._layers:
-            answer = layer.inside(tokens)
-            if isinstance(answer, MaterialHit):
-                return answer
-            miss = miss or answer
-        return miss or MaterialMiss("it is in no table")
+        doubt = (
+            f"{answer.doubt}; a FreeCAD card on this machine has that name, and its {card.density:g} kg/m³ "
+            f"were used instead of the {answer.material.density:g} kg/m³ of {answer.material.name}"
+        )
+        return MaterialHit(card, Found.CARD, doubt)
 
     def with_layer(self, rows: Iterable[Material]) -> MaterialTable:
         """The same with ``rows`` before all others."""
         return MaterialTable((tuple(rows), *self.layers), self.cards)
 
-    def _card(self, tokens: Words) -> Material | None:
-        return self._cards_by_words.get(tokens)
-
     @cached_property
-    def _layers(self) -> tuple[_Layer, ...]:
-        return tuple(_Layer(rows) for rows in self.layers)
+    def _index(self) -> _Index:
+        return _Index([row for rows in self.layers for row in rows])
 
     @cached_property
     def _cards_by_words(self) -> dict[Words, Material]:
         return {words(alias): card for card in self.cards() for alias in (card.name, *card.aliases)}
 
 
-class _Layer:
-    """One set of rows, indexed by words."""
+class _Index:
+    """Rows by the words of their names and aliases; of two with the same words the first wins."""
 
     def __init__(self, rows: Sequence[Material]) -> None:
         self.exact: dict[Words, Material] = {}
-        self._family = {row.name: row.family for row in rows}
+        self._family: dict[str, str] = {}
         for row in rows:
+            self._family.setdefault(row.name, row.family)
             for alias in (row.name, *row.aliases):
                 key = words(alias)
                 if key:
                     self.exact.setdefault(key, row)
         self._single = frozenset(key[0] for key in self.exact if len(key) == 1)
 
-    def inside(self, tokens: Words) -> MaterialHit | MaterialMiss | None:
+    def find(self, tokens: Words) -> MaterialHit | MaterialMiss:
+        equal = self.exact.get(tokens)
+        if equal is not None:
+            return MaterialHit(equal, Found.NAME)
         text = uncovered(tokens, self._single)
+        hits = self._hits(text)
+        named: dict[str, Material] = {}
+        for _, _, row in hits:
+            named.setdefault(row.name, row)
+        general = {ancestor for name in named for ancestor in self._ancestors(name)}
+        left = [row for name, row in named.items() if name not in general]
+        if not left:
+            return self._nothing(tokens, text)
+        covered = {index for start, end, _ in hits for index in range(start, end)}
+        rest = tuple(word for index, word in enumerate(text) if index not in covered)
+        turn = compound(rest)
+        if turn is not None:
+            return MaterialMiss(f"“{turn}” makes it something else than {left[0].name}", left[0])
+        if len({row.density for row in left}) > 1:
+            return MaterialMiss("it names more than one material: " + " and ".join(row.name for row in left))
+        strange = not_understood(rest)
+        if not strange:
+            return MaterialHit(left[0], Found.WORDS)
+        shown = " ".join(strange)
+        return MaterialHit(
+            left[0], Found.WORDS, f"“{shown}” in it is not understood, and may make it another"
+        )
+
+    def _hits(self, text: Words) -> list[tuple[int, int, Material]]:
         hits = [
             (start, start + len(key), row)
             for key, row in self.exact.items()
             if (start := find(key, text)) is not None
         ]
         # "stainless steel" in a text covers "steel" in it.
-        hits = [h for h in hits if not any(_covers(other, h) for other in hits)]
-        named = {row.name: row for _, _, row in hits}
-        general = {ancestor for name in named for ancestor in self._ancestors(name)}
-        left = [row for name, row in named.items() if name not in general]
-        if not left:
-            return None
-        covered = {index for start, end, _ in hits for index in range(start, end)}
-        turn = turned(tuple(word for index, word in enumerate(text) if index not in covered))
-        if turn is not None:
-            return MaterialMiss(f"“{turn}” makes it something else than {left[0].name}")
-        if len({row.density for row in left}) > 1:
-            return MaterialMiss("it names more than one material: " + " and ".join(row.name for row in left))
-        return MaterialHit(left[0], Found.WORDS)
+        return [hit for hit in hits if not any(_covers(other, hit) for other in hits)]
+
+    def _nothing(self, tokens: Words, text: Words) -> MaterialMiss:
+        if text != tokens and not not_understood(text):
+            # Most parts that only their plating is known of are of steel.
+            reason = "it names what lies on the part, and not what the part is made of"
+            return MaterialMiss(reason, self.exact.get(("steel",)))
+        return MaterialMiss("it is in no table", self._alike(tokens))
+
+    def _alike(self, tokens: Words) -> Material | None:
+        """The row with the most similar spelling and the same digits: 6063 is another alloy than 6061."""
+        wanted = " ".join(tokens)
+        digits = re.sub(r"\D+", " ", wanted)
+        names = {" ".join(key): row for key, row in self.exact.items()}
+        near = (name for name in difflib.get_close_matches(wanted, names, n=5, cutoff=0.75))
+        return next((names[name] for name in near if re.sub(r"\D+", " ", name) == digits), None)
 
     def _ancestors(self, name: str) -> set[str]:
         found: set[str] = set()

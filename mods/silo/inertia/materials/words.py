@@ -1,56 +1,136 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Material texts compared by whole words. "Aluminum - 6061" is aluminium; "PCB FR4" is not PC. Pure.
 
-A material is found inside a longer text only where nothing in that text turns it into something else: foam
-of aluminium is not aluminium, lead-free solder is not lead, nylon with 30 % glass is not nylon.
+A material inside a longer text is judged by the words around it:
+
+* platings and coats are left out: "zinc plated steel" is steel, and "zinc plated" alone is nothing;
+* fills, percentages and compounds make something else of it: "PLA, 20 %", "bronzefill PLA", "lead free";
+* colours, forms, treatments and grades say nothing about a density: "6061-T6 plate, black anodized";
+* any other word makes the answer a guess: "tin can" may be tin, and may be a can.
 """
 
 from __future__ import annotations
 
 import re
-import unicodedata
+from collections.abc import Set
+
+from silo.bom.numbers import plain_text
 
 Words = tuple[str, ...]
 
-# A number keeps its point (1.4301, A356.0); everything else that is no letter or digit separates words.
-_WORD = re.compile(r"[^\W_]+(?:\.\d+)*")
+# A number keeps its point (1.4301, A356.0), a percent sign counts; everything else separates words.
+_WORD = re.compile(r"[^\W_]+(?:\.\d+)*|%")
 
-_TURNS = {
+_COMPOUNDS = {
     "foam", "foamed", "foaming", "schaum", "sponge", "honeycomb", "wabe", "porous", "expanded", "lw",
-    "lightweight", "powder", "pulver", "wool", "wolle", "mesh", "filled", "gefüllt", "reinforced",
-    "verstärkt", "renforcé", "cf", "gf", "oxide", "dioxide", "nitride", "chloride", "sulfate", "sulphate",
-    "paint", "lacquer", "lack", "spray", "paste", "ink", "coating", "plating", "beschichtung", "free", "non",
-    "sintered", "gesintert", "infill", "füllung", "rope", "seil", "cable", "kabel", "braid", "braided",
-    "like", "imitation", "replacement", "substitute", "infused", "effect",
+    "lightweight", "powder", "pulver", "wool", "wolle", "mesh", "oxide", "dioxide", "nitride",
+    "chloride", "sulfate", "sulphate", "paint", "lacquer", "lack", "spray", "paste", "ink", "free",
+    "non", "sintered", "gesintert", "infill", "füllung", "rope", "seil", "cable", "kabel", "braid",
+    "braided", "like", "imitation", "replacement", "substitute", "infused", "effect", "fill", "filled",
+    "filler", "gefüllt", "füllstoff", "loaded", "reinforced", "verstärkt", "renforcé", "cf", "gf", "gk",
+    "percent", "prozent", "pct", "wt", "vol", "blend", "mix", "mixed", "mischung", "mélange", "hybrid",
+    "matrix", "composite", "composites", "compound", "komposit", "verbund", "alloyed", "polymer",
+    "polymers", "vinyl", "resin", "clad", "cladding", "lined", "liner", "core", "cored", "kern",
+    "laminate", "laminated", "laminat", "sandwich", "dibond", "bonded", "impregnated", "insert",
+    "inserts", "hollow", "wood", "holz", "marble", "stone", "glow", "ceramic", "crystal", "fiber",
+    "fibre", "fibers", "fibres", "faser", "chips", "flakes", "dust", "whisker", "nano",
 }  # fmt: skip
-_TURNS_WITH_NUMBER = re.compile(r"(?:cf|gf|gk)\d{1,2}")
+_COMPOUND_SHAPES = re.compile(
+    r"(?:cf|gf|gk|md|mf|td)\d{1,2}|\d{1,2}(?:cf|gf|gk)|t[1-4]0"
+    r"|\w+fills?|\w+filled|\w+gefüllt|\w+verstärkt|\w+schaum"
+)
 # "zinc plated steel" is steel: the word before is what lies on it.
-_COVERS = {
-    "plated", "coated", "galvanized", "galvanised", "painted", "verzinkt", "vernickelt", "beschichtet",
-    "lackiert", "anodized", "anodised", "eloxiert", "passivated", "clad", "lined",
+_COVERS_WITH = {
+    "plated", "coated", "plating", "coating", "finish", "finished", "beschichtet", "beschichtung",
+    "überzogen", "revêtu", "recubierto", "rivestito", "dipped", "sprayed",
 }  # fmt: skip
+# These name themselves what lies on the part.
+_COVERS = {
+    "galvanized", "galvanised", "galvanizing", "electroplated", "zincked", "painted", "verzinkt",
+    "feuerverzinkt", "verzinkter", "verzinktes", "vernickelt", "verchromt", "brüniert", "lackiert",
+    "eloxiert", "anodized", "anodised", "anodizing", "anodize", "chromated", "phosphated", "blued",
+    "blackened", "passivated", "pulverbeschichtet", "pulverlackiert", "zingué", "galvanisé", "anodisé",
+    "peint", "galvanizado", "anodizado", "pintado", "zincato", "anodizzato", "verniciato", "enameled",
+    "enamelled", "lacquered", "varnished",
+}  # fmt: skip
+# What lies on parts and is no material of the table, or is another one by itself.
+_COATS = {
+    "powder", "chrome", "chromium", "epoxy", "paint", "enamel", "lacquer", "oxide", "pvd", "dlc", "e",
+    "ptfe", "teflon", "hard", "black", "white", "zinc", "nickel", "nitride", "conversion", "chromate",
+    "phosphate", "cadmium", "clear", "wax", "oil", "rubber", "pvc", "plastic",
+}  # fmt: skip
+_FINISHES = (("black", "oxide"), ("oxide", "finish"), ("hot", "dip"), ("hot", "dipped"))
+
+_COLOURS = {
+    "black", "white", "grey", "gray", "red", "green", "blue", "yellow", "orange", "brown", "purple",
+    "pink", "violet", "natural", "nature", "clear", "transparent", "translucent", "opaque", "dark",
+    "light", "matte", "matt", "glossy", "gloss", "satin", "silk", "neutral", "beige", "ivory", "bright",
+    "schwarz", "weiß", "weiss", "grau", "rot", "grün", "blau", "gelb", "braun", "natur", "klar",
+    "transluzent", "dunkel", "hell", "noir", "blanc", "gris", "rouge", "vert", "bleu", "jaune", "negro",
+    "blanco", "rojo", "verde", "azul", "amarillo", "nero", "bianco", "grigio", "rosso", "giallo", "blu",
+    "naturel", "color", "colour", "coloured", "colored", "farbe", "uv",
+}  # fmt: skip
+_PLAIN_WORDS = {
+    "generic", "standard", "general", "plain", "pure", "virgin", "solid", "bulk", "type", "typ",
+    "grade", "gr", "class", "klasse", "quality", "no", "nr", "spec", "per", "to", "and", "und", "with",
+    "mit", "et", "of", "the", "in", "as", "or", "for", "material", "werkstoff", "metal", "plastic",
+    "plastics", "kunststoff", "polyamide", "thermoplastic", "elastomer", "astm", "en", "din", "iso",
+    "aisi", "sae", "aw", "uns", "jis", "gb", "bs", "nf", "wnr", "ams", "cw", "ek", "ac", "sheet",
+    "plate", "bar", "rod", "tube", "tubing", "pipe", "profile", "wire", "strip", "foil", "film",
+    "block", "round", "flat", "angle", "stock", "extrusion", "extruded", "blech", "platte", "stab",
+    "rohr", "profil", "draht", "rund", "flach", "welded", "seamless", "section", "billet", "coil",
+    "annealed", "hardened", "tempered", "quenched", "normalized", "normalised", "rolled", "cold", "hot",
+    "drawn", "forged", "cast", "casting", "molded", "moulded", "injection", "machined", "milled",
+    "turned", "ground", "polished", "brushed", "honed", "printed", "print", "printing", "fdm", "fff",
+    "sla", "sls", "mjf", "slm", "dmls", "3d", "filament", "geschliffen", "gebürstet", "gehärtet",
+    "vergütet", "kaltgewalzt", "warmgewalzt", "gezogen", "treated", "heat", "solution", "aged",
+    "stress", "relieved", "work", "half", "full", "quarter", "bearing", "structural", "mechanical",
+    "engineering", "alloy", "legierung", "alliage", "unalloyed", "wrought", "austenitic", "ferritic",
+    "martensitic", "duplex", "carbon", "low", "medium", "high", "mild", "tool", "spring", "strength",
+    "tensile", "yield", "hrc", "hb", "hv", "min", "max", "cutting", "machining", "soft", "hard",
+    "rigid", "flexible", "flex", "tough", "pro", "plus", "basic", "premium", "homopolymer", "copolymer",
+    "soda", "lime", "shore", "mm", "cm", "inch", "thick", "thickness", "gauge", "ga", "od", "id", "dia",
+    "jr", "qt", "ball", "ss", "cs", "sn", "pb", "ral", "rohs", "reach", "food", "safe", "fda",
+    "prusament", "polymaker", "polylite", "esun", "sunlu", "bambu", "hatchbox", "fillamentum",
+    "colorfabb", "ultrafuse",
+}  # fmt: skip
+_HARMLESS = _COLOURS | _PLAIN_WORDS
 
 
 def words(text: str) -> Words:
-    """The words of a material's name: NFKC, case-folded, separated by anything that is no letter or digit."""
-    return tuple(_WORD.findall(unicodedata.normalize("NFKC", text).casefold()))
+    """The words of a material's name in plain characters, case-folded; a percent sign is one."""
+    return tuple(_WORD.findall(plain_text(text).casefold()))
 
 
-def uncovered(text: Words, known: frozenset[str]) -> Words:
-    """Without platings: ("zinc", "plated", "steel") → ("steel",). ``known``: words that name a material."""
+def uncovered(text: Words, known: Set[str]) -> Words:
+    """Without platings: ("zinc", "plated", "steel") → ("steel",), ("zinc", "plated") → ().
+
+    known
+        words that name a material by themselves.
+    """
     kept: list[str] = []
     for word in text:
-        if word in _COVERS:
-            if kept and kept[-1] in known and len(text) > 2:
+        if word in _COVERS or (kept and (kept[-1], word) in _FINISHES):
+            if word not in _COVERS:
                 kept.pop()
-            continue
-        kept.append(word)
-    return tuple(kept) or text
+        elif word in _COVERS_WITH:
+            if kept and (kept[-1] in known or kept[-1] in _COATS):
+                kept.pop()
+        else:
+            kept.append(word)
+    return tuple(kept)
 
 
-def turned(rest: Words) -> str | None:
+def compound(rest: Words) -> str | None:
     """The word that makes a material with these other words something else; None where there is none."""
-    return next((word for word in rest if word in _TURNS or _TURNS_WITH_NUMBER.fullmatch(word)), None)
+    return next((word for word in rest if _is_compound(word)), None)
+
+
+def not_understood(rest: Words) -> Words:
+    """The words that may make something else of a material: no colour, form, treatment or grade."""
+    return tuple(
+        word for word in rest if len(word) > 1 and word not in _HARMLESS and not re.search(r"\d", word)
+    )
 
 
 def find(needle: Words, hay: Words) -> int | None:
@@ -59,3 +139,7 @@ def find(needle: Words, hay: Words) -> int | None:
         if hay[start : start + len(needle)] == needle:
             return start
     return None
+
+
+def _is_compound(word: str) -> bool:
+    return word == "%" or word in _COMPOUNDS or _COMPOUND_SHAPES.fullmatch(word) is not None
