@@ -143,6 +143,31 @@ def test_what_is_no_bom_is_refused(api: Api, data: bytes) -> None:
     api.bad(400, "POST", bom(parent, "import"), body=data)
 
 
+@pytest.mark.parametrize(
+    "header", ["PN,Qty", "Part No.,Quantity (pcs)", "Teilenummer,Menge", "part_number,QTY", "零件号,数量"]
+)
+def test_columns_are_known_by_the_aliases_that_the_bom_parser_knows(api: Api, header: str) -> None:
+    """One table of aliases for both."""
+    parent, a = api.items(2)
+    api.good("POST", bom(parent, "import"), body=f"{header}\n{a},3\n".encode())
+    assert api.quantities(parent) == {a: 3}
+
+
+@pytest.mark.parametrize(
+    ("header", "missing", "there"),
+    [("PN,Name", "Quantity", "Part number"), ("Title;Menge", "Part number", "Quantity")],
+)
+def test_the_missing_column_is_named(api: Api, header: str, missing: str, there: str) -> None:
+    """Which one lacks, what else it may be called, and which columns were seen."""
+    parent, a = api.items(2)
+    cell = ";" if ";" in header else ","
+    message = api.bad(400, "POST", bom(parent, "import"), body=f"{header}\n{a}{cell}3\n".encode())["message"]
+    assert f"there is no column '{missing}'" in message
+    assert f"'{there}'" not in message
+    assert header.replace(";", ", ").replace(",", ", ").replace("  ", " ") in message
+    assert "may also be called" in message
+
+
 def test_an_import_cannot_make_a_ring(api: Api) -> None:
     """409 with the path, nothing imported."""
     top, sub = api.items(2)

@@ -16,6 +16,7 @@ from typing import Any
 from sqlalchemy import select
 
 from silo.bom.errors import RejectedError
+from silo.bom.headers import Role, find_roles, missing_columns
 from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import items
@@ -36,28 +37,13 @@ from silo_server.services.items import get_item
 from silo_server.services.lines import lines_of
 from silo_server.values import Line, LineState
 
-# Header (lower case, without punctuation) → field.
-ALIASES = {
-    "part number": "part_number",
-    "partnumber": "part_number",
-    "child part number": "part_number",
-    "number": "part_number",
-    "quantity": "quantity",
-    "qty": "quantity",
-    "unit": "unit",
-    "uom": "unit",
-    "reference designators": "reference_designators",
-    "ref des": "reference_designators",
-    "designators": "reference_designators",
-    "find number": "find_number",
-    "find no": "find_number",
-    "notes": "notes",
-    "note": "notes",
-    "type": "rel_type",
-    "rel type": "rel_type",
-    "revision": "child_revision",
-    "level": "level",
-}
+ROLES = (
+    *(Role.PART_NUMBER, Role.QUANTITY, Role.UNIT, Role.REFERENCE_DESIGNATORS, Role.FIND_NUMBER, Role.NOTES),
+    *(Role.TYPE, Role.REVISION, Role.LEVEL),
+)
+NEEDED = (Role.PART_NUMBER, Role.QUANTITY)
+HEADER_WITHIN = 40
+"""The header must be among this many first lines (title blocks are a few lines long)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,10 +134,10 @@ def read_csv(data: bytes, max_rows: int) -> list[tuple[int, dict[str, str]]]:
     table, start, delimiter = _table(_decode(data))
     if len(table) - start > max_rows + 1:
         raise TooLargeError(f"file: this server takes at most {max_rows} rows, got {len(table) - start - 1}")
-    names = _fields(table[start])
+    at = find_roles(table[start], ROLES)
     records = []
     for number, cells in enumerate(table[start + 1 :], start=start + 2):
-        record = {name: plain_cell(cell.strip()) for name, cell in zip(names, cells, strict=False) if name}
+        record = {role.value: plain_cell(cells[i].strip()) for role, i in at.items() if i < len(cells)}
         if any(record.values()):
             record["decimal_comma"] = "1" if delimiter != "," else ""
             records.append((number, record))
@@ -161,15 +147,23 @@ def read_csv(data: bytes, max_rows: int) -> list[tuple[int, dict[str, str]]]:
 def _table(text: str) -> tuple[list[list[str]], int, str]:
     """(cells, index of the header row, delimiter), by the delimiter with which there is a header."""
     broken: csv.Error | None = None
+    near = ""
     for delimiter in (",", ";", "\t"):
         try:
             table = list(csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True))
         except csv.Error as error:
             broken = error
             continue
-        for index, row in enumerate(table):
-            if {"part_number", "quantity"} <= set(_fields(row)):
+        for index, row in enumerate(table[:HEADER_WITHIN]):
+            at = find_roles(row, ROLES)
+            missing = missing_columns(row, at, NEEDED)
+            if not missing:
                 return table, index, delimiter
+            # A line with one of the two, and another cell beside it, is a header that lacks the other.
+            if len(row) > 1 and set(NEEDED) & at.keys():
+                near = near or f"file: in line {index + 1}, {missing}"
+    if near:
+        raise RejectedError(near)
     if broken is not None:
         raise RejectedError(f"file: wanted CSV, got something that does not read as such ({broken})")
     raise RejectedError("file: wanted a header row with 'Part number' and 'Quantity', found none")
@@ -229,11 +223,6 @@ def _changes(record: Mapping[str, str], problems: list[str]) -> dict[str, Any]:
             problems.append(f"Revision: wanted a whole number, got {revision!r}")
         changes["child_revision"] = int(revision) if revision.isdigit() else None
     return changes
-
-
-def _fields(header: Sequence[str]) -> list[str]:
-    cleaned = ["".join(c if c.isalnum() else " " for c in cell.lower()) for cell in header]
-    return [ALIASES.get(" ".join(cell.split()), "") for cell in cleaned]
 
 
 def _decode(data: bytes) -> str:

@@ -1,83 +1,26 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Which column of a BOM means what: by alias in seven languages, by the user's word, never by position.
+"""Which column of a BOM holds what a mass needs: by :mod:`silo.bom.headers`, by the user's word.
 
-Onshape's columns are chosen and renamed by each company and its pages are localised; other tools differ
-anyhow. An alias is compared without case, accents' composition, punctuation, and a unit in brackets.
+Masses need more than an alias: their headers state units and say whether they are of one piece or of all.
 """
 
 from __future__ import annotations
 
 import re
+import sys
 import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from enum import StrEnum
 
 from silo.bom.errors import InputError
+from silo.bom.headers import BRACKET, Role, alias, normal
 from silo.inertia.bom.masses import unit_factor
 
-
-class Role(StrEnum):
-    """What a column is used for."""
-
-    NAME = "name"
-    PART_NUMBER = "part_number"
-    DESCRIPTION = "description"
-    MATERIAL = "material"
-    MASS = "mass"
-    TOTAL_MASS = "total_mass"
-    QUANTITY = "quantity"
-    ITEM = "item"
-    LEVEL = "level"
-
-
-# en, de, fr, es, it, ja, zh; Silo's and FreeCAD's own exports among them.
-_ALIASES: dict[Role, str] = {
-    Role.NAME: """name; part name; component; component name; product; product name; label; title; body;
-        bezeichnung; benennung; teil; teilename; bauteil; bauteilname; produkt; nom; nom de la pièce; pièce;
-        composant; désignation; nombre; nombre de pieza; pieza; componente; denominación; nome; nome parte;
-        nome componente; denominazione; 名前; 名称; 部品名; 品名; パーツ名; 部品; 名稱; 零件名称;
-        零件; 部件名称""",
-    Role.PART_NUMBER: """part number; part no; part nr; partnumber; pn; item number; article number;
-        article no; sku; child part number; teilenummer; teile nr; artikelnummer; artikel nr; sachnummer;
-        numéro de pièce; référence; réf; número de pieza; número de parte; referencia; código; numero parte;
-        codice; codice articolo; 部品番号; 品番; 型番; 図番;
-        零件编号; 零件号; 零件號; 料号; 料號; 物料编码""",
-    Role.DESCRIPTION: """description; desc; child description; beschreibung; descripción; descripcion;
-        descrizione; 説明; 描述; 说明; 説明文; 備考""",
-    Role.MATERIAL: """material; materials; werkstoff; werkstoffe; matériau; matière; materiau; material pieza;
-        materiale; 材料; 材質; 材质; 素材""",
-    Role.MASS: """mass; unit mass; mass each; weight; unit weight; weight each; masse; einzelmasse; gewicht;
-        einzelgewicht; stückgewicht; masse unitaire; poids; poids unitaire; masa; masa unitaria; peso;
-        peso unitario; massa; massa unitaria; 質量; 重量; 单重; 質量 単体; 质量; 单件质量; 單重""",
-    Role.TOTAL_MASS: """total mass; total weight; mass total; weight total; extended mass; extended weight;
-        gesamtmasse; gesamtgewicht; masse totale; poids total; masa total; peso total; massa totale;
-        peso totale; 总重量; 総質量; 総重量; 合計質量; 总质量; 总重; 總重""",
-    Role.QUANTITY: """quantity; qty; count; pieces; pcs; menge; anzahl; stückzahl; stück; quantité; qté; nb;
-        cantidad; cant; quantità; q tà; qta; quantita; 数量; 個数; 員数; 數量""",
-    Role.ITEM: """item; item no; index; pos; position; find number; find no; row; line; nr; lfd nr; rang;
-        repère; article; elemento; artículo; posición; ítem; posizione; voce; 項目; 番号; 项目; 项; 序号;
-        編號; 序號""",
-    Role.LEVEL: """level; depth; indent; ebene; stufe; niveau; nivel; livello; レベル; 階層;
-        级别; 层级; 層級""",
-}
-
-_BRACKET = re.compile(r"[\(\[（【<]\s*([^)\]）】>]*)\s*[\)\]）】>]")
-
-
-def normal(header: str) -> str:
-    """A header without case, punctuation, bracketed unit and double spaces."""
-    text = unicodedata.normalize("NFKC", header).casefold()
-    text = _BRACKET.sub(" ", text)
-    return " ".join(re.sub(r"[\W_]+", " ", text).split())
-
-
-# Alias → role and how well it fits: "Name" beats "Component" where a file has both.
-_ROLE_OF: dict[str, tuple[Role, int]] = {
-    normal(alias): (role, rank)
-    for role, aliases in reversed(_ALIASES.items())
-    for rank, alias in enumerate(aliases.split(";"))
-}
+ROLES = (
+    *(Role.NAME, Role.PART_NUMBER, Role.DESCRIPTION, Role.MATERIAL, Role.MASS, Role.TOTAL_MASS),
+    *(Role.QUANTITY, Role.ITEM, Role.LEVEL, Role.FIND_NUMBER),
+)
+"""What a mass calculation reads of a BOM."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +82,7 @@ def find_columns(header: Sequence[str], given: Mapping[str, str] | None = None) 
             continue
         role, rank = found
         seen.append((role, index))
-        if rank < best.get(role, len(_ROLE_OF)):
+        if rank < best.get(role, sys.maxsize):
             at[role], best[role] = index, rank
     units = {role: unit for role in _MASSES if role in at and (unit := _unit_of(header[at[role]]))}
     others = tuple((role, i) for role, i in seen if role in _ONE_ONLY and at[role] != i)
@@ -148,7 +91,7 @@ def find_columns(header: Sequence[str], given: Mapping[str, str] | None = None) 
 
 
 def _given_roles(given: Mapping[str, str]) -> dict[Role, str]:
-    known = {role.value for role in Role}
+    known = {role.value for role in ROLES}
     unknown = sorted(set(given) - known)
     if unknown:
         raise InputError(
@@ -176,10 +119,11 @@ def _says_total(cell: str) -> bool:
 
 
 def _alias(text: str) -> tuple[Role, int] | None:
-    if text in _ROLE_OF:
-        return _ROLE_OF[text]
+    found = alias(text)
+    if found is not None:
+        return found if found[0] in ROLES else None
     stem, _, unit = text.rpartition(" ")
-    found = _ROLE_OF.get(stem.removesuffix(" in"))
+    found = alias(stem.removesuffix(" in"))
     if found and found[0] in (Role.MASS, Role.TOTAL_MASS) and unit_factor(unit) is not None:
         return found
     return None
@@ -187,7 +131,7 @@ def _alias(text: str) -> tuple[Role, int] | None:
 
 def _unit_of(cell: str) -> str | None:
     """The unit a mass column's header states, in brackets or as its last word."""
-    bracket = _BRACKET.search(unicodedata.normalize("NFKC", cell))
+    bracket = BRACKET.search(unicodedata.normalize("NFKC", cell))
     if bracket and unit_factor(bracket[1]) is not None:
         return bracket[1].strip()
     words = normal(cell).split()

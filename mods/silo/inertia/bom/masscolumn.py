@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from silo.bom.headers import Role
 from silo.bom.numbers import Mark
-from silo.inertia.bom.columns import Role
 from silo.inertia.bom.masses import MassCell, column_mark, parse_mass
 from silo.inertia.bom.rows import BomCode, BOMEntry
 from silo.inertia.bom.sheet import Row, Sheet

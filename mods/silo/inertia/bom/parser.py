@@ -9,8 +9,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from silo.bom.errors import InputError
+from silo.bom.headers import Role
 from silo.bom.numbers import LARGEST_QUANTITY, Mark, read_count
-from silo.inertia.bom.columns import Role
 from silo.inertia.bom.masscolumn import MassReader
 from silo.inertia.bom.masses import is_empty, unit_factor
 from silo.inertia.bom.rows import BomCode, BOMEntry, BomTable, BomWarning
@@ -114,7 +114,7 @@ def _entry(
         quantum_kg=mass.quantum_kg,
         overridden=mass.overridden,
         unsure=mass.ambiguous,
-        item=cell(row.cells, item_role),
+        item=cell(row.cells, item_role) or cell(row.cells, Role.FIND_NUMBER),
         level=_level(cell(row.cells, Role.LEVEL)),
         line=row.line,
     )

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 from itertools import islice
 
 from silo.bom.errors import InputError
-from silo.inertia.bom.columns import Columns, Role, find_columns
+from silo.bom.headers import Role
+from silo.inertia.bom.columns import Columns, find_columns
 
 MAX_BYTES = 64 * 1024 * 1024
 HEADER_WITHIN = 40

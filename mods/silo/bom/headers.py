@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What a column of a BOM means, by its header: one table for the BOM parser and the server's import.
+
+Columns are chosen and renamed by each company, and CAD systems are localised. An alias is compared without
+case, punctuation, and a unit in brackets; a position never decides. Pure.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Collection, Mapping, Sequence
+from enum import StrEnum
+
+
+class Role(StrEnum):
+    """What a column is used for."""
+
+    NAME = "name"
+    PART_NUMBER = "part_number"
+    DESCRIPTION = "description"
+    MATERIAL = "material"
+    MASS = "mass"
+    TOTAL_MASS = "total_mass"
+    QUANTITY = "quantity"
+    ITEM = "item"
+    LEVEL = "level"
+    UNIT = "unit"
+    REFERENCE_DESIGNATORS = "reference_designators"
+    FIND_NUMBER = "find_number"
+    NOTES = "notes"
+    TYPE = "rel_type"
+    REVISION = "child_revision"
+
+
+# en, de, fr, es, it, ja, zh; Silo's and FreeCAD's own exports among them. The first alias fits best.
+_ALIASES: dict[Role, str] = {
+    Role.NAME: """name; part name; component; component name; product; product name; label; title; body;
+        bezeichnung; benennung; teil; teilename; bauteil; bauteilname; produkt; nom; nom de la pièce; pièce;
+        composant; désignation; nombre; nombre de pieza; pieza; componente; denominación; nome; nome parte;
+        nome componente; denominazione; 名前; 名称; 部品名; 品名; パーツ名; 部品; 名稱; 零件名称;
+        零件; 部件名称""",
+    Role.PART_NUMBER: """part number; part no; part nr; partnumber; pn; item number; article number;
+        article no; sku; child part number; teilenummer; teile nr; artikelnummer; artikel nr; sachnummer;
+        numéro de pièce; référence; réf; número de pieza; número de parte; referencia; código; numero parte;
+        codice; codice articolo; 部品番号; 品番; 型番; 図番;
+        零件编号; 零件号; 零件號; 料号; 料號; 物料编码; number""",
+    Role.DESCRIPTION: """description; desc; child description; beschreibung; descripción; descripcion;
+        descrizione; 説明; 描述; 说明; 説明文; 備考""",
+    Role.MATERIAL: """material; materials; werkstoff; werkstoffe; matériau; matière; materiau; material pieza;
+        materiale; 材料; 材質; 材质; 素材""",
+    Role.MASS: """mass; unit mass; mass each; weight; unit weight; weight each; masse; einzelmasse; gewicht;
+        einzelgewicht; stückgewicht; masse unitaire; poids; poids unitaire; masa; masa unitaria; peso;
+        peso unitario; massa; massa unitaria; 質量; 重量; 单重; 質量 単体; 质量; 单件质量; 單重""",
+    Role.TOTAL_MASS: """total mass; total weight; mass total; weight total; extended mass; extended weight;
+        gesamtmasse; gesamtgewicht; masse totale; poids total; masa total; peso total; massa totale;
+        peso totale; 总重量; 総質量; 総重量; 合計質量; 总质量; 总重; 總重""",
+    Role.QUANTITY: """quantity; qty; count; pieces; pcs; menge; anzahl; stückzahl; stück; quantité; qté; nb;
+        cantidad; cant; quantità; q tà; qta; quantita; 数量; 個数; 員数; 數量""",
+    Role.ITEM: """item; item no; index; pos; position; row; line; nr; lfd nr; rang;
+        repère; article; elemento; artículo; posición; ítem; posizione; voce; 項目; 番号; 项目; 项; 序号;
+        編號; 序號""",
+    Role.LEVEL: """level; depth; indent; ebene; stufe; niveau; nivel; livello; レベル; 階層;
+        级别; 层级; 層級""",
+    Role.UNIT: """unit; uom; unit of measure; einheit; mengeneinheit; unité; unidad; unità; 単位; 单位""",
+    Role.REFERENCE_DESIGNATORS: """reference designators; reference designator; ref des; refdes; designators;
+        designator; references""",
+    Role.FIND_NUMBER: """find number; find no; find nr; findnumber""",
+    Role.NOTES: """notes; note; remarks; remark; comment; comments; bemerkung; bemerkungen; notiz; remarque;
+        remarques; notas; 注記; 备注; 備註""",
+    Role.TYPE: """type; rel type; relation type""",
+    Role.REVISION: """revision""",
+}
+
+BRACKET = re.compile(r"[\(\[（【<]\s*([^)\]）】>]*)\s*[\)\]）】>]")
+"""A remark in brackets, a unit more often than not: its first group is what stands in them."""
+
+
+def normal(header: str) -> str:
+    """A header without case, punctuation, what stands in brackets, and double spaces."""
+    text = unicodedata.normalize("NFKC", header).casefold()
+    text = BRACKET.sub(" ", text)
+    return " ".join(re.sub(r"[\W_]+", " ", text).split())
+
+
+_ROLE_OF: dict[str, tuple[Role, int]] = {
+    normal(alias): (role, rank)
+    for role, aliases in reversed(_ALIASES.items())
+    for rank, alias in enumerate(aliases.split(";"))
+}
+
+
+def alias(text: str) -> tuple[Role, int] | None:
+    """Role of a :func:`normal` header, and how well it fits: 0 is best ("Name" beats "Component")."""
+    return _ROLE_OF.get(text)
+
+
+def find_roles(header: Sequence[str], roles: Collection[Role]) -> dict[Role, int]:
+    """Column index of each role. Of two columns the one whose name fits better, then the first."""
+    best: dict[Role, tuple[int, int]] = {}
+    for index, cell in enumerate(header):
+        found = alias(normal(cell))
+        if found is not None and found[0] in roles:
+            best[found[0]] = min(best.get(found[0], (len(_ROLE_OF), 0)), (found[1], index))
+    return {role: index for role, (_, index) in best.items()}
+
+
+def missing_columns(header: Sequence[str], at: Mapping[Role, int], needed: Sequence[Role]) -> str:
+    """Which of the ``needed`` columns a header lacks, and what was seen; "" where none is missing."""
+    lacking = [role for role in needed if role not in at]
+    if not lacking:
+        return ""
+    names = " and ".join(f"'{_title(role)}'" for role in lacking)
+    seen = ", ".join(cell.strip() for cell in header if cell.strip())
+    others = "; ".join(f"'{_title(role)}' may also be called {_others(role)}" for role in lacking)
+    return f"there is no column {names}; the columns are {seen}. {others}"
+
+
+def _title(role: Role) -> str:
+    return role.replace("_", " ").capitalize()
+
+
+def _others(role: Role) -> str:
+    return ", ".join(name.strip() for name in _ALIASES[role].split(";")[1:5])
