@@ -22,6 +22,7 @@ OK, UNDONE, BAD_INPUT, REMOTE, CANCELLED = 0, 1, 2, 3, 130
 _COMMANDS = (
     "bom",
     "diff",
+    "bom_diff",
     "sync",
     "register",
     "serve",

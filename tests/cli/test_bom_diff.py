@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""``silo-mod bom-diff`` as a user runs it: two folders, and two revisions of a repository; no server."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fcstd_writer import Doc, XLink, locals_
+
+from silo.cli.demo_edit import remove_from_assembly, set_element_count
+
+
+@pytest.fixture
+def changed(gearbox: Path, tmp_path: Path) -> tuple[Path, Path]:
+    """The example, and a copy without its cover and with four more bolts."""
+    old, new = gearbox.parent, tmp_path / "changed"
+    shutil.copytree(old, new)
+    remove_from_assembly(new / gearbox.name, "Cover")
+    set_element_count(new / gearbox.name, "CoverBolts", added=4)
+    return old, new
+
+
+def changes(data: Any) -> dict[str, dict[str, tuple[Any, Any]]]:
+    return {
+        change["doc_path"]: {
+            line["object"]: (line["old_quantity"], line["new_quantity"]) for line in change["lines"]
+        }
+        for change in data["changes"]
+    }
+
+
+WANTED = {"TopAssembly.FCStd": {"M8x20Bolt": (12, 16), "Cover": (1, None)}}
+
+
+def test_two_folders(run: Any, changed: tuple[Path, Path]) -> None:
+    assert changes(run("bom-diff", *changed, "--json").json()) == WANTED
+    shown = run("bom-diff", *changed)
+    assert shown.code == 0
+    assert "12 → 16" in shown.out
+    assert "Cover" in shown.out
+    assert run("bom-diff", *changed, "--check").code == 1
+    same = run("bom-diff", changed[0], changed[0], "--check")
+    assert (same.code, "No BOM changed; assemblies compared: 2." in same.out) == (0, True)
+
+
+def test_markdown_for_a_pull_request(run: Any, changed: tuple[Path, Path]) -> None:
+    out = run("bom-diff", *changed, "--markdown").out
+    assert "### TopAssembly.FCStd" in out
+    assert "| quantity changed | M8x20 Bolt | 12 → 16 | parts/M8x20Bolt.FCStd |" in out
+
+
+def test_two_revisions_and_the_work_tree(run: Any, changed: tuple[Path, Path], tmp_path: Path) -> None:
+    old, new = changed
+    repository = tmp_path / "repo"
+    models = repository / "cad"
+    shutil.copytree(old, models)
+
+    def git(*words: str) -> None:
+        who = ("-c", "user.name=t", "-c", "user.email=t", "-c", "commit.gpgsign=false")
+        subprocess.run(["git", *who, *words], cwd=repository, capture_output=True, check=True)
+
+    git("init", "-q", "-b", "main")
+    git("add", "-A")
+    git("commit", "-qm", "first")
+    shutil.copytree(new, models, dirs_exist_ok=True)
+    in_repository = {f"cad/{path}": lines for path, lines in WANTED.items()}
+    assert changes(run("bom-diff", "--git", "HEAD", repository, "--json").json()) == in_repository
+    git("commit", "-qam", "second")
+    assert changes(run("bom-diff", "--git", "HEAD~1..HEAD", repository, "--json").json()) == in_repository
+    # Of one folder, its own files; the work tree stays as it is.
+    assert changes(run("bom-diff", "--git", "HEAD~1..HEAD", models, "--json").json()) == WANTED
+    assert run("bom-diff", "--git", "nowhere..HEAD", repository).code == 2
+
+
+def test_an_unreadable_file_and_a_missing_one_are_reported(run: Any, tmp_path: Path) -> None:
+    """A part whose file is not there is still a line; the exit code says that the new state is not whole."""
+    for name in ("old", "new"):
+        folder = tmp_path / name
+        folder.mkdir()
+        Doc("part").add("Part::Box", "Box").save(folder / "part.FCStd")
+        top = Doc("top").add("App::Link", "L", LinkedObject=XLink("part.FCStd", "Box"))
+        top.add("Assembly::AssemblyObject", "A", Group=locals_("L")).save(folder / "top.FCStd")
+    (tmp_path / "new" / "part.FCStd").unlink()
+    (tmp_path / "new" / "other.FCStd").write_text(
+        "version https://git-lfs.github.com/spec/v1\noid sha256:" + "0" * 64 + "\nsize 12345\n"
+    )
+    ran = run("bom-diff", tmp_path / "old", tmp_path / "new", "--json")
+    data = ran.json()
+    assert ran.code == 1
+    assert data["old"]["complete"] is True
+    assert data["new"]["complete"] is False
+    assert [row["file"] for row in data["new"]["unreadable"]] == ["other.FCStd"]
+    assert [finding["code"] for finding in data["new"]["findings"]] == ["missing_file"]
+    # Nothing was taken out of the assembly.
+    assert data["changes"] == []
+    shown = run("bom-diff", tmp_path / "old", tmp_path / "new")
+    assert "other.FCStd" in shown.out
+    assert "part.FCStd" in shown.out
+    # From damaged to whole is no failure.
+    assert run("bom-diff", tmp_path / "new", tmp_path / "old").code == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [((), "two folders"), (("a",), "two folders"), (("--git", "A..B", "a", "b"), "at most one folder")],
+)
+def test_wrong_words_are_explained(run: Any, words: tuple[str, ...], named: str) -> None:
+    ran = run("bom-diff", *words)
+    assert ran.code == 2
+    assert named in ran.err
+
+
+def test_a_folder_that_is_not_there_is_an_error(run: Any, tmp_path: Path) -> None:
+    ran = run("bom-diff", tmp_path, tmp_path / "nowhere")
+    assert ran.code == 2
+    assert "nowhere" in ran.err

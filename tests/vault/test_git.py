@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""FreeCAD files of git revisions, with a real git."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from silo.bom.errors import InputError
+from silo.vault.git import Range, lay_out, parse_range, top_of
+
+if shutil.which("git") is None:
+    pytest.skip("git is not on this machine", allow_module_level=True)
+
+# Nobody's own configuration: no signing, no hooks, no other branch name.
+GIT_ENV = {
+    **os.environ,
+    "GIT_CONFIG_GLOBAL": os.devnull,
+    "GIT_CONFIG_SYSTEM": os.devnull,
+    **{f"GIT_{who}_{what}": "t" for who in ("AUTHOR", "COMMITTER") for what in ("NAME", "EMAIL")},
+}
+
+
+def git(folder: Path, *words: str) -> str:
+    done = subprocess.run(
+        ["git", *words], cwd=folder, env=GIT_ENV, capture_output=True, text=True, check=True
+    )
+    return done.stdout.strip()
+
+
+@pytest.fixture
+def repository(tmp_path: Path) -> Path:
+    """Two commits on main, and a branch that began at the first."""
+    folder = tmp_path / "repo"
+    (folder / "cad" / "große Teile").mkdir(parents=True)
+    git(folder, "init", "-q", "-b", "main")
+    (folder / "cad" / "a.FCStd").write_bytes(b"one")
+    (folder / "cad" / "große Teile" / "b b.fcstd").write_bytes(os.urandom(3_000_000))
+    (folder / "notes.txt").write_text("no model")
+    (folder / "cad" / "link.FCStd").symlink_to("a.FCStd")
+    git(folder, "add", "-A")
+    git(folder, "commit", "-qm", "first")
+    git(folder, "branch", "other")
+    (folder / "cad" / "a.FCStd").write_bytes(b"two")
+    git(folder, "commit", "-qam", "second")
+    git(folder, "checkout", "-q", "other")
+    (folder / "c.FCStd").write_bytes(b"")
+    git(folder, "add", "-A")
+    git(folder, "commit", "-qm", "third")
+    return folder
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    found = (path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in found}
+
+
+def test_models_are_laid_out_as_they_were_and_nothing_else(repository: Path, tmp_path: Path) -> None:
+    lay_out(str(repository), "main", "", tmp_path / "out")
+    found = files(tmp_path / "out")
+    assert found == {
+        "cad/a.FCStd": b"two",
+        "cad/große Teile/b b.fcstd": (repository / "cad/große Teile/b b.fcstd").read_bytes(),
+    }
+
+
+def test_a_part_of_the_repository_keeps_its_place(repository: Path, tmp_path: Path) -> None:
+    lay_out(str(repository), "other", "cad/große Teile", tmp_path / "out")
+    assert set(files(tmp_path / "out")) == {"cad/große Teile/b b.fcstd"}
+
+
+def test_ranges_mean_what_git_means_by_them(repository: Path) -> None:
+    where = str(repository)
+    first, main, other = (git(repository, "rev-parse", name) for name in ("other~1", "main", "other"))
+    assert parse_range(where, "main..other") == Range(main, other)
+    assert parse_range(where, "main...other") == Range(first, other)
+    assert parse_range(where, "main..") == Range(main, other)
+    assert parse_range(where, "main") == Range(main, None)
+
+
+@pytest.mark.parametrize("text", ["nowhere", "main..nowhere", "--help", "main:cad", ""])
+def test_what_is_no_revision_is_refused_by_name(repository: Path, text: str) -> None:
+    with pytest.raises(InputError) as caught:
+        parse_range(str(repository), text)
+    assert text.split("..")[-1] in str(caught.value)
+
+
+def test_a_folder_outside_any_repository_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="not a git repository"):
+        top_of(tmp_path)
+    with pytest.raises(InputError, match="is no folder"):
+        top_of(tmp_path / "nowhere")
+
+
+def test_a_name_that_leaves_its_folder_is_refused(repository: Path, tmp_path: Path) -> None:
+    """Git itself makes no such tree, but a hostile repository may hold one."""
+    blob = git(repository, "rev-parse", "main:cad/a.FCStd")
+    done = subprocess.run(
+        ["git", "hash-object", "-t", "tree", "-w", "--stdin", "--literally"],
+        cwd=repository,
+        env=GIT_ENV,
+        input=b"100644 ../evil.FCStd\0" + bytes.fromhex(blob),
+        capture_output=True,
+        check=True,
+    )
+    with pytest.raises(InputError, match="leaves its folder"):
+        lay_out(str(repository), done.stdout.decode().strip(), "", tmp_path / "in" / "out")
+    assert not (tmp_path / "in").exists()
+
+
+def test_files_kept_in_git_lfs_are_taken_where_they_were_fetched(repository: Path, tmp_path: Path) -> None:
+    oids = {"a": "ab" * 32, "b": "cd" * 32}
+    for name, oid in oids.items():
+        pointer = f"version https://git-lfs.github.com/spec/v1\noid sha256:{oid}\nsize 7\n"
+        (repository / f"{name}.FCStd").write_text(pointer)
+    git(repository, "add", "-A")
+    git(repository, "commit", "-qm", "pointers")
+    stored = repository / ".git/lfs/objects/ab/ab" / oids["a"]
+    stored.parent.mkdir(parents=True)
+    stored.write_bytes(b"content")
+    lay_out(str(repository), "HEAD", "", tmp_path / "out")
+    assert (tmp_path / "out/a.FCStd").read_bytes() == b"content"
+    assert (tmp_path / "out/b.FCStd").read_bytes().startswith(b"version https://git-lfs")
