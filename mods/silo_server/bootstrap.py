@@ -11,7 +11,7 @@ from silo.bom.errors import ConfigError
 from silo_server.db.engine import Database, Tx
 from silo_server.db.migrate import upgrade
 from silo_server.db.tables import users
-from silo_server.services import accounts, credentials, logins
+from silo_server.services import accounts, credentials, logins, search
 from silo_server.services.housekeeping import START_TOKEN, clear_away
 from silo_server.values import Role
 
@@ -44,6 +44,7 @@ def prepare(db: Database, token: str | None = None) -> Welcome:
         secret = _give_token(tx, admin, token)
         link = logins.create_login_link(tx, admin.username)
         clear_away(tx)
+        search.ensure_index(tx)
     return Welcome(admin.username, secret, link, first)
 
 

@@ -5,9 +5,14 @@ from __future__ import annotations
 
 import threading
 import uuid
+from urllib.parse import quote
 
 import pytest
-from server_testing import Api, bom
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from server_testing import Api, bom, form_body
+
+from silo_server.services.search import words_of
 
 
 def test_an_item_gets_a_number_of_its_category(api: Api) -> None:
@@ -157,8 +162,71 @@ def test_search_and_paging(api: Api) -> None:
     assert answer.headers["x-total-count"] == "5"
     assert len(api.get(f"/api/items/search?q={word}+zinc")) == 5
     assert api.get(f"/api/items?search={word}&item_type=part") == []
-    assert api.get(f"/api/items?search={word}%25") == []
-    assert api.get(f"/api/items?search={word}_") == []
+    # Neither is a wildcard; both only part words.
+    assert api.get(f"/api/items?search={word}%25zz") == []
+    assert api.get(f"/api/items?search={word}_zz") == []
+    assert api.get("/api/items?search=%25") == []
+
+
+def test_search_ranks_and_knows_what_people_type(api: Api) -> None:
+    """Numbers without dashes, parts of words, accents, supplier and its number, file names; best first."""
+    word = "q" + uuid.uuid4().hex[:8]
+    supplier = {
+        "supplier": f"Schräubli {word}",
+        "supplier_part_number": f"91290-A{word}",
+        "list": [{"a": word}],
+    }
+    numbers = [f"{word}-10", f"A{word}-1", f"B-{word[:4]}", "C-" + word[5:], f"D{word}"[:20]]
+    api.item(numbers[0], name="Zylinderschraube Größe ½")
+    api.item(numbers[2], name=f"x{word}x")
+    api.item(numbers[3], description=f"beside {word}")
+    api.item(numbers[4] + "-S", properties=supplier)
+    body, headers = form_body({"file": (f"Halter {word}.FCStd", b"x")})
+    api.call("POST", f"/api/items/{api.item(numbers[1])}/file", body=body, headers=headers)
+
+    def found(query: str) -> list[str]:
+        return [item["part_number"] for item in api.get(f"/api/items/search?q={quote(query)}")]
+
+    assert found(f"{word}10") == [numbers[0]]
+    assert found(f"{word}-10")[0] == numbers[0]
+    # In the number first, then in the name, then in all else.
+    assert found(word) == [*sorted([numbers[0], numbers[1], numbers[4] + "-S"]), numbers[2], numbers[3]]
+    assert found(f"{word} schraube") == [numbers[0]]
+    assert found(f"{word} grosse") == found(f"GRÖSSE {word.upper()}") == [numbers[0]]
+    assert found(f"{word} schraubli") == [numbers[4] + "-S"]
+    assert found(f"91290A{word}") == found(f"91290-a{word}") == [numbers[4] + "-S"]
+    assert found(f"halter {word}") == [numbers[1]]
+    # What was changed is found by the new words, and by the old ones no more.
+    api.good("PUT", f"/api/items/{numbers[0]}", {"name": "Mutter"})
+    assert found(f"{word} mutter") == [numbers[0]]
+    assert found(f"{word} schraube") == []
+    api.good("DELETE", f"/api/items/{numbers[0]}")
+    assert found(f"{word} mutter") == []
+
+
+@pytest.mark.parametrize(
+    "query", ['"', "'", "' OR 1=1", "a:* & !", "NEAR(", "{number}: x", "*", "\\", "Ａ", "ﬁ", "\u202e"]
+)
+def test_no_query_is_an_error(api: Api, query: str) -> None:
+    """What is syntax to a database is only a text here."""
+    api.item()
+    assert isinstance(api.get(f"/api/items/search?q={quote(query)}"), list)
+
+
+@given(name=st.text(min_size=1, max_size=40))
+@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_an_item_is_found_by_each_word_of_its_name(api: Api, name: str) -> None:
+    """Whatever the script: what the index has is what the query asks for, on both databases."""
+    words = words_of(name)
+    if not words or "\x00" in name or any("\ud800" <= c <= "\udfff" for c in name):
+        return
+    mark = "m" + uuid.uuid4().hex[:10]
+    answer = api.call("POST", "/api/items", {"part_number": mark, "name": name})
+    if answer.status == 201:
+        for query in [*words[:5], name]:
+            assert [i["part_number"] for i in api.get(f"/api/items/search?q={mark}%20{quote(query)}")] == [
+                mark
+            ]
 
 
 def test_renaming_keeps_the_identity(api: Api) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from server_testing import Api, Databases, bom, form_body, wait_until
 from sqlalchemy import inspect, text
 
 from silo.bom.errors import ConfigError
@@ -20,7 +21,6 @@ from silo_server.db.tables import metadata
 from silo_server.operation import backup
 from silo_server.run import running_server
 from silo_server.settings import Settings
-from silo_server.testing import Api, Databases, bom, form_body, wait_until
 
 TOKEN = "silo_backup"
 VOLATILE = {"server_state", "events", "audit", "login_links", "api_tokens", "sessions"}

@@ -95,7 +95,10 @@ def test_the_migrations_make_the_tables(url: str) -> None:
     differences, tables = _differences(db)
     db.close()
     assert differences == []
-    assert tables == set(metadata.tables) | {"alembic_version"}
+    assert {name for name in tables if not name.startswith("item_search")} == {
+        *metadata.tables,
+        "alembic_version",
+    }
 
 
 def test_every_step_up_can_be_taken_alone_and_repeated(url: str) -> None:
@@ -199,6 +202,8 @@ def _revision(db: Database) -> str | None:
 def _differences(db: Database) -> tuple[list[object], set[str]]:
     with db.engine.connect() as connection:
         found = compare_metadata(MigrationContext.configure(connection), metadata)
+        # The search index has another form in each database, of which Alembic knows nothing.
+        found = [each for each in found if "item_search" not in str(each)]
         return found, set(inspect(connection).get_table_names())
 
 

@@ -6,6 +6,7 @@ Rules of this module:
 * JSON is kept as text and written by us, so that both databases give back what was stored;
 * times are ISO 8601 text in UTC with microseconds (``clock.stamp``), which sorts as it reads on both;
 * `*_key` columns hold the case-folded form that is unique and looked up by;
+* the search index (``item_search``) is none of them: each database has its own form (``services.search``);
 * history (``bom_changes``, ``bom_change_lines``) and ``audit`` are only ever inserted into.
 """
 
@@ -38,6 +39,8 @@ metadata = MetaData(
 # SQLite gives out row ids (and never reuses one) only for a column of exactly INTEGER.
 Id = BigInteger().with_variant(Integer, "sqlite")
 Stamp = String(32)
+# By code point on both databases, whatever language a PostgreSQL sorts in by itself.
+Key = String(64).with_variant(String(64, collation="C"), "postgresql")
 Uuid = String(36)
 
 server_state = Table(
@@ -53,13 +56,12 @@ items = Table(
     Column("id", Id, primary_key=True),
     Column("uuid", Uuid, nullable=False, unique=True),
     Column("part_number", String(64), nullable=False),
-    Column("part_number_key", String(64), nullable=False, unique=True),
+    Column("part_number_key", Key, nullable=False, unique=True),
     Column("schema_name", String(64)),
     Column("category", String(32)),
     Column("item_type", String(32), nullable=False),
     Column("name", Text, nullable=False),
     Column("description", Text, nullable=False),
-    Column("search_key", Text, nullable=False),
     Column("sourcing_type", String(64)),
     Column("long_description", Text),
     Column("thumbnail_key", String(64)),
@@ -71,6 +73,9 @@ items = Table(
     Column("updated_at", Stamp, nullable=False),
     Column("updated_by", String(64), nullable=False),
     Column("archived_at", Stamp),
+    Index(None, "archived_at", "part_number_key"),
+    Index(None, "item_type", "archived_at", "part_number_key"),
+    Index(None, "category", "archived_at", "part_number_key"),
     sqlite_autoincrement=True,
 )
 
@@ -170,6 +175,7 @@ bom_syncs = Table(
     Column("answer", Text, nullable=False),
     Column("version", Integer, nullable=False),
     Column("at", Stamp, nullable=False),
+    Column("change_id", Id),
     Index(None, "at"),
 )
 

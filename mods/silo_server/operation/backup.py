@@ -37,7 +37,7 @@ from silo_server.db.migrate import check_revision, upgrade
 from silo_server.db.state import put_state
 from silo_server.db.tables import events, items, metadata, revisions
 from silo_server.files import FileStore
-from silo_server.services import audit
+from silo_server.services import audit, search
 from silo_server.services.events import HORIZON
 from silo_server.settings import Settings
 from silo_server.values import SYSTEM, dumps
@@ -233,6 +233,7 @@ def _replace_rows(reader: Connection, tx: Tx, made: Manifest, report: Report) ->
         )
     )
     _set_highest_ids(tx.conn, {**highest, "events": horizon + 1})
+    search.rebuild_index(tx)
     audit.note(tx, "server.restored", detail=f"backup of {made.made_at}")
     if tx.postgres:
         tx.conn.execute(select(func.pg_notify(EVENT_CHANNEL, "")))

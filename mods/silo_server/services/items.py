@@ -4,27 +4,24 @@
 from __future__ import annotations
 
 import json
-import re
 import uuid as uuids
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from sqlalchemy import ColumnElement, func, insert, or_, select, update
+from sqlalchemy import ColumnElement, func, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
 from silo.bom.errors import ConflictError, NotFoundError, RejectedError
 from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import items
-from silo_server.db.tables import revisions as revisions_table
 from silo_server.errors import DuplicateError
 from silo_server.schema.catalog import ITEM_TYPES, Category, find_schema
 from silo_server.services import events, revisions
 from silo_server.services.numbering import check_number, take_number
+from silo_server.services.search import index_item, search_for
 from silo_server.values import Item
-
-_SHA256 = re.compile(r"(?:sha256:)?([0-9a-f]{64})")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,8 +45,7 @@ class ItemQuery:
     """Filters of the list.
 
     search
-        looks into number, name and description, word by word. A SHA-256 finds the items that have, or had,
-        the file with this content, or were registered from it.
+        words, as :func:`silo_server.services.search.search_for` finds them.
     """
 
     search: str = ""
@@ -125,30 +121,22 @@ def by_ids(tx: Tx, ids: Collection[int]) -> dict[int, Item]:
 
 
 def list_items(tx: Tx, query: ItemQuery) -> tuple[list[Item], int]:
-    """A page of the items that match, by part number, and how many match in all."""
+    """A page of the items that match, best first, then by part number; and how many match in all."""
     conditions: list[ColumnElement[bool]] = [] if query.include_archived else [items.c.archived_at.is_(None)]
-    conditions += [_has_word(word) for word in query.search.casefold().split()]
+    order: list[ColumnElement[Any]] = [items.c.part_number_key]
+    found = search_for(tx, query.search)
+    if found is not None:
+        conditions.append(found.condition)
+        order.insert(0, found.rank)
     if query.item_type:
         conditions.append(items.c.item_type == query.item_type)
     if query.category:
         conditions.append(items.c.category == query.category.upper())
-    # By code point on both databases, whatever language a PostgreSQL sorts in by itself.
-    order = items.c.part_number_key.collate("C") if tx.postgres else items.c.part_number_key
     total = tx.conn.scalar(select(func.count()).select_from(items).where(*conditions)) or 0
     rows = tx.conn.execute(
-        select(items).where(*conditions).order_by(order).limit(query.limit).offset(query.offset)
+        select(items).where(*conditions).order_by(*order).limit(query.limit).offset(query.offset)
     ).all()
     return [to_item(row) for row in rows], total
-
-
-def _has_word(word: str) -> ColumnElement[bool]:
-    found = items.c.search_key.contains(word, autoescape=True)
-    if (digest := _SHA256.fullmatch(word)) is None:
-        return found
-    with_file = select(revisions_table.c.item_id).where(revisions_table.c.file_checksum == digest[1])
-    # The add-on notes from which content it registered an item: its own file has the identity in it by now.
-    noted = items.c.properties.contains(f'"{digest[1]}"')
-    return or_(found, noted, items.c.id.in_(with_file))
 
 
 def create_item(tx: Tx, new: NewItem) -> tuple[Item, bool]:
@@ -183,6 +171,8 @@ def create_item(tx: Tx, new: NewItem) -> tuple[Item, bool]:
     if new.properties:
         revisions.add_revision(tx, item, comment="created", properties=new.properties)
         item = get_item(tx, number)
+    else:
+        index_item(tx, item.id)
     events.item_created(tx, item)
     return item, True
 
@@ -210,7 +200,6 @@ def change_item(tx: Tx, part_number: str, change: ItemChange) -> Item:
     elif not values:
         return item
     number = values.pop("part_number", item.part_number)
-    merged = {"name": item.name, "description": item.description, **values}
     try:
         tx.conn.execute(
             update(items)
@@ -219,13 +208,13 @@ def change_item(tx: Tx, part_number: str, change: ItemChange) -> Item:
                 **values,
                 part_number=number,
                 part_number_key=number.casefold(),
-                search_key=_search_key(number, merged["name"], merged["description"]),
                 updated_at=tx.stamp,
                 updated_by=tx.actor.username,
             )
         )
     except IntegrityError as error:
         raise DuplicateError(f"part number {number} is taken by another item") from error
+    index_item(tx, item.id)
     after = get_item(tx, number)
     events.item_updated(tx, after)
     return after
@@ -290,7 +279,6 @@ def _insert(tx: Tx, number: str, values: Mapping[str, Any]) -> None:
                 **values,
                 part_number=number,
                 part_number_key=number.casefold(),
-                search_key=_search_key(number, values["name"], values["description"]),
                 updated_at=values["created_at"],
                 updated_by=values["created_by"],
             )
@@ -319,7 +307,3 @@ def _changed_values(item: Item, change: ItemChange) -> dict[str, Any]:
         "long_description": change.long_description,
     }
     return {key: value for key, value in given.items() if value is not None and value != getattr(item, key)}
-
-
-def _search_key(number: str, name: str, description: str) -> str:
-    return "\n".join((number, name, description)).casefold()

@@ -14,6 +14,7 @@ from silo.bom.errors import ConflictError, NotFoundError
 from silo_server.db.engine import Tx
 from silo_server.db.tables import items, revisions
 from silo_server.services import events
+from silo_server.services.search import index_item
 from silo_server.values import Item, Revision, dumps
 
 
@@ -73,6 +74,7 @@ def add_revision(
         .where(items.c.id == item.id)
         .values(**changed, updated_at=tx.stamp, updated_by=tx.actor.username)
     )
+    index_item(tx, item.id)
     revision = get_revision(tx, item, number)
     events.revision_created(tx, item, revision)
     return revision

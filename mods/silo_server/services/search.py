@@ -1,0 +1,243 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The search for items: an index of words, FTS5 on SQLite and ``tsvector`` on PostgreSQL, by the same rules.
+
+The words are made here and not by the databases, so that both find the same: case and accents do not count,
+everything but letters and digits parts words. A part number is found also without its dashes; in a number and
+a name the middle of a word is enough ("schraube" finds "Zylinderschraube"), elsewhere its beginning is.
+
+What is looked into: number, name, descriptions, texts among the properties (supplier, supplier's number,
+material, …) and the names of the uploaded files.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import unicodedata
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+from sqlalchemy import ColumnElement, Integer, case, column, func, literal_column, or_, select, table, text
+from sqlalchemy.dialects.postgresql import TSQUERY, TSVECTOR
+from sqlalchemy.sql.expression import cast, literal
+
+from silo_server.db.bulk import one_of
+from silo_server.db.engine import Tx
+from silo_server.db.state import get_state, put_state
+from silo_server.db.tables import items, revisions
+
+# Counts up when the rules below change; the next start then makes the index anew.
+RULES = "1"
+STATE = "search_index"
+PAGE = 1000
+# More than anybody searches for, and what keeps the index of one item small.
+LONGEST_WORD = 64
+MOST_WORDS = 500
+LONGEST_PROPERTY = 200
+
+_WORD = re.compile(r"[^\W_]+")
+_SHA256 = re.compile(r"(?:sha256:)?([0-9a-f]{64})", re.IGNORECASE)
+_fts = table("item_search", column("rowid", Integer))
+_vectors = table("item_search", column("item_id", Integer), column("words", TSVECTOR))
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """How to find and rank: a condition on ``items``, and what to order by (best first)."""
+
+    condition: ColumnElement[bool]
+    rank: ColumnElement[int]
+
+
+def words_of(written: str) -> list[str]:
+    """The words of a text as the index has them."""
+    return [word[:LONGEST_WORD] for word in _WORD.findall(_plain(written))]
+
+
+def search_for(tx: Tx, written: str) -> Found | None:
+    """What finds the items with all words of ``written``; None where it says nothing to search for.
+
+    A SHA-256 finds the items that have, or had, the file with this content, or were registered from it. Best
+    first: the very number, then the words in the number, then in number and name, then anywhere.
+    """
+    parts = written.split()
+    if not parts:
+        return None
+    conditions: list[ColumnElement[bool]] = []
+    words: list[str] = []
+    for part in parts:
+        if digest := _SHA256.fullmatch(part):
+            with_file = select(revisions.c.item_id).where(revisions.c.file_checksum == digest[1].lower())
+            conditions.append(or_(items.c.id.in_(with_file), _matches(tx, [digest[1].lower()], "")))
+        else:
+            words += words_of(part)
+    if words:
+        conditions.append(_matches(tx, words, ""))
+    elif not conditions:
+        conditions.append(literal(False))
+    key = written.strip().casefold()
+    number = or_(
+        items.c.part_number_key == key,
+        func.replace(items.c.part_number_key, "-", "") == key.replace("-", ""),
+    )
+    rank: ColumnElement[int] = literal(0)
+    if words:
+        rank = case(
+            (number, 0), (_matches(tx, words, "number"), 1), (_matches(tx, words, "number name"), 2), else_=3
+        )
+    condition = conditions[0]
+    for more in conditions[1:]:
+        condition = condition & more
+    return Found(condition, rank)
+
+
+def index_item(tx: Tx, item_id: int) -> None:
+    """Bring the index up to date with an item that was made or changed, or has a new file."""
+    _index(tx, [item_id])
+
+
+def ensure_index(tx: Tx) -> int:
+    """Make the whole index where there is none yet, or one by other rules; how many items were indexed."""
+    if get_state(tx, STATE) == RULES:
+        return 0
+    return rebuild_index(tx)
+
+
+def rebuild_index(tx: Tx) -> int:
+    """Make the whole index anew."""
+    tx.conn.execute(text("DELETE FROM item_search"))
+    count = last = 0
+    while True:
+        query = select(items.c.id).where(items.c.id > last).order_by(items.c.id).limit(PAGE)
+        ids = list(tx.conn.scalars(query))
+        if not ids:
+            break
+        _index(tx, ids, new=True)
+        count, last = count + len(ids), ids[-1]
+    put_state(tx, STATE, RULES)
+    return count
+
+
+def _index(tx: Tx, ids: list[int], *, new: bool = False) -> None:
+    names: dict[int, list[str]] = {}
+    files = select(revisions.c.item_id, revisions.c.file_name).distinct()
+    files = files.where(one_of(tx, revisions.c.item_id, ids), revisions.c.file_name.is_not(None))
+    for item_id, name in tx.conn.execute(files):
+        names.setdefault(item_id, []).append(name)
+    found = tx.conn.execute(
+        select(
+            items.c.id,
+            items.c.part_number,
+            items.c.name,
+            items.c.description,
+            items.c.long_description,
+            items.c.properties,
+        ).where(one_of(tx, items.c.id, ids))
+    ).all()
+    rows = [
+        {
+            "id": row.id,
+            "number": _inner({*words_of(row.part_number), _joined(row.part_number)}),
+            "name": _inner(words_of(row.name)),
+            "other": _limited(
+                [row.description, row.long_description or "", *names.get(row.id, ())], row.properties
+            ),
+        }
+        for row in found
+    ]
+    if not rows:
+        return
+    if tx.postgres:
+        vectors = [
+            {"id": row["id"], "words": _vector((row["number"], "A"), (row["name"], "B"), (row["other"], "C"))}
+            for row in rows
+        ]
+        tx.conn.execute(
+            text(
+                "INSERT INTO item_search (item_id, words) VALUES (:id, CAST(:words AS tsvector)) "
+                "ON CONFLICT (item_id) DO UPDATE SET words = EXCLUDED.words"
+            ),
+            vectors,
+        )
+        return
+    if not new:
+        tx.conn.execute(text("DELETE FROM item_search WHERE rowid = :id"), [{"id": r["id"]} for r in rows])
+    tx.conn.execute(
+        text("INSERT INTO item_search (rowid, number, name, other) VALUES (:id, :number, :name, :other)"),
+        [{k: v if k == "id" else " ".join(sorted(v)) for k, v in row.items()} for row in rows],
+    )
+
+
+def _matches(tx: Tx, words: Iterable[str], where: str) -> ColumnElement[bool]:
+    """The item has all ``words`` (their beginnings), ``where``: in these columns of the index, or in any."""
+    if tx.postgres:
+        weights = {"": "", "number": "A", "number name": "AB"}[where]
+        query = " & ".join(f"'{word}':*{weights}" for word in words)
+        return items.c.id.in_(
+            select(_vectors.c.item_id).where(_vectors.c.words.bool_op("@@")(cast(literal(query), TSQUERY)))
+        )
+    query = " AND ".join(f'"{word}"*' for word in words)
+    if where:
+        query = f"{{{where}}} : ({query})"
+    matching = literal_column("item_search").bool_op("MATCH")(query)
+    return items.c.id.in_(select(_fts.c.rowid).where(matching))
+
+
+def _vector(*parts: tuple[set[str], str]) -> str:
+    # All of a weight stand at one place: the order of words is of no matter here.
+    places: dict[str, list[str]] = {}
+    for number, (words, weight) in enumerate(parts, start=1):
+        for word in words:
+            places.setdefault(word, []).append(f"{number}{weight}")
+    return " ".join(f"'{word}':{','.join(where)}" for word, where in places.items())
+
+
+def _plain(written: str) -> str:
+    if written.isascii():
+        return written.lower()
+    parted = unicodedata.normalize("NFKD", written.casefold())
+    return "".join(c for c in parted if not unicodedata.combining(c)).casefold()
+
+
+def _joined(number: str) -> str:
+    return "".join(_WORD.findall(_plain(number)))[:LONGEST_WORD]
+
+
+def _inner(words: Iterable[str]) -> set[str]:
+    """Words and their ends, so that the beginning of an end, which is any part of a word, is found."""
+    found: set[str] = set()
+    for word in list(words)[:MOST_WORDS]:
+        found |= _ends(word)
+    return found
+
+
+@lru_cache(maxsize=4096)
+def _ends(word: str) -> frozenset[str]:
+    shortest = 3 if word.isascii() else 1
+    return frozenset({word, *(word[start:] for start in range(1, len(word) - shortest + 1))})
+
+
+def _limited(texts: Iterable[str], properties: str) -> set[str]:
+    found: set[str] = set()
+    for written in [*texts, *_texts(json.loads(properties))]:
+        words = words_of(written)
+        found.update(words)
+        if len(words) > 1 and len(written) <= LONGEST_WORD and any(c.isdigit() for c in written):
+            found.add(_joined(written))  # a supplier's number, without its dashes too
+        if len(found) > MOST_WORDS:
+            break
+    return set(sorted(found)[:MOST_WORDS])
+
+
+def _texts(value: Any) -> Iterator[str]:
+    waiting = [value]
+    while waiting:
+        one = waiting.pop()
+        if isinstance(one, Mapping):
+            waiting += one.values()
+        elif isinstance(one, list):
+            waiting += one
+        elif isinstance(one, str) and len(one) <= LONGEST_PROPERTY:
+            yield one
