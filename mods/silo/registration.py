@@ -1,27 +1,50 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Giving a component its item: create it in Silo, write the identity into its file, never twice.
 
-The order is what keeps a crash harmless: the intent, with the UUID that the item shall have, is on disk
-before the server is asked; the identity is in the file before the intent is forgotten. Whatever is
-interrupted, the next run finds the intent, asks the server for that UUID, and goes on where it stopped.
+The order is what keeps a crash harmless: the file can take an identity; the intent, with the UUID that the
+item shall have, is on disk before the server is asked; the identity is in the file before the intent is
+finished. Whatever is interrupted, the next run finds the intent and looks for the item that it may have made:
+by its UUID, by the property that carries it, and, where a server shows neither, among the items of the same
+description that were made since. Where that leaves a doubt, a person is asked.
 """
 
 from __future__ import annotations
 
-import json
-import uuid
-from collections.abc import Callable, Mapping
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from datetime import UTC, datetime
 from typing import Any, Protocol
 
-from silo.bom.errors import InputError, SiloError
+from silo.bom.errors import (
+    BusyError,
+    ConflictError,
+    DocumentError,
+    NotFoundError,
+    NotSentError,
+    ServerFaultError,
+    SiloError,
+    UnreachableError,
+)
 from silo.bom.model import BomEntry
 from silo.bom.naming import Proposal
-from silo.durable import replacing
+from silo.registration_journal import Journal, Record
+
+__all__ = [
+    "REGISTRATION_PROPERTY",
+    "Journal",
+    "Registration",
+    "RegistrationApi",
+    "component_key",
+    "register",
+]
 
 # Servers that give UUIDs of their own still keep properties: this one finds an item made before a crash.
 REGISTRATION_PROPERTY = "registration_id"
+
+PAGE, PAGES = 100, 50
+CLOCKS_APART_S = 26 * 3600.0
+"""Two clocks may differ by this much, time zones included."""
 
 
 class RegistrationApi(Protocol):
@@ -29,7 +52,9 @@ class RegistrationApi(Protocol):
 
     def get_item_by_uuid(self, uuid: str, /) -> Mapping[str, Any] | None: ...
 
-    def search_items(self, query: str, /) -> Any: ...
+    def get_properties(self, part_number: str, /) -> Mapping[str, Any]: ...
+
+    def search_items(self, query: str = "", /, *, limit: int = 50, offset: int = 0) -> Any: ...
 
     def create_item(
         self,
@@ -45,65 +70,52 @@ class RegistrationApi(Protocol):
 
 # Writes an identity into the component's file: (entry, uuid). Raises DocumentError where it cannot.
 Stamp = Callable[[BomEntry, str], None]
+# Raises DocumentError where an identity could not be written, before anything is made on the server.
+Check = Callable[[BomEntry], None]
+# Which of these items an interrupted run made for the component: one of them, or None for a new item.
+Ask = Callable[[Proposal, Sequence[Mapping[str, Any]]], Mapping[str, Any] | None]
 
 
 @dataclass(frozen=True)
 class Registration:
-    """What became of one component: its item, or the error that kept it from getting one."""
+    """What became of one component: its item, or the error that kept it from getting one.
+
+    found
+        the item was there already, made by an interrupted run or lost from the file since.
+    """
 
     proposal: Proposal
     part_number: str | None = None
     item_id: str | None = None
     error: SiloError | None = None
-
-
-class Journal:
-    """Intents that are not finished, one small JSON file; written whole and renamed, so never half."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-
-    def pending(self) -> dict[str, str]:
-        """``file#object`` → the UUID that its item was to get."""
-        try:
-            known = json.loads(self.path.read_text(encoding="utf-8"))
-        except FileNotFoundError:
-            return {}
-        except (OSError, ValueError) as error:
-            raise InputError(
-                f"{self.path}: the journal of unfinished registrations cannot be read ({error}). Mend or "
-                "move it away; items of an interrupted run may then exist without a file that names them."
-            ) from error
-        return {str(k): str(v) for k, v in known.items()} if isinstance(known, dict) else {}
-
-    def begin(self, component: str) -> tuple[str, bool]:
-        """The UUID for a component's item, and whether an earlier run had already begun with it."""
-        known = self.pending()
-        if component in known:
-            return known[component], True
-        known[component] = str(uuid.uuid4())
-        self._write(known)
-        return known[component], False
-
-    def replace(self, component: str, item_id: str) -> None:
-        """Remember the UUID that the server chose itself."""
-        self._write({**self.pending(), component: item_id})
-
-    def done(self, component: str) -> None:
-        """Forget a component: its file names its item."""
-        known = self.pending()
-        if known.pop(component, None) is not None:
-            self._write(known)
-
-    def _write(self, known: Mapping[str, str]) -> None:
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        with replacing(self.path) as file:
-            file.write(json.dumps(known, indent=1).encode())
+    found: bool = False
 
 
 def component_key(entry: BomEntry) -> str:
     """How the journal names a component."""
     return f"{entry.doc_path}#{entry.object_name}"
+
+
+def document_uid(entry: BomEntry) -> str:
+    """FreeCAD's UUID of the component's document, as it is on disk; "" where it cannot be read."""
+    from silo.fcstd import Library
+
+    if not os.path.isfile(entry.doc_path):
+        return ""
+    try:
+        with Library() as library:
+            return str(library.open(entry.doc_path).Uid)
+    except DocumentError:
+        return ""
+
+
+def unclear(proposal: Proposal, found: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
+    """The answer where nobody can be asked: an error that names the items."""
+    numbers = ", ".join(str(item["part_number"]) for item in found)
+    raise ConflictError(
+        f"{proposal.name}: an interrupted run may have made {numbers} for it (same description, made since). "
+        "Look at that, then take it or make a new item"
+    )
 
 
 def register(
@@ -114,42 +126,158 @@ def register(
     *,
     schema: str = "kindred-rd",
     properties: Mapping[str, Any] | None = None,
+    check: Check = lambda _entry: None,
+    ask: Ask = unclear,
 ) -> Registration:
     """Register one component; an error is returned, not raised, so that the others go on.
 
     properties
         further properties of the first revision, such as the file's hash.
+    check, ask
+        see :data:`Check` and :data:`Ask`.
     """
     component = component_key(proposal.entry)
     try:
-        wanted, begun = journal.begin(component)
-        item = _made_before(api, proposal, wanted) if begun else None
-        if item is None:
+        check(proposal.entry)
+        with journal.turn():
+            uid = document_uid(proposal.entry)
+            item, found = _lost(api, journal, component, uid), True
+            if item is None:
+                item, found = _item(proposal, api, journal, schema, properties or {}, ask)
+            item_id = str(item["id"])
+            stamp(proposal.entry, item_id)
+            journal.done(component, uid or document_uid(proposal.entry))
+    except SiloError as error:
+        return Registration(proposal, error=error)
+    return Registration(proposal, part_number=str(item["part_number"]), item_id=item_id, found=found)
+
+
+def _lost(api: RegistrationApi, journal: Journal, component: str, uid: str) -> Mapping[str, Any] | None:
+    """The item of a document that was registered before and lost its identity: FreeCAD saved over it."""
+    record = journal.find(component)
+    if record is None or not record.finished or not uid or record.document_uid != uid:
+        return None
+    return api.get_item_by_uuid(record.item_id)
+
+
+def _item(
+    proposal: Proposal,
+    api: RegistrationApi,
+    journal: Journal,
+    schema: str,
+    properties: Mapping[str, Any],
+    ask: Ask,
+) -> tuple[Mapping[str, Any], bool]:
+    """The component's item, and whether it was there already."""
+    component = component_key(proposal.entry)
+    intent, begun = journal.begin(component, str(getattr(api, "base_url", "")))
+    item = _made_before(proposal, api, journal, intent, ask) if begun else None
+    found = item is not None
+    if item is None:
+        mark = {} if getattr(api, "keeps_item_ids", False) else {REGISTRATION_PROPERTY: intent.wanted}
+        try:
             item = api.create_item(
                 schema,
                 proposal.category,
                 proposal.name,
                 item_type=proposal.item_type,
-                properties={**(properties or {}), REGISTRATION_PROPERTY: wanted},
-                idempotency_key=wanted,
+                properties={**properties, **mark},
+                idempotency_key=intent.wanted,
             )
-        item_id = str(item["id"])
-        if item_id != wanted:
-            journal.replace(component, item_id)
-        stamp(proposal.entry, item_id)
-        journal.done(component)
-    except SiloError as error:
-        return Registration(proposal, error=error)
-    return Registration(proposal, part_number=str(item["part_number"]), item_id=item_id)
+        except SiloError as error:
+            if not _may_have_arrived(error):
+                if not begun:
+                    journal.forget(component)
+                raise
+            item = _after_a_lost_answer(proposal, api, journal, intent, ask, error)
+    if str(item["id"]) != intent.item_id:
+        journal.replace(component, str(item["id"]))
+    return item, found
 
 
-def _made_before(api: RegistrationApi, proposal: Proposal, wanted: str) -> Mapping[str, Any] | None:
-    """The item that an interrupted run created, if it came that far."""
-    item = api.get_item_by_uuid(wanted)
-    if item is not None:
-        return item
-    for found in api.search_items(proposal.name):
-        if (found.get("properties") or {}).get(REGISTRATION_PROPERTY) == wanted:
-            match: Mapping[str, Any] = found
-            return match
-    return None
+def _may_have_arrived(error: SiloError) -> bool:
+    put_off = isinstance(error, (NotSentError, BusyError))
+    return isinstance(error, (UnreachableError, ServerFaultError)) and not put_off
+
+
+def _after_a_lost_answer(
+    proposal: Proposal, api: RegistrationApi, journal: Journal, intent: Record, ask: Ask, error: SiloError
+) -> Mapping[str, Any]:
+    try:
+        item = _made_before(proposal, api, journal, intent, ask)
+    except ConflictError:
+        raise
+    except SiloError:
+        raise error from None  # The way is still broken: the first reason says more.
+    if item is None:
+        raise error
+    return item
+
+
+def _made_before(
+    proposal: Proposal, api: RegistrationApi, journal: Journal, intent: Record, ask: Ask
+) -> Mapping[str, Any] | None:
+    """The item that this intent made, if it came that far."""
+    for known in dict.fromkeys((intent.item_id, intent.wanted)):
+        item = api.get_item_by_uuid(known)
+        if item is not None:
+            return item
+    if getattr(api, "keeps_item_ids", False):
+        return None  # This server gives an item the UUID that we ask for, so there is none.
+    others = journal.item_ids() - {intent.item_id}
+    doubtful: dict[str, Mapping[str, Any]] = {}
+    for item in _of_the_same_name(proposal, api, intent.begun_at):
+        mark = _mark(api, item)
+        if mark == intent.wanted:
+            return item
+        if mark is None and str(item["id"]) not in others:
+            doubtful[str(item["id"])] = item
+    return ask(proposal, tuple(doubtful.values())) if doubtful else None
+
+
+def _of_the_same_name(proposal: Proposal, api: RegistrationApi, since: float) -> Iterator[Mapping[str, Any]]:
+    """The items of this description made since then, each once; by search, then by the whole list."""
+    name, seen = proposal.name.casefold(), set()
+    for item in _all_items(proposal.name, api):
+        if str(item["id"]) in seen:
+            continue
+        seen.add(str(item["id"]))
+        made = _time(item.get("created_at"))
+        texts = (str(item.get("description") or "").casefold(), str(item.get("name") or "").casefold())
+        if name in texts and (made is None or made >= since - CLOCKS_APART_S):
+            yield item
+
+
+def _all_items(name: str, api: RegistrationApi) -> Iterator[Mapping[str, Any]]:
+    yield from api.search_items(name)
+    # A search may be fuzzy, late or short: what is not in it may exist all the same.
+    before: frozenset[str] = frozenset()
+    for page in range(PAGES):
+        try:
+            items = list(api.search_items("", limit=PAGE, offset=page * PAGE))
+        except NotFoundError:
+            return
+        ids = frozenset(str(item["id"]) for item in items)
+        if not ids or ids == before:  # the end, or a server that knows no pages
+            return
+        yield from items
+        before = ids
+
+
+def _mark(api: RegistrationApi, item: Mapping[str, Any]) -> str | None:
+    """The registration that an item names; None where it names none that can be read."""
+    mark = (item.get("properties") or {}).get(REGISTRATION_PROPERTY)
+    if mark is None:
+        try:
+            mark = api.get_properties(str(item["part_number"])).get(REGISTRATION_PROPERTY)
+        except (NotFoundError, ServerFaultError):
+            return None
+    return str(mark) if mark is not None else None
+
+
+def _time(value: Any) -> float | None:
+    try:
+        made = value if isinstance(value, datetime) else datetime.fromisoformat(str(value))
+    except ValueError:
+        return None
+    return (made if made.tzinfo else made.replace(tzinfo=UTC)).timestamp()

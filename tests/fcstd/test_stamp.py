@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from silo.bom.errors import DocumentError
 from silo.bom.identity import identity_of
-from silo.fcstd import open_document, stamp
+from silo.fcstd import check_stampable, open_document, stamp
 from silo.fcstd.container import FileState
 from silo.fcstd.stamp import _write
 
@@ -330,3 +330,22 @@ def test_what_was_in_meta_stays(tmp_path_factory: pytest.TempPathFactory, meta: 
     path = Doc(meta=meta).add("Part::Box", "Box").save(tmp_path_factory.mktemp("meta") / "p.FCStd")
     stamp(path, "u-1", replace=True)
     assert open_document(path).Meta == {**meta, "SiloUUID": "u-1"}
+
+
+def test_what_cannot_be_stamped_is_known_before(tmp_path: Path) -> None:
+    """The check refuses what the stamp would refuse, and changes nothing."""
+    path = tmp_path / "a.FCStd"
+    Doc().add("Part::Feature", "Box").save(path)
+    content = path.read_bytes()
+    check_stampable(path)
+    check_stampable(path, object_name="Box")
+    with pytest.raises(DocumentError, match="no object named"):
+        check_stampable(path, object_name="Sphere")
+    assert path.read_bytes() == content
+    path.chmod(0o444)
+    with pytest.raises(DocumentError, match="read-only"):
+        check_stampable(path)
+    path.chmod(0o644)
+    stamp(path, "u-1")
+    with pytest.raises(DocumentError, match="another identity"):
+        check_stampable(path)

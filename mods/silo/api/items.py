@@ -5,16 +5,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import cached_property
 from typing import Any
 from uuid import UUID
 
 from silo.api.bodies import ItemBody, ItemChanges, NumberAnswer, NumberBody, UuidsBody, body
 from silo.api.caller import LISTS, Caller, Params
 from silo.api.replies import WebPageError
-from silo.api.schemas import categories_of
+from silo.api.schemas import categories_of, schema_names
 from silo.api.transport import Cancel, stop_if
 from silo.api.wire import Item
-from silo.bom.errors import NotFoundError, RejectedError, RouteMissingError, SiloError
+from silo.bom.errors import InputError, NotFoundError, RejectedError, RouteMissingError, SiloError
 
 MAX_UUIDS = 500
 """Identities in one batch question."""
@@ -29,6 +30,10 @@ class ItemCalls(Caller):
     # None until known: an older server has no batch look-up, and is asked for it only once.
     _has_batch: bool | None = None
     _is_silo: bool | None = None
+
+    @cached_property
+    def _schemas(self) -> dict[str, str]:
+        return {}
 
     def get_item_by_uuid(self, uuid: str, /) -> Item | None:
         """The item with this identity; None where the server has none (unknown, archived, or no UUID)."""
@@ -185,6 +190,39 @@ class ItemCalls(Caller):
     def get_schema(self, name: str = "kindred-rd") -> dict[str, Any]:
         """The part-number schema as the server describes it."""
         return self._get(f"schema {name}", "schemas", name).mapping()
+
+    def find_schema(self, wanted: str = "kindred-rd") -> str:
+        """The name of the part-number schema to use: the wanted one, else the server's only one.
+
+        Raises :class:`InputError` that lists the schemas where there are several others, or none.
+        """
+        if wanted in self._schemas:
+            return self._schemas[wanted]
+        try:
+            self.get_schema(wanted)
+            found = wanted
+        except RouteMissingError:
+            raise
+        except NotFoundError as error:
+            found = self._only_schema(wanted, error)
+        self._schemas[wanted] = found
+        return found
+
+    def _only_schema(self, wanted: str, missing: NotFoundError) -> str:
+        try:
+            said = self._get("its schemas", "schemas").data()
+        except NotFoundError:
+            raise missing from None
+        names = schema_names(said)
+        if len(names) == 1:
+            return names[0]
+        host = self._address.host
+        if not names:
+            raise InputError(f"{host} has no part-number schema {wanted}, and lists no other") from missing
+        raise InputError(
+            f"{host} has no part-number schema {wanted}; it has {', '.join(names)}. Choose one of them with "
+            "--schema, or in the Silo preferences"
+        ) from missing
 
     def categories(self, name: str = "kindred-rd") -> dict[str, str]:
         """The categories of a schema: code → description, in the schema's order."""

@@ -106,6 +106,11 @@ def _scope(error: SiloError, alive: Callable[[], object] | None) -> Scope:
     return Scope.ENTRY
 
 
+def ends_run(error: SiloError) -> bool:
+    """True where a run over many items that sends one kind of request must not try the next one."""
+    return judge(error).scope is not Scope.ENTRY
+
+
 def told_wait(error: SiloError) -> float | None:
     """The pause that the server named with this error, in seconds, within bounds."""
     told = getattr(error, "retry_after", None)

@@ -22,6 +22,16 @@ def categories_of(schema: Mapping[str, Any]) -> dict[str, str]:
     return {}
 
 
+def schema_names(said: Any) -> list[str]:
+    """The names in a list of schemas: objects or bare names, bare or under ``schemas``, or by name."""
+    if isinstance(said, Mapping):
+        said = said.get("schemas", said.get("items", said.get("data", said)))
+    if isinstance(said, Mapping):
+        return [str(name) for name, body in said.items() if isinstance(body, Mapping)]
+    names = [body.get("name") if isinstance(body, Mapping) else body for body in said or ()]
+    return list(dict.fromkeys(name for name in names if isinstance(name, str) and name))
+
+
 def _segments(value: Any) -> Iterator[Mapping[str, Any]]:
     if isinstance(value, Mapping):
         yield from ({"name": name, **body} for name, body in value.items() if isinstance(body, Mapping))

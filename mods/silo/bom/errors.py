@@ -82,8 +82,6 @@ class UnreachableError(RemoteError):
 class NotSentError(UnreachableError):
     """The request did not leave this computer: no such host, refused. Sending again is safe."""
 
-    code = "not_sent"
-
 
 class BusyError(UnreachableError):
     """429, or 503 with Retry-After: the server did not process the request and wants it later."""

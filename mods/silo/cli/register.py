@@ -9,14 +9,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from silo.bom.errors import InputError
+from silo.bom.errors import ConflictError, InputError, SiloError
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.naming import Proposal, crowded_files, propose
 from silo.bom.report import base_of, relative
 from silo.bom_sync import resolve
 from silo.cli import common
 from silo.cli.common import Commands
-from silo.registration import Journal, Registration
+from silo.registration import Ask, Journal, Registration, unclear
 from silo.registration import register as register_component
 
 if TYPE_CHECKING:
@@ -33,7 +33,18 @@ def register(commands: Commands) -> None:
     )
     common.add_assembly_options(parser)
     parser.add_argument("--yes", action="store_true", help="take every proposal without asking")
-    parser.add_argument("--schema", default="kindred-rd", help="part number schema (default: kindred-rd)")
+    parser.add_argument(
+        "--schema",
+        default="kindred-rd",
+        help="part number schema (default: kindred-rd, else the server's only one)",
+    )
+    parser.add_argument(
+        "--unclear",
+        choices=("ask", "take", "new"),
+        default="ask",
+        help="an interrupted run may have made the item, and the server does not show for which part: "
+        "ask (default), take it where only one fits, or make a new one",
+    )
     parser.add_argument("--category", help="this category for every part (assemblies keep theirs)")
     common.add_json_option(parser)
     common.add_server_options(parser)
@@ -46,11 +57,12 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("register asks before it creates items, and there is nobody to ask here; say --yes")
     extraction = common.read_assembly(args.top, args.assembly)
     with common.client_of(args) as client:
-        proposals = proposals_for(extraction, client, args.schema)
+        schema = client.find_schema(args.schema)
+        proposals = proposals_for(extraction, client, schema)
         if args.category:
             proposals = [p if p.entry.is_assembly else replace(p, category=args.category) for p in proposals]
         chosen = proposals if args.yes else _ask(proposals, base_of(extraction))
-        done = register_all(chosen, extraction, client, schema=args.schema)
+        done = register_all(chosen, extraction, client, schema=schema, ask=_asker(args.unclear))
     skipped = [p for p in proposals if p not in chosen]
     _tell(args, extraction, done, skipped)
     return 1 if skipped or any(r.error for r in done) else 0
@@ -71,20 +83,62 @@ def proposals_for(extraction: Extraction, client: SiloClient, schema: str) -> li
 
 
 def register_all(
-    proposals: Sequence[Proposal], extraction: Extraction, client: SiloClient, *, schema: str
+    proposals: Sequence[Proposal],
+    extraction: Extraction,
+    client: SiloClient,
+    *,
+    schema: str,
+    ask: Ask = unclear,
 ) -> list[Registration]:
-    """Register each; one failure does not stop the rest."""
-    from silo.fcstd import stamp
-    from silo.folders import data_folder
+    """Register each; one failure does not stop the rest, unless it concerns all of them."""
+    from silo.api.policy import ends_run
+    from silo.fcstd import check_stampable, stamp
 
     crowded = crowded_files((extraction.assembly, *extraction.entries))
-    journal = Journal(data_folder() / "registrations.json")
+
+    def own_name(entry: BomEntry) -> str | None:
+        return entry.object_name if entry.doc_path in crowded else None
 
     def write(entry: BomEntry, identity: str) -> None:
-        name = entry.object_name if entry.doc_path in crowded else None
-        stamp(entry.doc_path, identity, object_name=name)
+        stamp(entry.doc_path, identity, object_name=own_name(entry))
 
-    return [register_component(p, client, journal, write, schema=schema) for p in proposals]
+    def check(entry: BomEntry) -> None:
+        check_stampable(entry.doc_path, object_name=own_name(entry))
+
+    journal, done = Journal(), []
+    stopped: SiloError | None = None
+    for proposal in proposals:
+        if stopped is not None:
+            done.append(Registration(proposal, error=stopped))
+            continue
+        result = register_component(proposal, client, journal, write, schema=schema, check=check, ask=ask)
+        stopped = result.error if result.error is not None and ends_run(result.error) else None
+        done.append(result)
+    return done
+
+
+def _asker(how: str) -> Ask:
+    """Which of the items that fit an interrupted run made: as ``--unclear`` says."""
+
+    def ask(proposal: Proposal, found: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
+        if how == "new":
+            return None
+        if how == "take" and len(found) == 1:
+            return found[0]
+        if how == "take" or not sys.stdin.isatty():
+            try:
+                return unclear(proposal, found)
+            except ConflictError as error:
+                raise ConflictError(f"{error}: --unclear take, or --unclear new") from None
+        print(f"{proposal.name}: an interrupted run may have made its item already:", file=sys.stderr)
+        for number, item in enumerate(found, start=1):
+            print(f"  {number}  {item['part_number']}  {item.get('created_at') or ''}", file=sys.stderr)
+        answer = input("which one is it? [number, n = make a new item] ").strip()
+        if answer.isdecimal() and 1 <= int(answer) <= len(found):
+            return found[int(answer) - 1]
+        return None if answer.lower() == "n" else unclear(proposal, found)
+
+    return ask
 
 
 def _ask(proposals: Sequence[Proposal], base: str) -> list[Proposal]:

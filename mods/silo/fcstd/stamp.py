@@ -18,7 +18,7 @@ from pathlib import Path
 from silo.bom.errors import DocumentError
 from silo.bom.identity import META_KEY, meta_key
 from silo.durable import sync_folder
-from silo.fcstd.container import DOCUMENT_XML, ContainerFile, FileState
+from silo.fcstd.container import DOCUMENT_XML, ContainerFile, Entry, FileState
 from silo.fcstd.inflate import Inflater
 from silo.fcstd.library import Library
 from silo.fcstd.limits import Limits
@@ -57,13 +57,28 @@ def stamp(
         if _present(real, state, identity, object_name, replace, limits):
             return False
         _check_writable(real)
-        content = _stamped(container, key, identity)
+        content = replaced_entry(container, *_stamped_xml(container, key, identity))
     # The file is closed by now: Windows lets nobody replace an open one.
     try:
         _write(real, state, content, key, identity)
     except OSError as error:
         raise DocumentError(real, f"it cannot be written: {error.strerror or error}") from error
     return True
+
+
+def check_stampable(
+    path: Path | str, *, object_name: str | None = None, limits: Limits | None = None
+) -> None:
+    """Raise the DocumentError that :func:`stamp` would raise for a new identity; changes nothing.
+
+    Asked before an item is made on the server: a file that cannot name its item shall get none.
+    """
+    real = os.path.realpath(path)
+    limits = limits or Limits()
+    with ContainerFile(real, limits) as container:
+        _present(real, container.state, "", object_name, False, limits)
+        _check_writable(real)
+        _stamped_xml(container, meta_key(object_name or ""), "0" * 36)
 
 
 def _check_identity(path: str, identity: str) -> None:
@@ -117,8 +132,8 @@ def _check_writable(path: str) -> None:
         raise DocumentError(path, "its folder is read-only; nothing was written")
 
 
-def _stamped(container: ContainerFile, key: str, identity: str) -> bytes:
-    """The whole file as it is to become."""
+def _stamped_xml(container: ContainerFile, key: str, identity: str) -> tuple[Entry, bytes]:
+    """The entry Document.xml, and its content as it is to become."""
     path, limits = container.path, container.limits
     entry = container.entry(DOCUMENT_XML)
     if entry is None:
@@ -126,10 +141,9 @@ def _stamped(container: ContainerFile, key: str, identity: str) -> bytes:
     packed = container.packed(entry, limits.packed)
     text = Inflater(path, entry, packed, limits.document_xml, limits).whole()
     try:
-        new = with_meta(text, key, identity, limits.depth)
+        return entry, with_meta(text, key, identity, limits.depth)
     except ValueError as error:
         raise FcstdError(path, f"its Document.xml {error}; nothing was written") from error
-    return replaced_entry(container, entry, new)
 
 
 def _write(path: str, state: FileState, content: bytes, key: str, identity: str) -> None:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Set
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from silo.api.policy import Scope, judge
+from silo.api.policy import ends_run
 from silo.bom.errors import NotFoundError, SiloError
 from silo.inertia.bom.rows import BomCode
 from silo.inertia.codes import MassCode, Source
@@ -142,7 +142,7 @@ def push(items: Items, plan: PushPlan, told: Callable[[str], None] = lambda part
             unknown.append(wanted.part_number)
         except SiloError as error:
             failed.append((wanted.part_number, error))
-            stopped = error if judge(error).scope is not Scope.ENTRY else None
+            stopped = error if ends_run(error) else None
     return Pushed(tuple(written), tuple(unchanged), tuple(unknown), tuple(failed), plan)
 
 

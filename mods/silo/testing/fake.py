@@ -178,6 +178,9 @@ class FakeSilo(FakeStore):
     def get_schema_form(self, name: str = "kindred-rd", category: str | None = None) -> dict[str, Any]:
         return {"schema": self.get_schema(name)["name"], "field_groups": []}
 
+    def find_schema(self, wanted: str = "kindred-rd") -> str:
+        return wanted if wanted == "kindred-rd" or not wanted else str(self.get_schema(wanted)["name"])
+
     def categories(self, name: str = "kindred-rd") -> dict[str, str]:
         return dict(self.get_schema(name)["segments"][0]["values"])
 

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 from silo.bom.errors import DocumentError, SiloError
 from silo.bom.identity import walk_entries
 from silo.bom.model import BomEntry, Extraction
-from silo.folders import data_folder
 from silo.registration import Journal, Registration
 from silo.workbench.commit.flow import CommitFlow, take_snapshot
 from silo.workbench.commit.snapshot import Snapshot
@@ -45,7 +44,7 @@ class RegisterFlow:
     ) -> None:
         self._session, self._preferences, self._commits = session, preferences, commits
         self._changed = changed
-        self._journal = Journal(data_folder() / "registrations.json")
+        self._journal = Journal()
         self._open: dict[str, RegisterDialog] = {}
 
     def start(self, doc: Any) -> None:
@@ -125,7 +124,7 @@ class RegisterFlow:
                 client,
                 self._journal,
                 lambda candidate, identity: self._session.in_gui(lambda: write(candidate, identity), control),
-                schema=schema,
+                schema=client.find_schema(schema),
                 control=control,
                 done=tell,
             )

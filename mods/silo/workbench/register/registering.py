@@ -13,12 +13,12 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any
 
-from silo.bom.errors import NotFoundError, SiloError, UnreachableError
+from silo.bom.errors import NotFoundError, SiloError
 from silo.bom.findings import FindingCode
 from silo.bom.identity import walk_entries
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.naming import Proposal, clean_name, crowded_files, propose
-from silo.registration import Journal, Registration, RegistrationApi, component_key, register
+from silo.registration import Journal, Registration, RegistrationApi, component_key, register, unclear
 from silo.workbench.commit.item_file import other_name
 from silo.workbench.register.on_disk import changed_since, sha256_or_nothing
 from silo.workbench.session.jobs import Control
@@ -164,6 +164,7 @@ def offer(
     from silo.bom_sync import resolve
 
     resolved = resolve(extraction, api)
+    schema = api.find_schema(schema)
     numbers = _numbers_by_identity(resolved)
     categories = api.categories(schema)
     crowded = crowded_files((extraction.assembly, *extraction.entries))
@@ -282,7 +283,7 @@ def _next_numbers(candidates: Iterable[Candidate], api: Any, schema: str) -> dic
 def next_number(api: Any, schema: str, category: str) -> str:
     """The number that the next item of a category would get; "" where the server does not say."""
     try:
-        return str(api.generate_part_number(schema, category))
+        return str(api.generate_part_number(api.find_schema(schema), category))
     except SiloError:
         return ""
 
@@ -325,10 +326,13 @@ def carry_out(
     control: Control,
     done: Callable[[Order, Registration], None],
 ) -> None:
-    """Register one after another; ``done`` is told of each, a failure does not stop the rest. Worker.
+    """Register one after another; ``done`` is called with each result. Worker.
 
-    Only where nobody answers at all, the rest is not tried: each would wait for its own time-out.
+    One item's failure does not stop the rest. An error that concerns all of them does: a token that is not
+    accepted, a server that is gone or busy (:mod:`silo.api.policy`).
     """
+    from silo.api.policy import ends_run
+
     gone: SiloError | None = None
     for number, order in enumerate(orders):
         control.check()
@@ -337,7 +341,7 @@ def carry_out(
             done(order, Registration(order.proposal, error=gone))
             continue
         result = _carry_out(order, api, journal, write, schema)
-        gone = result.error if isinstance(result.error, UnreachableError) else None
+        gone = result.error if result.error is not None and ends_run(result.error) else None
         done(order, result)
 
 
@@ -359,4 +363,12 @@ def _carry_out(
         lambda _entry, identity: write(order.candidate, identity),
         schema=schema,
         properties={"file_sha256": order.candidate.sha256} if order.candidate.sha256 else None,
+        ask=lambda proposal, found: _seen_before(order, proposal, found),
     )
+
+
+def _seen_before(order: Order, proposal: Proposal, found: Sequence[Mapping[str, Any]]) -> None:
+    """None (make a new item) where the person saw these items in the dialog and took none of them."""
+    shown = {similar.item_id for similar in order.candidate.similar}
+    if not all(str(item["id"]) in shown for item in found):
+        unclear(proposal, found)
