@@ -10,6 +10,7 @@ from typing import Any, Protocol
 
 from pydantic import ValidationError
 
+from silo.api.arrived import Downloads, MayHaveArrivedError, Sent, find_arrived
 from silo.api.events import Backoff
 from silo.api.multipart import Progress
 from silo.api.outbox_store import Kind, OutboxEntry, State, Store
@@ -39,7 +40,7 @@ _FINAL = (RejectedError, ForbiddenError, NotFoundError, ConflictError, InputErro
 _PASSING = (ConfigError, WebPageError)
 
 
-class OutboxApi(Protocol):
+class OutboxApi(Downloads, Protocol):
     """What sending needs of a Silo; :class:`silo.api.client.SiloClient` has it."""
 
     @property
@@ -177,6 +178,9 @@ class Sender:
     def _failed(self, entry: OutboxEntry, error: SiloError, run: _Run) -> None:
         if isinstance(error, _FINAL) and not isinstance(error, _PASSING):
             self._store.update(entry.id, state=State.REJECTED, reason=str(error))
+            if isinstance(error, MayHaveArrivedError):
+                # A person who presses Retry has looked at these revisions.
+                self._store.update(entry.id, base_revision=error.newest)
             run.rejected.append(self._store.entry(entry.id) or entry)
             return
         pause = self._backoff.pause(entry.attempts + 1, self._chance())
@@ -213,7 +217,9 @@ class Sender:
             base = max((revision.revision_number for revision in known), default=0)
             self._store.update(entry.id, base_revision=base)
         else:
-            found = _arrived_before(entry, known, entry.base_revision)
+            found = find_arrived(
+                self._client, entry.part_number, _sent(entry, entry.base_revision), known, cancelled=cancelled
+            )
             if found is not None:
                 return found
         payload = entry.payload
@@ -242,15 +248,6 @@ def _request(entry: OutboxEntry) -> MergeRequest:
         raise InputError(f"{entry.part_number}: this BOM cannot be read any more; commit it again") from error
 
 
-def _arrived_before(entry: OutboxEntry, known: Sequence[Revision], base: int) -> Revision | None:
-    """Our own upload, if an interrupted attempt brought it to the server."""
-    for revision in sorted(known, key=lambda r: r.revision_number):
-        if revision.revision_number <= base:
-            continue
-        checksum = (revision.file_checksum or "").lower().removeprefix("sha256:")
-        if checksum == entry.payload["sha256"]:
-            return revision
-        same = (entry.payload["size"], entry.payload.get("comment", ""))
-        if not checksum and (revision.file_size, revision.comment) == same:
-            return revision
-    return None
+def _sent(entry: OutboxEntry, base: int) -> Sent:
+    payload = entry.payload
+    return Sent(str(payload["file_name"]), str(payload["sha256"]), int(payload["size"]), base)
