@@ -71,9 +71,9 @@ def test_flat_quantities_are_multiplied_down_the_tree() -> None:
     bolt = entry("bolt", 3, level=2)
     found = extraction(entry("sub", 2, entry("gear", 4, level=2), bolt), entry("bolt", 5))
     assert flat_json(found) == [
-        {"doc_path": "sub.FCStd", "object": "Body", "quantity": 2},
-        {"doc_path": "gear.FCStd", "object": "Body", "quantity": 8},
-        {"doc_path": "bolt.FCStd", "object": "Body", "quantity": 11},
+        {"doc_path": "sub.FCStd", "object": "Body", "standard": None, "quantity": 2},
+        {"doc_path": "gear.FCStd", "object": "Body", "standard": None, "quantity": 8},
+        {"doc_path": "bolt.FCStd", "object": "Body", "standard": None, "quantity": 11},
     ]
 
 

@@ -38,6 +38,7 @@ def test_bom_prints_the_json_that_is_documented(run: Any, gearbox: Path) -> None
         "quantity",
         "missing",
         "level",
+        "standard",
         "consolidation_warning",
         "children",
     }
@@ -59,7 +60,7 @@ def test_bom_prints_the_json_that_is_documented(run: Any, gearbox: Path) -> None
 def test_flat_multiplies_down_the_tree(run: Any, gearbox: Path) -> None:
     """Two gearboxes with four gears each are eight gears; sub-assemblies are listed too."""
     flat = run("bom", gearbox, "--flat", "--json").json()
-    assert all(set(row) == {"doc_path", "object", "quantity"} for row in flat)
+    assert all(set(row) == {"doc_path", "object", "standard", "quantity"} for row in flat)
     assert counts(flat) == {
         "BasePlate": 1,
         "Gearbox": 2,

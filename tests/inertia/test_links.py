@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from silo.inertia.bodies import box
 from silo.inertia.frames import FrameChoice, origin_frame
 from silo.inertia.links import claim, link_map, matches, read_link_map
 from silo.inertia.model import Instance
+from silo.inertia.output.urdf import root_link
 
 Fixture = Callable[..., Any]
 PART = box("p", 0.1, 0.1, 0.1)
@@ -61,11 +63,33 @@ def test_product_patterns() -> None:
 
 
 def test_default_links_are_first_level_sub_assemblies(assemble: Fixture) -> None:
-    """Parts beside them are unclaimed, and listed."""
+    """Parts beside them belong to the root link, which comes first."""
     asm = assemble(("base/a", PART), ("plate", PART), ("arm/b", PART), ("base/c", PART))
     claims = claim(asm)
-    assert claims.members == {"base": (0, 3), "arm": (2,)}
-    assert claims.unclaimed == (1,)
+    assert claims.members == {"base_link": (1,), "base": (0, 3), "arm": (2,)}
+    assert next(iter(claims.members)) == "base_link"
+    assert (claims.unclaimed, claims.rooted) == ((), (1,))
+
+
+def test_no_mass_is_lost_without_a_map(assemble: Fixture, compute: Fixture, codes: Fixture) -> None:
+    """The links together weigh what the assembly weighs; a warning names parts that lie beside them."""
+    asm = assemble(("base_link/a", PART), ("plate", PART), ("plate#2", PART), ("arm/b", PART))
+    report = compute(asm, "Name,Material,Mass\np,steel,\n")
+    assert sum(link.props.mass for link in report.links.values()) == pytest.approx(report.total.mass)
+    assert report.links["base_link"].props.mass == pytest.approx(3 * 7.85)
+    assert codes(report) == ["in_root_link"]
+    assert "2 pieces, 15.7 kg" in report.warnings[0].message
+    assert report.unclaimed == ()
+
+
+def test_the_root_link_has_the_name_that_the_urdf_gives_it() -> None:
+    """base_link where there is one (a root without mass stands above it), else the tree's root."""
+    joint = '<joint name="{0}"><parent link="{1}"/><child link="{2}"/></joint>'
+    for names, root in ((("torso", "arm"), "torso"), (("world", "base_link", "arm"), "base_link")):
+        text = "".join(f'<link name="{name}"/>' for name in names)
+        text += "".join(joint.format(b, a, b) for a, b in pairwise(names))
+        assert root_link(f'<robot name="r">{text}</robot>'.encode()) == root
+    assert root_link(b'<robot name="r"><link name="a"/><link name="b"/></robot>') == "base_link"
 
 
 def test_without_sub_assemblies_all_is_one_link(assemble: Fixture) -> None:
@@ -78,7 +102,8 @@ def test_unclaimed_parts_are_in_no_link_but_in_the_total(
 ) -> None:
     """Their mass is told, with one warning per product."""
     asm = assemble(("base/a", PART), ("plate", PART))
-    report = compute(asm, "Name,Material,Mass\np,steel,\n")
+    links = link_map({"links": {"base": ["base"]}})
+    report = compute(asm, "Name,Material,Mass\np,steel,\n", links=links)
     assert report.links["base"].props.mass == pytest.approx(7.85)
     assert report.total.mass == pytest.approx(15.7)
     assert [part.total_mass for part in report.unclaimed] == [pytest.approx(7.85)]

@@ -54,6 +54,7 @@ PARENT = {
     "PartDesign::Body": "Part::Feature",
     "PartDesign::CoordinateSystem": "Part::Datum",
     "PartDesign::Feature": "Part::Feature",
+    "PartDesign::FeaturePython": "PartDesign::Feature",
     "PartDesign::Plane": "Part::Datum",
     "PartDesign::SubShapeBinder": "Part::Feature",
     "Sketcher::SketchObject": "Part::Part2DObject",

@@ -12,8 +12,12 @@ from dataclasses import dataclass, field, fields
 from typing import Any, TypeVar
 
 from silo.bom.findings import Finding, FindingCode, Place, Severity
+from silo.bom.walk.standard import standard_uuid
 
 T = TypeVar("T")
+
+# Stands in the place of the file in the key of a standard part, whose designation is all that it is.
+STANDARD_PARTS = "standard part:"
 
 
 class Frozen(tuple[T, ...]):
@@ -56,6 +60,9 @@ class BomEntry:
         several individual links where one link array would do.
     object_name, label
         FreeCAD ``Name`` (with ``doc_path`` the component's key) and ``Label`` (for people only).
+    standard
+        designation of a standard part in trade form ("ISO 4762 M4×16"), None for any other component.
+        ``doc_path`` and ``object_name`` then say where it first occurs.
     is_assembly
         True for a sub-assembly, also for an empty one.
     missing
@@ -88,14 +95,25 @@ class BomEntry:
     instances: tuple[str, ...] = field(default=(), compare=False, repr=False)
     document_label: str = field(default="", compare=False, repr=False)
     also: tuple[tuple[str, str], ...] = field(default=(), compare=False, repr=False)
+    standard: str | None = None
 
     def __post_init__(self) -> None:
         _freeze(self, "children", "instances", "also")
 
     @property
     def key(self) -> tuple[str, str]:
-        """(file, object): what a component is. Never a label, never the file alone."""
+        """What a component is: (file, object), or the designation of a standard part. Never a label."""
+        if self.is_standard:
+            return (STANDARD_PARTS, self.standard or "")
         return (self.doc_path, self.object_name)
+
+    @property
+    def is_standard(self) -> bool:
+        """True for an article that its designation identifies; no file is stamped for it.
+
+        False for a fastener that somebody registered as an item of its own: its object carries that identity.
+        """
+        return self.standard is not None and self.silo_uuid == standard_uuid(self.standard)
 
 
 @dataclass(frozen=True)

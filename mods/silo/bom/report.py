@@ -9,6 +9,7 @@ from typing import Any
 
 from silo.bom.errors import InputError
 from silo.bom.findings import Finding, Place
+from silo.bom.identity import walk_entries
 from silo.bom.model import BomDiff, BomEntry, Extraction, rows_as_dicts
 
 # A line takes about 1 kB of memory on its way to JSON or to a terminal.
@@ -39,6 +40,7 @@ def entry_json(entry: BomEntry, base: str) -> dict[str, Any]:
         "silo_uuid": entry.silo_uuid,
         "part_number": entry.part_number,
         "name": entry.name,
+        "standard": entry.standard,
         "quantity": entry.quantity,
         "missing": entry.missing,
         "level": entry.level,
@@ -125,12 +127,24 @@ def flat_counts(entries: Iterable[BomEntry]) -> dict[tuple[str, str], int]:
     return everything
 
 
+def flat_lines(entries: Iterable[BomEntry]) -> list[tuple[BomEntry, int]]:
+    """Each component once, with its instances in the whole assembly."""
+    direct = tuple(entries)
+    known = {entry.key: entry for entry in walk_entries(direct)}
+    return [(known[key], count) for key, count in flat_counts(direct).items()]
+
+
 def flat_json(extraction: Extraction) -> list[dict[str, Any]]:
-    """``[{"doc_path", "object", "quantity"}]``: quantities multiplied down the tree."""
+    """``[{"doc_path", "object", "standard", "quantity"}]``: quantities multiplied down the tree."""
     base = base_of(extraction)
     return [
-        {"doc_path": relative(path, base), "object": name, "quantity": count}
-        for (path, name), count in flat_counts(extraction.entries).items()
+        {
+            "doc_path": relative(entry.doc_path, base),
+            "object": entry.object_name,
+            "standard": entry.standard,
+            "quantity": count,
+        }
+        for entry, count in flat_lines(extraction.entries)
     ]
 
 

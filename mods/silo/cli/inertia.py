@@ -35,7 +35,11 @@ def register(commands: Commands) -> None:
     group.add_argument(
         "--links", metavar="MAP", help="YAML map: link → instance path patterns (see docs/inertia.md)"
     )
-    group.add_argument("--loose", metavar="LINK", help="the link that gets what no other link claims")
+    group.add_argument(
+        "--loose",
+        metavar="LINK",
+        help="the link of what no other link claims (without a map: base_link, warned of)",
+    )
     group.add_argument(
         "--frame",
         choices=FRAMES,
@@ -94,19 +98,19 @@ def run(args: argparse.Namespace) -> int:
 def _task(args: argparse.Namespace) -> Task:
     from silo.inertia.calculator import Task
     from silo.inertia.frames import FrameChoice
-    from silo.inertia.links import read_link_map
+    from silo.inertia.links import ROOT_LINK, read_link_map
     from silo.inertia.massrule import Options
-    from silo.inertia.output.urdf import link_names, read_urdf, urdf_frames
+    from silo.inertia.output.urdf import link_names, read_urdf, root_link, urdf_frames
 
     frame = FrameChoice(args.frame or ("urdf" if args.urdf else "assembly"))
-    frames = None
+    frames, root = None, ROOT_LINK
     if frame is FrameChoice.URDF and not args.urdf:
         raise InputError("--frame urdf needs --urdf FILE, whose joints say where the link frames are")
     if args.urdf:
         data = read_urdf(args.urdf)
         link_names(data, args.urdf)  # a file that cannot be filled is told before anything else is read
         try:
-            frames = urdf_frames(data, args.urdf)
+            frames, root = urdf_frames(data, args.urdf), root_link(data, args.urdf)
         except InputError:
             # A xacro that is not expanded has no frames; who named another one does without the comparison.
             if frame is FrameChoice.URDF:
@@ -118,6 +122,7 @@ def _task(args: argparse.Namespace) -> Task:
         frame,
         frames,
         args.loose,
+        root,
     )
 
 

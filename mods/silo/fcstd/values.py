@@ -122,6 +122,12 @@ def _map(node: Node, _: str) -> dict[str, str]:
     return {a["key"]: a.get("value", "") for a in items if "key" in a}
 
 
+def _class(node: Node) -> Any:
+    """The class of a Python object, which is not made here: (module, name)."""
+    module = node.attributes.get("module", "")
+    return (module, node.attributes.get("class", "")) if module else ABSENT
+
+
 def _subs(node: Node) -> tuple[str, ...]:
     if "sub" in node.attributes:
         return (node.attributes["sub"],)
@@ -178,6 +184,7 @@ _READERS: dict[str, Callable[[Node, str], Any]] = {
     "LinkList": lambda node, _: LocalList(_texts(node)),
     "LinkSubList": _link_subs,
     "XLinkSubList": _xlinks,
+    "Python": lambda node, _: _class(node),
     "VectorList": lambda node, _: SideEntry(node.attributes.get("file", "")),
 }
 

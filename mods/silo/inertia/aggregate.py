@@ -188,6 +188,7 @@ def tell_claims(report: InertiaReport, assembly: Assembly, claims: Claims) -> No
             f"no link claims it ({many}{part.total_mass:.6g} kg, {part.paths[0]}); it is in no link's mass",
             MassCode.UNCLAIMED,
         )
+    _tell_rooted(report, assembly, claims)
     twice: dict[tuple[str, str, str], list[str]] = {}
     for owner, other, index in claims.twice:
         instance = assembly.instances[index]
@@ -199,6 +200,23 @@ def tell_claims(report: InertiaReport, assembly: Assembly, claims: Claims) -> No
         report.add_warning(other, name, words, MassCode.CLAIMED_TWICE)
     for link, pattern in claims.unused:
         report.add_warning(link, "", f"the pattern “{pattern}” matches nothing", MassCode.PATTERN_UNUSED)
+
+
+def _tell_rooted(report: InertiaReport, assembly: Assembly, claims: Claims) -> None:
+    """Parts that the root link got because no sub-assembly holds them: one warning per product."""
+    if not claims.rooted:
+        return
+    root = next(name for name, ids in claims.members.items() if claims.rooted[0] in ids)
+    alone = {assembly.instances[index].name for index in claims.rooted}
+    for part in report.links[root].parts:
+        paths = [path for path in part.paths if path in alone]
+        if paths:
+            many = f"{len(paths)} pieces, " if len(paths) > 1 else ""
+            words = (
+                f"no first-level sub-assembly holds it ({many}{part.mass * len(paths):.6g} kg); it is in the "
+                f"root link {root}. --loose or --links can say otherwise"
+            )
+            report.add_warning(root, part.name, words, MassCode.IN_ROOT_LINK)
 
 
 def tell_bom(report: InertiaReport, table: BomTable) -> None:

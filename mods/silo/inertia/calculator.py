@@ -14,7 +14,7 @@ from silo.inertia.bom import BOMEntry, BOMParser, BomTable, as_table
 from silo.inertia.codes import MassCode
 from silo.inertia.core import Floats
 from silo.inertia.frames import FrameChoice, LinkFrame, apart
-from silo.inertia.links import Claims, LinkMap, claim, read_link_map
+from silo.inertia.links import ROOT_LINK, Claims, LinkMap, claim, read_link_map
 from silo.inertia.massrule import MassRule, Options
 from silo.inertia.matching import match
 from silo.inertia.materials import MaterialHit, MaterialTable, load_materials
@@ -39,7 +39,9 @@ class Task:
         link → (4, 4) placement in the assembly's frame, where a URDF is to be filled; used where ``frame``
         is URDF, else compared with.
     loose_link
-        a link that takes what no other claims; None: such parts are listed as unclaimed.
+        a link that takes what no other claims; None: a map leaves such parts unclaimed.
+    root_link
+        without a map: the link of parts in no first-level sub-assembly, with a warning.
     simulated
         the links go to a simulator: warn of those that it would refuse.
     """
@@ -50,13 +52,15 @@ class Task:
     frame: FrameChoice = FrameChoice.ASSEMBLY
     urdf_frames: Mapping[str, Floats] | None = None
     loose_link: str | None = None
+    root_link: str = ROOT_LINK
     simulated: bool = True
 
 
 def calculate(assembly: Assembly, table: BomTable | None, task: Task | None = None) -> InertiaReport:
     """Mass properties of every link of an assembly. Pure: nothing is read or written."""
     task = task or Task()
-    claims = _framed(_gathered(claim(assembly, task.links), task.loose_link), task)
+    claims = claim(assembly, task.links, task.loose_link or task.root_link)
+    claims = _framed(_gathered(claims, task.loose_link), task)
     report = InertiaReport()
     _tell_frames(report, claims, task)
     return _run(assembly, table, task, claims, report)
@@ -112,8 +116,10 @@ def _run(
 
 
 def _gathered(claims: Claims, loose: str | None) -> Claims:
-    if loose is None or not claims.unclaimed:
+    if loose is None:
         return claims
+    if not claims.unclaimed:
+        return replace(claims, rooted=())  # the caller named the link: nothing to warn of
     members = dict(claims.members)
     members[loose] = tuple(sorted((*members.get(loose, ()), *claims.unclaimed)))
     return replace(claims, members=members, unclaimed=())

@@ -36,6 +36,7 @@ class MassCode(StrEnum):
     ROW_UNUSED = "row_unused"
     # links
     UNCLAIMED = "unclaimed"
+    IN_ROOT_LINK = "in_root_link"  # in no first-level sub-assembly: the root link has it
     CLAIMED_TWICE = "claimed_twice"
     PATTERN_UNUSED = "pattern_unused"
     FRAME_DIFFERS = "frame_differs"  # the numbers' frame is not that of the URDF's link

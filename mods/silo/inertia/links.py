@@ -33,6 +33,8 @@ from silo.inertia.frames import ASSEMBLY_FRAME, LinkFrame, origin_frame
 from silo.inertia.model import Assembly, Instance
 
 PRODUCT = "product:"
+ROOT_LINK = "base_link"
+"""The usual name of a robot's first link (ROS REP 105)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +69,8 @@ class Claims:
         (link that has it, link that wanted it too, instance index).
     unused
         (link, pattern) that matched nothing.
+    rooted
+        without a map: indices of parts in no sub-assembly, which the root link has.
     """
 
     members: Mapping[str, tuple[int, ...]]
@@ -74,6 +78,7 @@ class Claims:
     frames: Mapping[str, LinkFrame] | None = None
     twice: tuple[tuple[str, str, int], ...] = ()
     unused: tuple[tuple[str, str], ...] = ()
+    rooted: tuple[int, ...] = ()
 
     def frame(self, link: str) -> LinkFrame:
         """The link's frame; the assembly's where none was set."""
@@ -169,13 +174,13 @@ def _origin(value: Mapping[str, Any]) -> Floats:
     return origin_frame(xyz, rpy)
 
 
-def claim(assembly: Assembly, links: LinkMap | None = None) -> Claims:
-    """Give every instance to a link, or list it as unclaimed."""
-    return _by_map(assembly, links) if links is not None else _by_first_level(assembly)
+def claim(assembly: Assembly, links: LinkMap | None = None, root: str = ROOT_LINK) -> Claims:
+    """Give every instance to a link, or list it as unclaimed. ``root``: the link of what no other has."""
+    return _by_map(assembly, links) if links is not None else _by_first_level(assembly, root)
 
 
-def _by_first_level(assembly: Assembly) -> Claims:
-    """Each first-level sub-assembly is a link; parts that lie beside them are unclaimed.
+def _by_first_level(assembly: Assembly, root: str) -> Claims:
+    """Each first-level sub-assembly is a link; parts that lie beside them belong to the root link.
 
     Without any sub-assembly the whole is one link, named after the assembly.
     """
@@ -183,18 +188,17 @@ def _by_first_level(assembly: Assembly) -> Claims:
         name = assembly.name or "assembly"
         return Claims({name: tuple(range(len(assembly.instances)))})
     members: dict[str, list[int]] = {}
-    unclaimed: list[int] = []
+    rooted = [index for index, instance in enumerate(assembly.instances) if len(instance.path) < 2]
+    if rooted and all(instance.path[0] != root for instance in assembly.instances):
+        members[root] = []
     for index, instance in enumerate(assembly.instances):
-        if len(instance.path) > 1:
-            members.setdefault(instance.path[0], []).append(index)
-        else:
-            unclaimed.append(index)
+        members.setdefault(instance.path[0] if len(instance.path) > 1 else root, []).append(index)
     frames = {
         name: LinkFrame(assembly.frames[(name,)], f"sub-assembly “{name}”")
         for name in members
         if (name,) in assembly.frames
     }
-    return Claims({name: tuple(ids) for name, ids in members.items()}, tuple(unclaimed), frames)
+    return Claims({name: tuple(ids) for name, ids in members.items()}, (), frames, rooted=tuple(rooted))
 
 
 def _by_map(assembly: Assembly, links: LinkMap) -> Claims:

@@ -92,7 +92,11 @@ def test_dotted_levels_are_item_numbers(bom: Bom) -> None:
 @pytest.mark.parametrize(
     "header",
     ["Mass (total)", "Total mass (kg)", "Weight [total] kg", "Masse (gesamt)", "Mass (extended)",
-     "Gewicht, gesamt", "Total weight, kg", "Summe Masse", "質量（合計）", "总重量"],
+     "Gewicht, gesamt", "Total weight, kg", "Summe Masse", "質量（合計）", "总重量",
+     "Mass (x qty)", "Mass (all)", "Mass (Qty)", "Mass x Qty", "Qty * Mass", "Mass (kg × Menge)",
+     "Mass [all, kg]",
+          "Weight (each × qty)", "Mass (Σ)", "Gewicht (ges.)", "Weight for all (kg)", "Poids (tous)",
+     "Mass (lot)"],
 )  # fmt: skip
 def test_a_header_that_says_total_is_no_mass_of_one_piece(bom: Bom, header: str) -> None:
     """Wherever the word stands: half of the total is the mass of one of two."""
@@ -100,7 +104,21 @@ def test_a_header_that_says_total_is_no_mass_of_one_piece(bom: Bom, header: str)
     assert table["plate"].mass_kg == pytest.approx(0.3)
 
 
-@pytest.mark.parametrize("header", ["Mass (unit)", "Mass (each)", "Unit mass (g)", "Masse in g"])
+@pytest.mark.parametrize(
+    "header",
+    [
+        "Mass (unit)",
+        "Mass (each)",
+        "Unit mass (g)",
+        "Masse in g",
+        "Mass [g/pc]",
+        "Mass (per piece)",
+        "Mass, g each",
+        "Weight ea. (lb)",
+        "Mass (kg/unit)",
+        "Gewicht pro Stück",
+    ],
+)
 def test_a_header_that_says_each_is_that_of_one(bom: Bom, header: str) -> None:
     """Other words beside it do not make it a total."""
     assert bom(f"Name,Quantity,Material,{header}\nplate,2,,0.600 kg\n")["plate"].mass_kg == 0.6
@@ -112,3 +130,47 @@ def test_a_mass_beyond_all_parts_is_told(bom: Bom, mass: str) -> None:
     table = bom(f"Name,Material,Mass\nplate,,{mass}\n")
     assert table["plate"].mass_kg is None
     assert codes(table) == [BomCode.UNREADABLE_MASS]
+
+
+@pytest.mark.parametrize(
+    ("header", "unit_kg"),
+    [
+        ("Weight (oz.)", 0.45359237 / 16),
+        ("Mass (each, g)", 1e-3),
+        ("Mass [g/pc]", 1e-3),
+        ("Mass [g / Stk]", 1e-3),
+        ("Mass (each) [g]", 1e-3),
+        ("Mass (g per piece)", 1e-3),
+        ("Mass, g each", 1e-3),
+        ("Weight ea. (lb)", 0.45359237),
+        ("mass_g", 1e-3),
+        ("Weight [lbf]", 0.45359237),
+        ("Weight (N)", 1 / 9.80665),
+        ("Weight (kgf)", 1.0),
+        ("重量（ｇ）", 1e-3),
+    ],
+)
+def test_the_unit_of_a_header(bom: Bom, header: str, unit_kg: float) -> None:
+    """Read, and never with the word that there is none; a force is said to be one."""
+    table = bom(f'Name,Quantity,Material,"{header}"\nplate,2,,3.0\n')
+    assert table["plate"].mass_kg == pytest.approx(3 * unit_kg)
+    forces = [w for w in table.warnings if "unit of force" in w.message]
+    is_force = any(word in header for word in ("lbf", "(N)", "kgf"))
+    assert len(table.warnings) == len(forces) == is_force
+
+
+@pytest.mark.parametrize("header", ["Mass (kg/m)", "Mass [g/cm3]", "Mass (kg per metre)", "Weight (lb/ft)"])
+def test_a_mass_per_length_is_no_mass(bom: Bom, header: str) -> None:
+    """There is no mass column then, and that is said, with the columns that there are."""
+    table = bom(f"Name,Quantity,Material,{header}\nrail,2,,3.0\n")
+    assert table["rail"].mass_kg is None
+    assert BomCode.MISSING_COLUMN in codes(table)
+
+
+def test_a_bracket_that_is_not_understood(bom: Bom) -> None:
+    """Read as kg, with the bracket in the warning; a unit in the cell needs no word."""
+    table = bom("Name,Quantity,Material,Mass (ctw)\nplate,2,,3.0\n")
+    (warning,) = table.warnings
+    assert warning.code is BomCode.MASS_WITHOUT_UNIT
+    assert "“ctw”" in warning.message
+    assert codes(bom("Name,Quantity,Material,Mass (from CAD)\nplate,2,,3.0 g\n")) == []

@@ -54,7 +54,7 @@ def test_case_12_a_split_assembly_is_completed(
     assert report.total.mass == pytest.approx(2 * 0.027 + hand + 4 * finger, rel=1e-9)
     assert part(report, "finger").quantity == 4
     assert report.links["gripper-1"].props.mass == pytest.approx(hand + 4 * finger, rel=1e-9)
-    assert set(codes(report)) == {GeometryCode.EXTERNAL_FILE, "unclaimed"}
+    assert set(codes(report)) == {GeometryCode.EXTERNAL_FILE, "in_root_link"}
     arms = np.array([[0.005, 0.005, 0.05], [0.505, 0.005, 0.05]])
     np.testing.assert_allclose(
         [arms.mean(axis=0)],

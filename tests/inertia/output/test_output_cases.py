@@ -20,6 +20,7 @@ from silo.bom.errors import InputError
 from silo.inertia.bodies import box, cylinder, placement, shape_only
 from silo.inertia.core import MassProps, combine
 from silo.inertia.frames import ASSEMBLY_FRAME, origin_frame
+from silo.inertia.links import link_map
 from silo.inertia.output.data import CSV_HEADER, report_csv, report_data, report_json
 from silo.inertia.output.snippets import SNIPPETS, snippets
 from silo.inertia.output.text import report_markdown, report_tables
@@ -50,6 +51,7 @@ def _report(assemble: Fixture, compute: Fixture) -> Any:
             source="arm.step",
         ),
         BOM,
+        links=link_map({"links": {name: [name] for name in ("base", "arm", "pad")}}),
     )
 
 

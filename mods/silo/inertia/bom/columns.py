@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import re
 import sys
-import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from silo.bom.errors import InputError
-from silo.bom.headers import BRACKET, Role, alias, normal
-from silo.inertia.bom.masses import unit_factor
+from silo.bom.headers import Role, alias, normal
+from silo.inertia.bom.massheader import read_mass_header
 
 ROLES = (
     *(Role.NAME, Role.PART_NUMBER, Role.DESCRIPTION, Role.MATERIAL, Role.MASS, Role.TOTAL_MASS),
@@ -31,12 +30,15 @@ class Columns:
         columns that mean a mass or a material as well, and lost to the one that is used.
     exact
         masses are written in full (Silo's own export does so): a short one was not rounded.
+    strange
+        what the header of a mass column says in brackets and is not understood.
     """
 
     at: Mapping[Role, int]
     units: Mapping[Role, str] = field(default_factory=dict)
     others: tuple[tuple[Role, int], ...] = ()
     exact: bool = False
+    strange: Mapping[Role, str] = field(default_factory=dict)
 
     def cell(self, row: Sequence[str], role: Role) -> str:
         """The row's cell for a role; "" where there is no such column or the row is too short.
@@ -53,9 +55,6 @@ class Columns:
         return bool({Role.NAME, Role.PART_NUMBER, Role.DESCRIPTION} & self.at.keys())
 
 
-_TOTAL_WORDS = frozenset(
-    {"total", "totale", "gesamt", "summe", "sum", "extended", "ext", "row", "line", "zeile"}
-)
 _MASSES = (Role.MASS, Role.TOTAL_MASS)
 _ONE_ONLY = (*_MASSES, Role.MATERIAL)
 _SILOS_OWN = {"part number", "total quantity", "unreferenced since"}
@@ -84,10 +83,12 @@ def find_columns(header: Sequence[str], given: Mapping[str, str] | None = None) 
         seen.append((role, index))
         if rank < best.get(role, sys.maxsize):
             at[role], best[role] = index, rank
-    units = {role: unit for role in _MASSES if role in at and (unit := _unit_of(header[at[role]]))}
+    masses = {role: read_mass_header(header[at[role]]) for role in _MASSES if role in at}
+    units = {role: mass.unit for role, mass in masses.items() if mass.unit}
+    strange = {role: mass.strange for role, mass in masses.items() if mass.strange}
     others = tuple((role, i) for role, i in seen if role in _ONE_ONLY and at[role] != i)
     exact = {normal(cell) for cell in header} >= _SILOS_OWN
-    return Columns(at, units, others, exact)
+    return Columns(at, units, others, exact, strange)
 
 
 def _given_roles(given: Mapping[str, str]) -> dict[Role, str]:
@@ -101,38 +102,12 @@ def _given_roles(given: Mapping[str, str]) -> dict[Role, str]:
 
 
 def _role_of(cell: str) -> tuple[Role, int] | None:
-    """Role and rank of one header cell: "Mass", "Mass (g)", "mass_kg", "Gewicht in kg"."""
-    text = normal(cell)
-    found = _alias(text)
-    if found is not None and found[0] is Role.MASS and _says_total(cell):
-        return Role.TOTAL_MASS, found[1]
-    if found is None and _says_total(cell):
-        # "Weight, total kg", "Summe Masse": what is left without the word is a mass or nothing.
-        rest = _alias(" ".join(word for word in text.split() if word not in _TOTAL_WORDS))
-        return (Role.TOTAL_MASS, rest[1]) if rest is not None and rest[0] is Role.MASS else None
-    return found
-
-
-def _says_total(cell: str) -> bool:
-    text = unicodedata.normalize("NFKC", cell).casefold()
-    return bool(_TOTAL_WORDS & set(re.findall(r"[^\W_]+", text))) or "合計" in text
-
-
-def _alias(text: str) -> tuple[Role, int] | None:
-    found = alias(text)
-    if found is not None:
+    """Role and rank of one header cell: "Mass", "Mass (g)", "mass_kg", "Gewicht in kg", "Summe Masse"."""
+    found = alias(normal(cell))
+    if found is not None and found[0] is not Role.MASS:
         return found if found[0] in ROLES else None
-    stem, _, unit = text.rpartition(" ")
-    found = alias(stem.removesuffix(" in"))
-    if found and found[0] in (Role.MASS, Role.TOTAL_MASS) and unit_factor(unit) is not None:
-        return found
-    return None
-
-
-def _unit_of(cell: str) -> str | None:
-    """The unit a mass column's header states, in brackets or as its last word."""
-    bracket = BRACKET.search(unicodedata.normalize("NFKC", cell))
-    if bracket and unit_factor(bracket[1]) is not None:
-        return bracket[1].strip()
-    words = normal(cell).split()
-    return words[-1] if len(words) > 1 and unit_factor(words[-1]) is not None else None
+    header = read_mass_header(cell)
+    found = found or alias(header.title)
+    if found is None or found[0] not in _MASSES or header.rate:
+        return None
+    return (Role.TOTAL_MASS, found[1]) if header.total else found

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from silo.bom.headers import Role
 from silo.bom.numbers import Mark
-from silo.inertia.bom.masses import MassCell, column_mark, parse_mass
+from silo.inertia.bom.masses import MassCell, column_mark, is_force, parse_mass
 from silo.inertia.bom.rows import BomCode, BOMEntry
 from silo.inertia.bom.sheet import Row, Sheet
 
@@ -41,7 +41,7 @@ class MassReader:
         # Programs that separate by commas write points; no other delimiter says where a file comes from.
         self._points_are_decimal = sheet.delimiter == ","
         self._units: dict[int, str] = {}
-        self._told_unit = False
+        self._told_unit = self._told_force = False
 
     def read(self, row: Row, name: str, quantity: float | None) -> MassCell:
         """The mass of one piece; every doubt is told, with the line."""
@@ -87,12 +87,16 @@ class MassReader:
             )
         if cell.kg is not None and not cell.unit and not self._told_unit:
             self._told_unit = True
-            self._tell(
-                BomCode.MASS_WITHOUT_UNIT,
-                f"the mass “{text}” has no unit, nor has its header; read as kg",
-                row,
-                name,
+            strange = self._columns.strange.get(role)
+            header = (
+                f"and its header’s “{strange}” is none that is known" if strange else "nor has its header"
             )
+            words = f"the mass “{text}” has no unit, {header}; read as kg"
+            self._tell(BomCode.MASS_WITHOUT_UNIT, words, row, name)
+        if cell.kg is not None and is_force(cell.unit) and not self._told_force:
+            self._told_force = True
+            words = f"“{cell.unit}” is a unit of force; masses are what weighs as much at 9.80665 m/s²"
+            self._tell(BomCode.FILE, words, row, name)
         return cell
 
     def _decide(self, text: str, unit: str | None, row: Row, name: str) -> MassCell:

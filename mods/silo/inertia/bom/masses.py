@@ -39,6 +39,21 @@ MASS_UNITS: dict[str, float] = {
 }
 """Unit → kg. "Mg" is missing on purpose: it may mean megagram or a careless mg."""
 
+STANDARD_GRAVITY = 9.80665
+"""[m/s^2] by definition (CGPM 1901): weights that are forces are divided by it."""
+
+FORCE_UNITS: dict[str, float] = {
+    **dict.fromkeys(("N", "newton", "newtons"), 1 / STANDARD_GRAVITY),
+    **dict.fromkeys(("kN",), 1e3 / STANDARD_GRAVITY),
+    **dict.fromkeys(("mN",), 1e-3 / STANDARD_GRAVITY),
+    **dict.fromkeys(("daN",), 10 / STANDARD_GRAVITY),
+    **dict.fromkeys(("lbf", "lb f"), _POUND),
+    **dict.fromkeys(("ozf",), _POUND / 16),
+    **dict.fromkeys(("kgf", "kp"), 1.0),
+    **dict.fromkeys(("gf",), 1e-3),
+}
+"""Unit of force → kg that weigh as much. Case counts: mN is no MN."""
+
 # What Onshape and others write for "nothing" in the languages whose headers we know.
 _EMPTY = {
     "", "-", "--", "---", "–", "—", "?", "n/a", "na", "n.a.", "none", "no value", "null", "nan", "unknown",
@@ -124,11 +139,16 @@ def _cell(number: Number, factor: float, unit: str, overridden: bool) -> MassCel
 
 
 def unit_factor(unit: str) -> float | None:
-    """kg per ``unit``; None where it is no unit of mass. Case is ignored except for Mg."""
-    text = unit.strip()
+    """kg per ``unit``; None where it is no unit of mass or weight. Case counts for Mg and forces only."""
+    text = plain_text(unit).rstrip(".")
     if text == "Mg":
         return None
-    return MASS_UNITS.get(text) or MASS_UNITS.get(unicodedata.normalize("NFKC", text).casefold())
+    return FORCE_UNITS.get(text) or MASS_UNITS.get(text) or MASS_UNITS.get(text.casefold())
+
+
+def is_force(unit: str) -> bool:
+    """True for N, lbf and the like."""
+    return plain_text(unit).rstrip(".") in FORCE_UNITS
 
 
 def column_mark(cells: Iterable[str]) -> Mark | None:

@@ -20,6 +20,7 @@ import numpy as np
 from silo.bom.errors import InputError
 from silo.inertia.core import Floats, MassProps
 from silo.inertia.frames import origin_frame
+from silo.inertia.links import ROOT_LINK
 from silo.inertia.output.files import write_whole
 from silo.inertia.output.snippets import urdf_inertial
 
@@ -231,12 +232,26 @@ def urdf_frames(data: bytes, source: str = "URDF") -> dict[str, Floats]:
     Raises InputError where joints do not form a tree, or their origins are no numbers (xacro: expand first).
     """
     reader = _Reader(data, source)
+    above = _parents(reader)
+    return {span.name: _placement(span.name, above, source) for span in reader.links}
+
+
+def root_link(data: bytes, source: str = "URDF") -> str:
+    """The link that everything else hangs on: ``base_link`` where there is one, else the tree's root."""
+    reader = _Reader(data, source)
+    names = [span.name for span in reader.links]
+    above = _parents(reader)
+    roots = [name for name in names if name not in above]
+    return roots[0] if len(roots) == 1 and ROOT_LINK not in names else ROOT_LINK
+
+
+def _parents(reader: _Reader) -> dict[str, _Joint]:
     above: dict[str, _Joint] = {}
     for joint in reader.joints:
         if joint.child in above:
-            raise InputError(f"{source}: the link {joint.child} has two parents; a URDF is a tree")
+            raise InputError(f"{reader.source}: the link {joint.child} has two parents; a URDF is a tree")
         above[joint.child] = joint
-    return {span.name: _placement(span.name, above, source) for span in reader.links}
+    return above
 
 
 def _placement(link: str, above: Mapping[str, _Joint], source: str) -> Floats:
