@@ -76,7 +76,7 @@ def test_case_37_moving_everything(compute: Fixture, layout: list[Any], xyz: Any
     outer = origin_frame(xyz, rpy)
     before, after = compute(build(layout), BOM), compute(build(layout, outer), BOM)
     for name, link in before.links.items():
-        close(after.links[name].props, link.props.transform(outer), scale=10)
+        close(after.links[name].props, link.props.transformed(outer), scale=10)
     shift = np.eye(4)
     shift[:3, 3] = xyz
     shifted = compute(build(layout, shift), BOM)

@@ -64,7 +64,7 @@ def test_parallel_axis_products_have_the_tensor_sign() -> None:
 
 def test_transform_turns_tensor_and_moves_centre() -> None:
     """A quarter turn about z swaps Ixx and Iyy; the shift moves the centre only."""
-    moved = props(com=(1, 0, 0)).transform(placement((0, 0, 7), TURN_Z))
+    moved = props(com=(1, 0, 0)).transformed(placement((0, 0, 7), TURN_Z))
     assert moved.com == pytest.approx([0, 1, 7])
     assert moved.inertia == pytest.approx(np.diag([4.0, 3.0, 5.0]))
 
@@ -72,7 +72,7 @@ def test_transform_turns_tensor_and_moves_centre() -> None:
 def test_mirror_is_rigid_and_turns_products() -> None:
     """Mirroring x turns the sign of Ixy and Ixz and nothing else."""
     tensor = np.array([[3, 0.1, 0.2], [0.1, 4, 0.3], [0.2, 0.3, 5]])
-    mirrored = MassProps(1, [1, 2, 3], tensor).transform(np.diag([-1.0, 1, 1, 1]))
+    mirrored = MassProps(1, [1, 2, 3], tensor).transformed(np.diag([-1.0, 1, 1, 1]))
     assert mirrored.com == pytest.approx([-1, 2, 3])
     assert mirrored.inertia == pytest.approx(tensor * [[1, -1, -1], [-1, 1, 1], [-1, 1, 1]])
     assert mirrored.check() == ()
@@ -81,7 +81,7 @@ def test_mirror_is_rigid_and_turns_products() -> None:
 def test_scaling_a_mass_is_refused() -> None:
     """What scaling does to a given mass nobody knows; the message says which axes scale."""
     with pytest.raises(InputError, match=r"not scaled.*\[2\.0, 1\.0, 1\.0\]"):
-        props().transform(np.diag([2.0, 1, 1, 1]))
+        props().transformed(np.diag([2.0, 1, 1, 1]))
 
 
 @pytest.mark.parametrize(

@@ -98,7 +98,9 @@ def test_print_summary_goes_to_the_log(caplog: pytest.LogCaptureFixture) -> None
 def test_public_names() -> None:
     """Every name of the public surface is importable from silo.inertia, and listed."""
     for name in silo.inertia.__all__:
-        assert getattr(silo.inertia, name).__name__ == name
+        value = getattr(silo.inertia, name)
+        also = {"EnhancedInertiaCalculator": "InertiaCalculator", "MATERIAL_DENSITIES": ""}
+        assert getattr(value, "__name__", "") == also.get(name, name)
         assert name in dir(silo.inertia)
     with pytest.raises(AttributeError, match="Nonsense"):
         _ = silo.inertia.Nonsense

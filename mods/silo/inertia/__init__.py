@@ -11,16 +11,21 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from silo.inertia.bom import BOMEntry, BOMParser
-    from silo.inertia.calculator import InertiaCalculator, compute_link_inertials
+    from silo.inertia.calculator import EnhancedInertiaCalculator, InertiaCalculator, compute_link_inertials
+    from silo.inertia.core import MassProps
+    from silo.inertia.materials import MATERIAL_DENSITIES
     from silo.inertia.report import InertiaReport, PartWarning
     from silo.inertia.types import InertialProperties
 
 __all__ = [
+    "MATERIAL_DENSITIES",
     "BOMEntry",
     "BOMParser",
+    "EnhancedInertiaCalculator",
     "InertiaCalculator",
     "InertiaReport",
     "InertialProperties",
+    "MassProps",
     "PartWarning",
     "compute_link_inertials",
 ]
@@ -28,9 +33,12 @@ __all__ = [
 _HOME = {
     "BOMEntry": "bom",
     "BOMParser": "bom",
+    "EnhancedInertiaCalculator": "calculator",
     "InertiaCalculator": "calculator",
     "InertiaReport": "report",
     "InertialProperties": "types",
+    "MATERIAL_DENSITIES": "materials",
+    "MassProps": "core",
     "PartWarning": "report",
     "compute_link_inertials": "calculator",
 }

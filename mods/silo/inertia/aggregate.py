@@ -7,6 +7,7 @@ The sum over one link is one vectorised expression; 10 000 instances take millis
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -48,7 +49,8 @@ def fill_links(
     """Put every link and the unclaimed parts into the report, warnings included."""
     for name, indices in claims.members.items():
         frame = chosen_frame(name, claims, choice)
-        props = sum_up(placed, indices).transform(frame.inverse())
+        words = frame.description if frame is ASSEMBLY_FRAME else f"{frame.description} ({name})"
+        props = sum_up(placed, indices).transformed(frame.inverse(), words)
         parts = tuple(_parts(assembly, placed, indices, name))
         link = LinkResult(name, props, frame, parts, props.check())
         report.links[name] = link
@@ -57,7 +59,8 @@ def fill_links(
     report.unclaimed = tuple(_parts(assembly, placed, claims.unclaimed, ""))
     _part_warnings(report, report.unclaimed)
     report.sub_assemblies = tuple(_sub_assemblies(assembly, placed))
-    report.total = sum_up(placed, range(len(assembly.instances)))
+    total = sum_up(placed, range(len(assembly.instances)))
+    report.total = replace(total, frame=ASSEMBLY_FRAME.description)
 
 
 def _sub_assemblies(assembly: Assembly, placed: Placed) -> Iterator[SubAssemblyResult]:
@@ -94,7 +97,7 @@ def _shape(assembly: Assembly, placed: Placed, occurrence: Occurrence) -> tuple[
     props = sum_up(placed, occurrence.below)
     if frame is None or not is_rigid(frame) or np.linalg.det(frame[:3, :3]) < 0 or props.mass <= 0:
         return volume, None
-    return volume, props.transform(LinkFrame(frame, "").inverse()).com
+    return volume, props.transformed(LinkFrame(frame, "").inverse()).com
 
 
 def chosen_frame(name: str, claims: Claims, choice: FrameChoice) -> LinkFrame:

@@ -7,14 +7,14 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from silo.inertia.aggregate import chosen_frame, fill_links, tell_bom, tell_claims, tell_rows, tell_tensors
 from silo.inertia.bom import BOMEntry, BOMParser, BomTable, as_table
 from silo.inertia.codes import MassCode
 from silo.inertia.core import Floats
 from silo.inertia.frames import FrameChoice, LinkFrame, apart
-from silo.inertia.links import ROOT_LINK, Claims, LinkMap, claim, read_link_map
+from silo.inertia.links import ROOT_LINK, Claims, LinkMap, as_link_map, claim
 from silo.inertia.massrule import MassRule, Options
 from silo.inertia.matching import match
 from silo.inertia.materials import MaterialHit, MaterialTable, load_materials
@@ -48,7 +48,7 @@ class Task:
 
     materials: MaterialTable = field(default_factory=load_materials)
     options: Options = field(default_factory=Options)
-    links: LinkMap | None = None
+    links: LinkMap | Mapping[str, Any] | None = None
     frame: FrameChoice = FrameChoice.ASSEMBLY
     urdf_frames: Mapping[str, Floats] | None = None
     loose_link: str | None = None
@@ -59,7 +59,7 @@ class Task:
 def calculate(assembly: Assembly, table: BomTable | None, task: Task | None = None) -> InertiaReport:
     """Mass properties of every link of an assembly. Pure: nothing is read or written."""
     task = task or Task()
-    claims = claim(assembly, task.links, task.loose_link or task.root_link)
+    claims = claim(assembly, as_link_map(task.links), task.loose_link or task.root_link)
     claims = _framed(_gathered(claims, task.loose_link), task)
     report = InertiaReport()
     _tell_frames(report, claims, task)
@@ -210,11 +210,15 @@ class InertiaCalculator:
         return read_geometry(path, self._read_options)
 
 
+EnhancedInertiaCalculator = InertiaCalculator
+"""The name that the spec has for it (bom-inertia, "Architecture")."""
+
+
 def compute_link_inertials(
     step_path: Path | str,
     bom_path: Path | str | None = None,
     *,
-    links: LinkMap | Path | str | None = None,
+    links: LinkMap | Mapping[str, Any] | Path | str | None = None,
     density: float = 1000.0,
     materials: MaterialTable | None = None,
     step_density: bool = False,
@@ -224,19 +228,17 @@ def compute_link_inertials(
     """Every link of an assembly file (spec bom-inertia, Task 5).
 
     links
-        a link map or its file; None: each first-level sub-assembly is a link.
+        a link map, its file, or a dict of link → patterns; None: each first-level sub-assembly is a link.
     density
         [kg/m^3] of parts that the BOM does not have.
 
     Numbers are in the assembly's frame unless ``frame`` or the link map says otherwise.
     """
-    if isinstance(links, (str, Path)):
-        links = read_link_map(links)
     table = BOMParser().parse(bom_path) if bom_path is not None else None
     task = Task(
         materials if materials is not None else load_materials(),
         Options(density, step_density),
-        links,
+        as_link_map(links),
         FrameChoice(frame),
     )
     return calculate(read_geometry(step_path, read_options), table, task)

@@ -10,9 +10,11 @@ Rules of this module:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import html
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -43,18 +45,22 @@ class TensorProblem(StrEnum):
     TRIANGLE_INEQUALITY = "triangle_inequality"  # a principal moment exceeds the sum of the two others
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class MassProps:
-    """Mass properties of one rigid body in one frame.
+    """Mass properties of one rigid body in one frame; what a report has for each link.
 
     mass : float [kg]
     com : (3,) float [m], in the frame
     inertia : (3, 3) float [kg m^2], about ``com``, axes of the frame
+    frame : which frame, in words; "" where nobody said. Bodies of two named frames cannot be added.
+
+    ``center_mass``, ``moment_inertia`` and the principal ones are the same under the names that trimesh has.
     """
 
     mass: float
     com: Floats
     inertia: Floats
+    frame: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "mass", float(self.mass))
@@ -73,8 +79,89 @@ class MassProps:
         rows = [[v.ixx, v.ixy, v.ixz], [v.ixy, v.iyy, v.iyz], [v.ixz, v.iyz, v.izz]]
         return cls(v.mass, np.asarray(v.com, float), np.asarray(rows, float))
 
-    def transform(self, placement: ArrayLike) -> MassProps:
-        """The same body after ``placement`` ((4, 4), rigid or mirrored).
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> MassProps:
+        """From what :meth:`to_dict` gives. InputError with every key that lacks or does not fit."""
+        try:
+            mass, com, inertia = (values[name] for name in ("mass", "center_mass", "moment_inertia"))
+            unknown = sorted(set(values) - {"mass", "center_mass", "moment_inertia", "frame"})
+        except (KeyError, TypeError, IndexError) as error:
+            raise InputError(f"{_DICT_WANTED}; missing: {error}") from error
+        if unknown:
+            raise InputError(f"{_DICT_WANTED}; unknown: {', '.join(unknown)}")
+        try:
+            return cls(mass, com, inertia, str(values.get("frame", "")))
+        except (TypeError, ValueError) as error:
+            raise InputError(f"{_DICT_WANTED} ({error})") from error
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, fit for JSON: ``mass``, ``center_mass``, ``moment_inertia``, ``frame``."""
+        return {
+            "mass": self.mass,
+            "center_mass": self.com.tolist(),
+            "moment_inertia": self.inertia.tolist(),
+            "frame": self.frame,
+        }
+
+    @property
+    def center_mass(self) -> Floats:
+        """(3,) centre of mass [m]."""
+        return self.com
+
+    @property
+    def moment_inertia(self) -> Floats:
+        """(3, 3) tensor [kg m^2] about the centre of mass; off-diagonals are tensor elements (-∫xy dm)."""
+        return self.inertia
+
+    @property
+    def principal_inertia_components(self) -> Floats:
+        """(3,) principal moments [kg m^2], ascending."""
+        return self.principal()[0]
+
+    @property
+    def principal_inertia_vectors(self) -> Floats:
+        """(3, 3): the unit axis of each principal moment, one a row, right-handed."""
+        return self.principal()[1].T
+
+    def __add__(self, other: object) -> MassProps:
+        """Both as one rigid body. InputError where their frames are known to differ."""
+        if not isinstance(other, MassProps):
+            return NotImplemented
+        if self.frame and other.frame and self.frame != other.frame:
+            raise InputError(
+                f"these bodies are given in two frames ({self.frame}; {other.frame}) and cannot be added; "
+                "bring one into the other's frame with transformed(T), or ask for all in the assembly's frame"
+            )
+        return replace(combine((self, other)), frame=self.frame or other.frame)
+
+    def __radd__(self, other: object) -> MassProps:
+        # sum() begins with 0.
+        return self if other == 0 else NotImplemented
+
+    def __repr__(self) -> str:
+        centre = ", ".join(f"{v:.6g}" for v in self.com)
+        moments = self._moments_words()
+        where = f", frame={self.frame!r}" if self.frame else ""
+        return f"MassProps(mass={self.mass:.6g} kg, com=[{centre}] m, principal=[{moments}] kg m²{where})"
+
+    def _moments_words(self) -> str:
+        if not np.isfinite(self.inertia).all():
+            return "not finite"
+        return ", ".join(f"{v:.6g}" for v in self.principal_inertia_components)
+
+    def _repr_html_(self) -> str:
+        """A table, where a notebook shows it."""
+        rows = [
+            ("mass", f"{self.mass:.6g} kg"),
+            ("centre of mass", ", ".join(f"{v:.6g}" for v in self.com) + " m"),
+            *(("inertia" if i == 0 else "", _html_row(row)) for i, row in enumerate(self.inertia)),
+            ("principal moments", f"{self._moments_words()} kg m²"),
+            *([("frame", html.escape(self.frame))] if self.frame else []),
+        ]
+        return "<table>" + "".join(f"<tr><th>{k}</th><td>{v}</td></tr>" for k, v in rows) + "</table>"
+
+    def transformed(self, placement: ArrayLike, frame: str = "") -> MassProps:
+        """The same body after ``placement`` ((4, 4), rigid or mirrored); ``frame`` names the new frame.
 
         A placement that scales is refused (InputError): a mass says nothing about what scaling does to it.
         Scaled *geometry* is handled exactly, by :func:`place`.
@@ -86,7 +173,7 @@ class MassProps:
                 f"the placement's axes have the lengths {np.linalg.norm(matrix[:3, :3], axis=0).tolist()}"
             )
         turn = matrix[:3, :3]
-        return MassProps(self.mass, turn @ self.com + matrix[:3, 3], turn @ self.inertia @ turn.T)
+        return MassProps(self.mass, turn @ self.com + matrix[:3, 3], turn @ self.inertia @ turn.T, frame)
 
     def about(self, point: ArrayLike) -> Floats:
         """(3, 3) tensor [kg m^2] about ``point`` ((3,) [m]) instead of the centre of mass."""
@@ -138,6 +225,13 @@ class MassProps:
             ixz=float(t[0, 2]),
             iyz=float(t[1, 2]),
         )
+
+
+_DICT_WANTED = "wanted mass [kg], center_mass (3 numbers) [m] and moment_inertia (3 × 3 numbers) [kg m^2]"
+
+
+def _html_row(values: Floats) -> str:
+    return "&nbsp;&nbsp;".join(f"{v:.6g}" for v in values) + " kg m²"
 
 
 def parallel_axis(masses: Floats, offsets: Floats) -> Floats:

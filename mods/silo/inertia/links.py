@@ -131,6 +131,24 @@ def _keys_given_twice(tree: Any) -> list[str]:
     return found
 
 
+def as_link_map(links: LinkMap | Mapping[str, Any] | Path | str | None) -> LinkMap | None:
+    """What a caller may give for links: a map, its file, or plain values, with or without ``links:`` around.
+
+    ``{"base": ["base*", "plate"]}`` is link → patterns. ConfigError says what was wanted otherwise.
+    """
+    if links is None or isinstance(links, LinkMap):
+        return links
+    if isinstance(links, (str, Path)):
+        return read_link_map(links)
+    if isinstance(links, Mapping):
+        whole = isinstance(links.get("links"), Mapping) and len(links) == 1
+        return link_map({"links": {**(links["links"] if whole else links)}})
+    raise ConfigError(
+        "links: wanted a link map, the path of its YAML file, or a dict of link → list of patterns; "
+        f"got {type(links).__name__}"
+    )
+
+
 def link_map(data: Any, source: str = "the link map") -> LinkMap:
     """As :func:`read_link_map`, from plain values."""
     links = data.get("links") if isinstance(data, dict) else None

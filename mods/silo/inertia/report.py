@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import html
 import logging
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -178,6 +179,26 @@ class InertiaReport:
             logger.warning(self.get_summary())
         else:
             logger.info(self.get_summary())
+
+    @property
+    def bodies(self) -> dict[str, MassProps]:
+        """Link → mass properties in the link's frame: numpy arrays, sums, moves, principal axes."""
+        return {name: link.props for name, link in self.links.items()}
+
+    def _repr_html_(self) -> str:
+        """The links as a table, where a notebook shows it."""
+        head = "".join(
+            f"<th>{w}</th>" for w in ("link", "mass [kg]", "centre of mass [m]", "pieces", "frame")
+        )
+        rows = "".join(
+            f"<tr><td>{html.escape(name)}</td><td>{link.props.mass:.6g}</td>"
+            f"<td>{', '.join(f'{v:.5g}' for v in link.props.com)}</td>"
+            f"<td>{sum(part.quantity for part in link.parts)}</td>"
+            f"<td>{html.escape(link.frame.description)}</td></tr>"
+            for name, link in self.links.items()
+        )
+        said = html.escape(self.get_summary())
+        return f"<table><tr>{head}</tr>{rows}</table><pre>{said}</pre>"
 
     def parts(self) -> tuple[tuple[str, PartResult], ...]:
         """(link, part) of everything, links first, then the unclaimed ones under ""."""

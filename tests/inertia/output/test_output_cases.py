@@ -172,7 +172,7 @@ def test_case_16_flat_plate_survives_printing() -> None:
     for _ in range(50):
         a, b = rng.uniform(1e-9, 1e-3, 2)
         turn = origin_frame((0, 0, 0), rng.uniform(-3, 3, 3))
-        plate = MassProps(0.01, [0, 0, 0], np.diag([a, b, a + b])).transform(turn)  # type: ignore[arg-type]
+        plate = MassProps(0.01, [0, 0, 0], np.diag([a, b, a + b])).transformed(turn)  # type: ignore[arg-type]
         out = settled(plate)
         assert out.check(tolerance=0.0) == ()
         assert np.abs(out.inertia - plate.inertia).max() <= 1e-12 * (a + b)

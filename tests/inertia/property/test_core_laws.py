@@ -52,7 +52,7 @@ def assert_same(left: MassProps, right: MassProps) -> None:
 @given(st.lists(bodies(), min_size=1, max_size=6), rigid())
 def test_moving_all_is_moving_the_sum(parts: list[MassProps], placement: np.ndarray) -> None:
     """Combining and moving may be done in either order."""
-    assert_same(combine([p.transform(placement) for p in parts]), combine(parts).transform(placement))
+    assert_same(combine([p.transformed(placement) for p in parts]), combine(parts).transformed(placement))
 
 
 @given(bodies(), turns())
@@ -60,7 +60,7 @@ def test_rotation_keeps_principal_moments(part: MassProps, turn: np.ndarray) -> 
     """A turned body has the same principal moments."""
     placement = np.eye(4)
     placement[:3, :3] = turn
-    before, after = part.principal()[0], part.transform(placement).principal()[0]
+    before, after = part.principal()[0], part.transformed(placement).principal()[0]
     assert np.allclose(before, after, rtol=1e-10)
 
 
@@ -69,7 +69,7 @@ def test_translation_leaves_the_tensor_alone(part: MassProps, shift: tuple[float
     """The tensor is about the centre of mass, wherever that is."""
     placement = np.eye(4)
     placement[:3, 3] = shift
-    moved = part.transform(placement)
+    moved = part.transformed(placement)
     assert np.allclose(moved.inertia, part.inertia, rtol=1e-12, atol=0)
     assert np.allclose(moved.com, part.com + np.array(shift))
 
@@ -110,7 +110,7 @@ def test_place_agrees_with_transform_and_scales_by_powers(
 ) -> None:
     """Geometry placed rigidly moves like a mass; scaled by s, the volume grows by s³ and the tensor by s⁵."""
     volume, com, unit = place([part.mass], [part.com], [part.inertia], placement[None])
-    assert_same(MassProps(volume[0], com[0], unit[0]), part.transform(placement))
+    assert_same(MassProps(volume[0], com[0], unit[0]), part.transformed(placement))
     grown = placement.copy()
     grown[:3, :3] *= factor
     volume, _, unit = place([part.mass], [part.com], [part.inertia], grown[None])

@@ -95,7 +95,7 @@ def views_of(report: InertiaReport, assembly: Assembly) -> list[LinkView]:
     views = []
     for link in report.links.values():
         members = tuple(by_path[path] for part in link.parts for path in part.paths if path in by_path)
-        props = link.props.transform(link.frame.placement) if link.props.mass > 0 else None
+        props = link.props.transformed(link.frame.placement) if link.props.mass > 0 else None
         views.append(LinkView(link.name, members, props))
     loose = tuple(by_path[path] for part in report.unclaimed for path in part.paths if path in by_path)
     if loose:

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The objects that a Python user gets, as users of trimesh would expect them, and the spec's names."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+import silo.inertia as inertia
+from silo.bom.errors import ConfigError, InputError
+from silo.inertia import MATERIAL_DENSITIES, EnhancedInertiaCalculator, InertiaCalculator, MassProps
+from silo.inertia.bodies import box, placement
+from silo.inertia.links import as_link_map, link_map
+
+Fixture = Callable[..., Any]
+ARM = Path(__file__).parents[2] / "examples" / "arm"
+
+
+@pytest.fixture(name="report")
+def _report(assemble: Fixture, compute: Fixture) -> Any:
+    return compute(
+        assemble(
+            ("base/a", box("a", 0.1, 0.2, 0.3), placement((0.1, 0, 0))),
+            ("arm/<b>", box("<b>", 0.3, 0.1, 0.05), placement((0, 1, 2))),
+        ),
+        "Name,Mass\na,2 kg\n<b>,0.5 kg\n",
+    )
+
+
+def test_a_link_has_what_trimesh_calls_it(report: Any) -> None:
+    """The same numbers as trimesh's own mass properties of the same box."""
+    body = report.bodies["base"]
+    mesh = trimesh.creation.box((0.1, 0.2, 0.3))
+    corner = box("a", 0.1, 0.2, 0.3).com_m + np.array([0.1, 0, 0])
+    mesh.apply_translation(corner)
+    mesh.density = 2 / mesh.volume
+    assert body.mass == pytest.approx(mesh.mass)
+    np.testing.assert_allclose(body.center_mass, mesh.center_mass, atol=1e-12)
+    np.testing.assert_allclose(body.moment_inertia, mesh.moment_inertia, atol=1e-12)
+    np.testing.assert_allclose(
+        np.sort(body.principal_inertia_components), np.sort(mesh.principal_inertia_components), atol=1e-12
+    )
+    axes, moments = body.principal_inertia_vectors, body.principal_inertia_components
+    np.testing.assert_allclose(axes.T @ np.diag(moments) @ axes, body.moment_inertia, atol=1e-12)
+    assert np.linalg.det(axes) == pytest.approx(1)
+
+
+def test_bodies_add_up_to_the_whole(report: Any) -> None:
+    """With + and with sum(), in one frame."""
+    whole = sum(report.bodies.values())
+    assert isinstance(whole, MassProps)
+    assert whole.frame == report.total.frame == "assembly frame"
+    assert whole.mass == pytest.approx(report.total.mass)
+    np.testing.assert_allclose(whole.moment_inertia, report.total.moment_inertia, rtol=1e-12, atol=1e-15)
+    moved = whole.transformed(placement((1, 2, 3)))
+    np.testing.assert_allclose(moved.center_mass, whole.center_mass + np.array([1, 2, 3]))
+    with pytest.raises(TypeError):
+        whole + 1
+
+
+def test_bodies_of_two_frames_are_not_added() -> None:
+    """Each link's own numbers added as they are would be wrong in silence."""
+    report = inertia.compute_link_inertials(ARM / "arm.step", ARM / "bom.csv", frame="own")
+    with pytest.raises(InputError, match="two frames"):
+        sum(report.bodies.values())
+    moved = [link.props.transformed(link.frame.placement) for link in report.links.values()]
+    assert report.total is not None
+    np.testing.assert_allclose(sum(moved).moment_inertia, report.total.moment_inertia, rtol=1e-9)  # type: ignore[union-attr]
+
+
+def test_to_json_and_back(report: Any) -> None:
+    """Nothing lost; what does not fit is refused with a sentence."""
+    body = report.bodies["arm"]
+    again = MassProps.from_dict(json.loads(json.dumps(body.to_dict())))
+    assert (again.mass, again.frame) == (body.mass, body.frame)
+    np.testing.assert_array_equal(again.moment_inertia, body.moment_inertia)
+    np.testing.assert_array_equal(again.center_mass, body.center_mass)
+    for bad in (
+        {},
+        {"mass": 1},
+        {**body.to_dict(), "Mass": 2},
+        {**body.to_dict(), "center_mass": [1, 2]},
+        {**body.to_dict(), "mass": "much"},
+        {**body.to_dict(), "moment_inertia": [1, 2, 3]},
+        [],
+    ):
+        with pytest.raises(InputError, match=r"wanted .*3"):
+            MassProps.from_dict(bad)  # type: ignore[arg-type]
+
+
+def test_what_a_person_sees(report: Any) -> None:
+    """repr and a notebook's table; names from a file are no HTML."""
+    assert repr(report.bodies["base"]).startswith("MassProps(mass=2 kg, com=[")
+    assert "frame='assembly frame'" in repr(report.bodies["base"])
+    assert "not finite" in repr(MassProps(1, [0, 0, 0], np.full((3, 3), np.nan)))
+    assert "<th>mass</th><td>2 kg</td>" in report.bodies["base"]._repr_html_()
+    table = report._repr_html_()
+    assert "<td>base</td><td>2</td>" in table
+    report.add_warning("arm", "<b>", "a warning", "x")
+    assert "<b>" not in report._repr_html_()
+
+
+def test_the_names_of_the_spec() -> None:
+    """bom-inertia: the calculator, and the table of densities as plain values."""
+    assert EnhancedInertiaCalculator is InertiaCalculator
+    assert MATERIAL_DENSITIES["steel"] == 7850
+    assert MATERIAL_DENSITIES["aluminium"] == MATERIAL_DENSITIES["aluminum"] == 2700
+    assert MATERIAL_DENSITIES["ppa-cf"] == 1400
+    assert MATERIAL_DENSITIES["default"] == 1000
+    assert all(1 <= value < 25_000 for value in MATERIAL_DENSITIES.values())
+    assert set(inertia.__all__) == set(inertia._HOME)
+    for name in inertia.__all__:
+        assert getattr(inertia, name) is not None
+
+
+def test_links_as_plain_values() -> None:
+    """A dict of patterns, with or without "links" around it; what is none is refused with a sentence."""
+    for given in ({"base": ["a*"], "arm": "b"}, {"links": {"base": ["a*"], "arm": {"parts": "b"}}}):
+        found = as_link_map(given)
+        assert found is not None
+        assert [(link.name, link.patterns) for link in found.links] == [("base", ("a*",)), ("arm", ("b",))]
+    made = link_map({"links": {"links": ["a"]}})
+    assert as_link_map(made) is made
+    assert as_link_map(None) is None
+    for bad in ({}, {"base": 3}, {"base": []}, [("base", "a")], 5):
+        with pytest.raises(ConfigError, match="wanted"):
+            as_link_map(bad)  # type: ignore[arg-type]
+
+
+def test_a_dict_is_taken_by_the_one_call_too() -> None:
+    """compute_link_inertials(links={…})."""
+    report = inertia.compute_link_inertials(
+        ARM / "arm.step", ARM / "bom.csv", links={"all": ["*"]}, frame="assembly"
+    )
+    assert list(report.bodies) == ["all"]
+    assert report.total is not None
+    assert report.bodies["all"].mass == pytest.approx(report.total.mass)
