@@ -14,6 +14,7 @@ from silo.bom.errors import DocumentError
 from silo.bom.findings import FindingCode
 from silo.bom.links import extract
 from silo.fcstd import FcstdObject, Library, Limits, open_document
+from silo.fcstd.locate import refusal
 
 
 def problem(folder: Path, file: str, name: str = "Box", *, root: Path | None = None) -> LinkProblem:
@@ -335,3 +336,57 @@ def test_a_damaged_file_is_read_once(tmp_path: Path) -> None:
         with pytest.raises(DocumentError):
             library.open(path)
     assert len(looks) == 1
+
+
+@pytest.mark.parametrize(
+    "recorded",
+    [
+        *(
+            "//evil/share/x.FCStd",
+            "\\\\evil\\share\\x.FCStd",
+            "\\/evil/share/x.FCStd",
+            "/\\evil\\share\\x.FCStd",
+        ),
+        *("//./pipe/x", "\\\\.\\pipe\\x", "//?/C:/x.FCStd", "/\\/evil/x.FCStd"),
+    ],
+)
+def test_no_spelling_of_another_host_or_a_device_is_looked_at(recorded: str) -> None:
+    """On Windows the look alone would send the user's credentials; so it is refused on every platform."""
+    found = refusal(recorded)
+    assert found is not None
+    assert found.code is FindingCode.OUTSIDE_ROOT
+
+
+@pytest.mark.parametrize(
+    "recorded",
+    ["NUL", "parts/con", "aux.FCStd", "sub/COM1.txt", "prn .FCStd", "nul:", "x.FCStd:stream", "conin$"],
+)
+def test_windows_devices_and_streams_are_no_files(recorded: str) -> None:
+    found = refusal(recorded)
+    assert found is not None
+    assert found.code is FindingCode.MISSING_FILE
+
+
+@pytest.mark.parametrize(
+    "recorded",
+    [
+        *(
+            "part.FCStd",
+            "../parts/part.FCStd",
+            "C:/vault/part.FCStd",
+            "C:\\vault\\part.FCStd",
+            "/vault/part.FCStd",
+        ),
+        *(
+            "console.FCStd",
+            "auxiliary/nullpart.FCStd",
+            "COM.FCStd",
+            "com10.FCStd",
+            "a:b.FCStd",
+            "",
+            "./x.FCStd",
+        ),
+    ],
+)
+def test_usual_names_are_looked_for(recorded: str) -> None:
+    assert refusal(recorded) is None

@@ -11,15 +11,20 @@ from __future__ import annotations
 
 import os
 import re
-import stat
-import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import NamedTuple
 
 from silo.bom.findings import FindingCode
+from silo.spelling import Spelling, Spelt, folded
 
 _URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+://")
+# Windows opens a device under each of these names, in any folder and with any ending.
+_DEVICE = re.compile(
+    r"(?:CON|PRN|AUX|NUL|CLOCK\$|CONIN\$|CONOUT\$|(?:COM|LPT)[0-9¹²³])\s*(?:[.:].*)?\Z", re.I
+)
+_STREAM = re.compile(r"\.fcstd:", re.I)
 _LONGEST, _DEEPEST = 4096, 128
 _FOLDER_AT_MOST = 50_000
 
@@ -44,7 +49,7 @@ class Locator:
     """Finds linked files, all below ``root`` where one is given; remembers folders for one session."""
 
     root: str | None = None
-    _real_folders: dict[str, str] = field(default_factory=dict)
+    _spelling: Spelling = field(default_factory=Spelling)
     _listings: dict[str, dict[str, list[str]]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -52,23 +57,8 @@ class Locator:
             self.root = os.path.realpath(self.root)
 
     def real(self, path: str) -> str:
-        """``os.path.realpath``, with the folders remembered."""
-        return self._look(path)[0]
-
-    def _look(self, path: str) -> tuple[str, bool]:
-        """The path without symlinks, and whether anything is there."""
-        folder, name = os.path.split(path)
-        real_folder = self._real_folders.get(folder)
-        if real_folder is None:
-            real_folder = self._real_folders[folder] = os.path.realpath(folder)
-        candidate = os.path.join(real_folder, name)
-        try:
-            if not stat.S_ISLNK(os.lstat(candidate).st_mode):
-                return candidate, True
-        except (OSError, ValueError):
-            return candidate, False
-        real = os.path.realpath(candidate)
-        return real, os.path.lexists(real)
+        """The one path of a file: without symlinks, as its folders list it."""
+        return self._spelling.look(path).path
 
     def inside(self, real_path: str) -> bool:
         """True where a path without symlinks may be read."""
@@ -79,18 +69,15 @@ class Locator:
         """The file that a link in a document of (one of) these folders means."""
         if "://" in recorded and _URL.match(recorded):
             return NotFound(FindingCode.MISSING_FILE, "it is a web address; only files are read")
-        if recorded.startswith(("//", "\\\\")):
-            # On Windows the mere look would send the user's credentials to that host.
-            return NotFound(FindingCode.OUTSIDE_ROOT, "it is on the network, by an absolute path")
-        if "\0" in recorded or len(recorded) > _LONGEST:
-            return NotFound(FindingCode.MISSING_FILE, "its path cannot be one")
+        if (refused := refusal(recorded)) is not None:
+            return refused
         outside = False
         for path in _candidates(recorded, folders):
-            real, there = self._look(path)
-            if not self.inside(real):
+            spelt = self._spelling.look(path)
+            if not self.inside(spelt.path):
                 outside = True
-            elif there:
-                return Found(path, real)
+            elif spelt.there:
+                return Found(path, spelt.path, respelt=_respelt_by_disk(recorded, spelt))
         if outside:
             return NotFound(FindingCode.OUTSIDE_ROOT)
         if recorded.count("/") > _DEEPEST:
@@ -120,7 +107,7 @@ class Locator:
             parents = [p for p in self._spellings(folder) if os.path.isdir(p)][:2]
         for parent in parents:
             if self.inside(os.path.realpath(parent)):
-                for match in self._listing(parent).get(_folded(name), ()):
+                for match in self._listing(parent).get(folded(name), ()):
                     yield os.path.join(parent, match)
 
     def _listing(self, folder: str) -> dict[str, list[str]]:
@@ -130,14 +117,42 @@ class Locator:
             try:
                 with os.scandir(folder) as found:
                     for _, item in zip(range(_FOLDER_AT_MOST), found, strict=False):
-                        known.setdefault(_folded(item.name), []).append(item.name)
+                        known.setdefault(folded(item.name), []).append(item.name)
             except OSError:
                 pass  # a folder that cannot be listed shows nothing
         return known
 
 
-def _folded(name: str) -> str:
-    return unicodedata.normalize("NFC", name).casefold()
+def refusal(recorded: str) -> NotFound | None:
+    """Why a recorded path is not even looked at; None where it may be.
+
+    The rules are those of Windows, where a mere look can do harm, and the same on every platform: a project
+    must not read in one way here and in another there.
+    """
+    if "\0" in recorded or len(recorded) > _LONGEST:
+        return NotFound(FindingCode.MISSING_FILE, "its path cannot be one")
+    path = recorded.replace("\\", "/")
+    if path.startswith("//"):
+        # The mere look would send the user's credentials to that host; //./ and //?/ name devices.
+        return NotFound(FindingCode.OUTSIDE_ROOT, "it is on the network or a device, by an absolute path")
+    for name in path.split("/"):
+        if _DEVICE.match(name):
+            return NotFound(FindingCode.MISSING_FILE, f"{name} is a device on Windows, not a file")
+        if _STREAM.search(name):
+            return NotFound(FindingCode.MISSING_FILE, f"{name} names a stream within a file")
+    return None
+
+
+def _respelt_by_disk(recorded: str, spelt: Spelt) -> bool:
+    """True where a disk that does not tell case apart found a name of the link under another spelling.
+
+    How the user spelt the folders above is not the link's matter.
+    """
+    if spelt.path == spelt.plain:
+        return False
+    own = len([name for name in recorded.replace("\\", "/").split("/") if name not in ("", ".", "..")])
+    plain, listed = (Path(path).parts[-own:] for path in (spelt.plain, spelt.path))
+    return plain != listed
 
 
 def _candidates(recorded: str, folders: tuple[str, ...]) -> Iterator[str]:

@@ -14,7 +14,6 @@ import re
 import zipfile
 import zlib
 from collections.abc import Callable
-from functools import lru_cache
 from typing import Any
 from xml.sax.saxutils import unescape
 
@@ -24,6 +23,7 @@ from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.links import extract
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.roots import choose_assembly
+from silo.spelling import Spelling
 from silo.workbench.freecad import host, saving
 from silo.workbench.freecad.cached import CachedDocument, FactCache
 
@@ -95,8 +95,8 @@ def extract_object(assembly_obj: Any) -> Extraction:
 
 
 def canonical_paths() -> Callable[[str], str]:
-    """``os.path.realpath``, remembered for one walk: a file opened by two paths is one file."""
-    return lru_cache(maxsize=None)(os.path.realpath)
+    """The one path of a file, remembered for one walk: a file opened by two paths is one file."""
+    return Spelling().real
 
 
 def stored_target(link: Any, name: str = "LinkedObject") -> tuple[str, str] | None:

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""One path per file: without symlinks, each name as its folder lists it. Standard library only.
+
+Windows and macOS find ``Part.FCStd`` under ``part.fcstd`` too, and macOS finds a name in any Unicode normal
+form. Two spellings are one file there, and must be one component and one item. Such a disk is recognised by
+asking it, not by the platform: Linux mounts such disks, and macOS can have case-sensitive ones.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+import unicodedata
+from typing import NamedTuple
+
+_LISTED_AT_MOST = 50_000
+
+
+class Spelt(NamedTuple):
+    """A path. ``plain`` is its real path in the spelling asked for, ``path`` in that of the folders."""
+
+    path: str
+    plain: str
+    there: bool
+
+
+class Spelling:
+    """Finds the one path of a file; remembers folders for one session."""
+
+    def __init__(self) -> None:
+        self._folders: dict[str, tuple[str, str]] = {}
+        self._canonical: dict[str, str] = {}
+        self._exact: set[str] = set()  # folders that find a name in its own spelling only
+        self._listings: dict[str, dict[int, list[str]]] = {}
+
+    def real(self, path: str) -> str:
+        """``os.path.realpath`` with each name as its folder lists it; also for paths that are not there."""
+        return self.look(os.path.abspath(path)).path
+
+    def look(self, path: str) -> Spelt:
+        """The same for an absolute path, with what was asked for and whether anything is there."""
+        folder, name = os.path.split(path)
+        if not name:
+            found = os.path.realpath(path)
+            return Spelt(self._as_listed(found), found, os.path.lexists(found))
+        if folder not in self._folders:
+            plain = os.path.realpath(folder)
+            self._folders[folder] = plain, self._as_listed(plain)
+        plain, real_folder = self._folders[folder]
+        candidate = os.path.join(real_folder, name)
+        try:
+            status = os.lstat(candidate)
+        except (OSError, ValueError):
+            return Spelt(candidate, os.path.join(plain, name), False)
+        if stat.S_ISLNK(status.st_mode):
+            target = os.path.realpath(candidate)
+            return Spelt(self._as_listed(target), target, os.path.lexists(target))
+        listed = self._listed(real_folder, name, status)
+        return Spelt(os.path.join(real_folder, listed), os.path.join(plain, name), True)
+
+    def _as_listed(self, real: str) -> str:
+        """A path without symlinks, each name as its folder lists it."""
+        known = self._canonical.get(real)
+        if known is None:
+            folder, name = os.path.split(real)
+            if not name or folder == real:
+                known = real
+            else:
+                parent = self._as_listed(folder)
+                try:
+                    name = self._listed(parent, name, os.lstat(os.path.join(parent, name)))
+                except (OSError, ValueError):
+                    pass  # nothing is there, so nothing lists it
+                known = os.path.join(parent, name)
+            self._canonical[real] = known
+        return known
+
+    def _listed(self, folder: str, name: str, status: os.stat_result) -> str:
+        if name.isascii() and folder in self._exact:
+            return name
+        spellings = {name.swapcase(), *(unicodedata.normalize(form, name) for form in ("NFC", "NFD"))} - {
+            name
+        }
+        if not any(_is(os.path.join(folder, other), status) for other in spellings):
+            if name.isascii() and spellings:
+                self._exact.add(folder)
+            return name
+        names = self._listing(folder).get(status.st_ino, ())
+        if not names or name in names:  # a hard link may have several names
+            return name
+        return next((other for other in names if folded(other) == folded(name)), name)
+
+    def _listing(self, folder: str) -> dict[int, list[str]]:
+        known = self._listings.get(folder)
+        if known is None:
+            known = self._listings[folder] = {}
+            try:
+                with os.scandir(folder) as found:
+                    for _, item in zip(range(_LISTED_AT_MOST), found, strict=False):
+                        known.setdefault(item.inode(), []).append(item.name)
+            except OSError:
+                pass  # a folder that cannot be listed shows nothing; names stay as they were given
+        return known
+
+
+def folded(name: str) -> str:
+    """Equal for names that differ in case or normal form only."""
+    return unicodedata.normalize("NFC", unicodedata.normalize("NFD", name).casefold())
+
+
+def _is(path: str, status: os.stat_result) -> bool:
+    try:
+        return os.path.samestat(os.lstat(path), status)
+    except (OSError, ValueError):
+        return False

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""One path per file, on disks of both kinds: those that tell spellings apart, and those that do not."""
+
+from __future__ import annotations
+
+import json
+import os
+import unicodedata
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fcstd_writer import Doc, XLink, locals_
+from other_disk import other_disk
+
+from silo.bom.report import bom_json
+from silo.cli.common import read_assembly
+from silo.spelling import Spelling
+
+NFD = unicodedata.normalize("NFD", "Büchse")
+
+
+@pytest.fixture
+def disk(tmp_path: Path) -> Iterator[Path]:
+    """A folder on a disk that finds a name in any case and normal form."""
+    with other_disk(tmp_path) as mounted:
+        yield mounted
+
+
+def real(path: Path | str) -> str:
+    return Spelling().real(os.fspath(path))
+
+
+def test_every_spelling_of_a_file_is_one_path(disk: Path) -> None:
+    (disk / "Parts" / "Sub").mkdir(parents=True)
+    wanted = disk / "Parts" / "Sub" / "Bolt.FCStd"
+    wanted.write_text("x")
+    session = Spelling()
+    for spelt in (
+        "Parts/Sub/Bolt.FCStd",
+        "parts/SUB/bolt.fcstd",
+        "PARTS/sub/BOLT.FCSTD",
+        "parts/../parts/sub/bolt.fcstd",
+    ):
+        assert real(disk / spelt) == str(wanted), spelt
+        assert session.real(str(disk / spelt)) == str(wanted), spelt
+
+
+def test_every_normal_form_of_a_name_is_one_path(disk: Path) -> None:
+    wanted = disk / "Büchse" / "Büchse.FCStd"
+    wanted.parent.mkdir()
+    wanted.write_text("x")
+    assert real(disk / NFD / f"{NFD}.FCStd") == str(wanted)
+    assert real(disk / NFD.upper() / f"{NFD}.FCStd") == str(wanted)
+
+
+def test_a_path_that_is_not_there_is_spelt_as_far_as_it_goes(disk: Path) -> None:
+    (disk / "Parts").mkdir()
+    assert real(disk / "PARTS" / "new.FCStd") == str(disk / "Parts" / "new.FCStd")
+
+
+def test_where_names_differ_by_case_they_are_two_files(tmp_path: Path) -> None:
+    for name in ("Bolt.FCStd", "bOLT.fcsTD"):
+        (tmp_path / name).write_text(name)
+    if len(os.listdir(tmp_path)) == 1:
+        pytest.skip("this disk does not tell case apart")
+    for name in ("Bolt.FCStd", "bOLT.fcsTD"):
+        assert real(tmp_path / name) == str(tmp_path / name)
+
+
+def test_hard_links_and_symlinks(tmp_path: Path) -> None:
+    """Both names of a hard link are listed, so each stays what it is; a symlink is its target."""
+    (tmp_path / "Bolt.FCStd").write_text("x")
+    os.link(tmp_path / "Bolt.FCStd", tmp_path / "bOLT.fcsTD")
+    (tmp_path / "link.FCStd").symlink_to("Bolt.FCStd")
+    assert real(tmp_path / "bOLT.fcsTD") == str(tmp_path / "bOLT.fcsTD")
+    assert real(tmp_path / "link.FCStd") == str(tmp_path / "Bolt.FCStd")
+
+
+def project(folder: Path, *recorded: str) -> Path:
+    """An assembly with one link for each recorded spelling of ``Parts/Büchse.FCStd``."""
+    (folder / "Parts").mkdir()
+    Doc("part").add("Part::Box", "Box").save(folder / "Parts" / "Büchse.FCStd")
+    top = Doc("top")
+    for number, file in enumerate(recorded):
+        top.add("App::Link", f"L{number}", LinkedObject=XLink(file, "Box"))
+    links = locals_(*(f"L{number}" for number in range(len(recorded))))
+    top.add("Assembly::AssemblyObject", "A", Group=links).save(folder / "Top.FCStd")
+    return folder / "Top.FCStd"
+
+
+def counted(top: Path) -> list[tuple[str, int]]:
+    return [(os.path.basename(entry.doc_path), entry.quantity) for entry in read_assembly(str(top)).entries]
+
+
+def test_two_spellings_of_a_part_are_one_component(disk: Path) -> None:
+    top = project(disk, "Parts/Büchse.FCStd", "parts/büchse.fcstd", f"PARTS/{NFD}.FCStd")
+    assert counted(top) == [("Büchse.FCStd", 3)]
+    assert counted(disk / "TOP.fcstd") == [("Büchse.FCStd", 3)]
+
+
+def test_the_bom_reads_the_same_on_both_kinds_of_disk(disk: Path, tmp_path: Path) -> None:
+    """To the letter, findings included: the note about another spelling as well."""
+    recorded = ("Parts/Büchse.FCStd", "parts/büchse.fcstd")
+    (tmp_path / "usual").mkdir()
+    read: list[Any] = [
+        json.dumps(bom_json(read_assembly(str(project(folder, *recorded)))), sort_keys=True)
+        for folder in (tmp_path / "usual", disk)
+    ]
+    assert read[0].replace(str(tmp_path / "usual"), "") == read[1].replace(str(disk), "")
+    assert "differs in case" in read[0]
+
+
+def test_how_the_user_spells_the_folder_is_no_matter_of_the_links(disk: Path) -> None:
+    (disk / "Vault").mkdir()
+    project(disk / "Vault", "Parts/Büchse.FCStd")
+    found = read_assembly(str(disk / "VAULT" / "top.fcstd"))
+    assert [f.code.value for f in found.findings if "differs" in f.message] == []
