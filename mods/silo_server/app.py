@@ -3,17 +3,20 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any
 
+import anyio.to_thread
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 
 from silo.api.wire import MergeRequest
 from silo_server import failures
+from silo_server.background import Probe, TokenUses
 from silo_server.clock import Clock, utc_now
-from silo_server.db.engine import Database
+from silo_server.db.engine import WRITERS_WAITING, Database
 from silo_server.events.hub import Hub
 from silo_server.files import FileStore
 from silo_server.middleware import BodyLimit, SecurityHeaders
@@ -23,6 +26,7 @@ from silo_server.settings import Settings, settings_from_environment
 from silo_server.web import pages
 
 VERSION = "0.1.0"
+READING_THREADS = 40
 # Routes are matched in this order; /items/by-uuid and /items/search stand before /items/{part_number}.
 ROUTERS = (
     system.router,
@@ -42,11 +46,17 @@ def create_app(settings: Settings, clock: Clock = utc_now) -> FastAPI:
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        hub = Hub(db)
-        app.state.server = Server(settings, db, hub, FileStore(settings.storage))
+        # Changes that wait hold a thread each; what is left is for those who read.
+        anyio.to_thread.current_default_thread_limiter().total_tokens = WRITERS_WAITING + READING_THREADS
+        hub, files, uses = Hub(db), FileStore(settings.storage), TokenUses(db)
+        probe = Probe(db, files)
+        app.state.server = Server(settings, db, hub, files, probe)
         await hub.start()
+        uses.start()
         yield
         await hub.stop()
+        probe.stop()
+        await asyncio.to_thread(uses.stop)
         db.close()
 
     # The interactive pages of FastAPI load scripts from elsewhere, which our CSP forbids; the document stays.

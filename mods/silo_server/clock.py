@@ -16,7 +16,7 @@ def utc_now() -> datetime:
 
 def stamp(when: datetime) -> str:
     """As stored: microseconds always, so that text order is time order (``2026-02-08T22:15:00.000000Z``)."""
-    return when.astimezone(UTC).strftime("%Y-%m-%dT%H:%M:%S.%fZ")
+    return when.astimezone(UTC).replace(tzinfo=None).isoformat(timespec="microseconds") + "Z"
 
 
 def wire(stored: str | None) -> str | None:

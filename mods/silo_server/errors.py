@@ -24,13 +24,6 @@ class TooManyAttemptsError(RemoteError):
         self.retry_after = retry_after
 
 
-class BusyError(RemoteError):
-    """503: the database cannot be reached or is too busy; the same request may succeed later."""
-
-    status_hint = 503
-    code = "unavailable"
-
-
 class DuplicateError(ConflictError):
     """409: there is one already."""
 

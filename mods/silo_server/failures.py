@@ -14,8 +14,8 @@ from sqlalchemy.exc import DataError, DBAPIError, IntegrityError, OperationalErr
 from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, Response
 
-from silo.bom.errors import CycleError, ReadOnlyError, RejectedError, RouteMissingError, SiloError
-from silo_server.errors import BusyError, TooManyAttemptsError
+from silo.bom.errors import BusyError, CycleError, ReadOnlyError, RejectedError, RouteMissingError, SiloError
+from silo_server.errors import TooManyAttemptsError
 
 logger = logging.getLogger("silo_server")
 RETRY_SECONDS = "5"

@@ -4,7 +4,10 @@
 from __future__ import annotations
 
 import hashlib
+import lzma
 import os
+import shutil
+import struct
 import tempfile
 import zipfile
 import zlib
@@ -19,6 +22,11 @@ from silo_server.services.revisions import StoredFile
 CHUNK = 1024 * 1024
 THUMBNAIL = "thumbnails/Thumbnail.png"
 MAX_THUMBNAIL = 1024 * 1024
+# A zip's directory is read whole, and takes eight times its size in memory. FreeCAD writes some 100 bytes for
+# each object.
+MAX_DIRECTORY = 4 * 1024 * 1024
+END_MARK = b"PK\x05\x06"
+END_SIZE = 22
 PNG = b"\x89PNG\r\n\x1a\n"
 
 
@@ -59,13 +67,16 @@ class FileStore:
         with source:
             return self._write(iter(lambda: source.read(CHUNK), b""), wanted=checksum)[0] == checksum
 
-    def healthy(self) -> bool:
-        """True where the store can be written to."""
+    def state(self, wanted: int) -> str:
+        """``ok``; ``unwritable``; ``full`` where fewer than ``wanted`` bytes are free."""
         try:
             self.root.mkdir(parents=True, exist_ok=True)
+            free = shutil.disk_usage(self.root).free
         except OSError:
-            return False
-        return os.access(self.root, os.W_OK)
+            return "unwritable"
+        if not os.access(self.root, os.W_OK):
+            return "unwritable"
+        return "ok" if free >= wanted else "full"
 
     def _place(self, checksum: str) -> Path:
         return self.root / checksum[:2] / checksum[2:4] / checksum
@@ -105,6 +116,8 @@ def clean_name(name: str) -> str:
 def read_thumbnail(path: Path) -> bytes | None:
     """The picture inside an FCStd file, None where there is none. The file is not to be trusted."""
     try:
+        if _directory_size(path) > MAX_DIRECTORY:
+            return None
         with zipfile.ZipFile(path) as archive, archive.open(THUMBNAIL) as entry:
             data = entry.read(MAX_THUMBNAIL + 1)
     except (
@@ -115,7 +128,21 @@ def read_thumbnail(path: Path) -> bytes | None:
         NotImplementedError,
         EOFError,
         zlib.error,
+        lzma.LZMAError,
         ValueError,
     ):
         return None
     return data if data.startswith(PNG) and len(data) <= MAX_THUMBNAIL else None
+
+
+def _directory_size(path: Path) -> int:
+    """The bytes of a zip's directory by its end record; a huge number for ZIP64, 0 where this is no zip."""
+    with path.open("rb") as source:
+        length = source.seek(0, os.SEEK_END)
+        source.seek(max(0, length - END_SIZE - 0xFFFF))
+        tail = source.read()
+    place = tail.rfind(END_MARK)
+    if place < 0 or len(tail) - place < END_SIZE:
+        return 0
+    size: int = struct.unpack_from("<I", tail, place + 12)[0]
+    return size

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import re
+import time
 
 from starlette.datastructures import MutableHeaders
 from starlette.exceptions import HTTPException
@@ -12,6 +14,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from silo_server.failures import error_answer
 from silo_server.settings import MIB, Settings
 
+# A body may take another second for each BODY_PACE bytes.
+BODY_PACE = 8 * 1024
+CLOSE = {"Connection": "close"}
 UPLOAD_PATH = re.compile(r"/(?:api/)?items/[^/]+/file$")
 
 SECURITY_HEADERS = {
@@ -68,10 +73,20 @@ class BodyLimit:
             await error_answer(413, "too_large", message)(scope, receive, send)
             return
         taken = 0
+        whole = False
+        begun = time.monotonic()
 
         async def counted() -> Message:
-            nonlocal taken
-            part = await receive()
+            nonlocal taken, whole
+            if whole:
+                return await receive()
+            # A body must come at some pace: half a request, kept open, would be kept for ever.
+            left = begun + self.settings.request_body_seconds + taken / BODY_PACE - time.monotonic()
+            try:
+                part = await asyncio.wait_for(receive(), max(left, 0.01))
+            except TimeoutError:
+                raise HTTPException(408, "the request's body came too slowly", CLOSE) from None
+            whole = not part.get("more_body", False)
             taken += len(part.get("body", b""))
             if taken > limit:
                 raise HTTPException(413, message)

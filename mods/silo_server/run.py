@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import gc
 import ipaddress
 import multiprocessing
@@ -22,6 +23,7 @@ import uvicorn
 from fastapi import FastAPI
 from sqlalchemy import make_url
 from sqlalchemy.exc import SQLAlchemyError
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from silo.bom.errors import ConfigError
 from silo_server.app import create_app
@@ -71,6 +73,44 @@ class Greeting:
 def _tell(greeting: Greeting) -> None:
     # Whoever reads the output of a pipe waits for the address, and the server never ends by itself.
     print(*greeting.lines(), sep="\n", flush=True)
+
+
+class _Protocol(H11Protocol):
+    """uvicorn's HTTP, which hangs up on a connection that begins no request, or half of one.
+
+    A connection that has had an answer may be silent for uvicorn's own keep-alive time.
+    """
+
+    head_seconds = 0.0
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        super().connection_made(transport)
+        self._late: asyncio.TimerHandle | None = None
+        self._expect_a_request()
+
+    def data_received(self, data: bytes) -> None:
+        super().data_received(data)
+        if self.cycle is not None and not self.cycle.response_complete:
+            self._stop_expecting()
+        elif self._late is None and self.timeout_keep_alive_task is None:
+            self._expect_a_request()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._stop_expecting()
+        super().connection_lost(exc)
+
+    def _expect_a_request(self) -> None:
+        self._late = self.loop.call_later(self.head_seconds, self._hang_up)
+
+    def _stop_expecting(self) -> None:
+        if self._late is not None:
+            self._late.cancel()
+            self._late = None
+
+    def _hang_up(self) -> None:
+        self._late = None
+        if not self.transport.is_closing():
+            self.transport.close()
 
 
 class SiloServer(uvicorn.Server):
@@ -151,7 +191,7 @@ def running_server(
     app = create_app(given)
     sock = _bind(host, port)
     up = threading.Event()
-    server = SiloServer(_config(app), up.set)
+    server = SiloServer(_config(app, given), up.set)
     thread = threading.Thread(target=server.run, kwargs={"sockets": [sock]}, name="silo-server", daemon=True)
     thread.start()
     try:
@@ -178,9 +218,10 @@ def _prepare(settings: Settings, token: str | None) -> Welcome:
         raise ConfigError(f"the database {_without_password(settings)} cannot be used: {cause}") from error
 
 
-def _config(app: FastAPI) -> uvicorn.Config:
+def _config(app: FastAPI, settings: Settings) -> uvicorn.Config:
     return uvicorn.Config(
         app,
+        http=type("Protocol", (_Protocol,), {"head_seconds": settings.request_head_seconds}),
         log_level="warning",
         # uvicorn's access log writes whole URLs; a login link must not end up there.
         access_log=False,
@@ -218,7 +259,7 @@ def _work(settings: Settings, sock: socket.socket, on_up: Callable[[], None] | N
     gc.freeze()
     gc.set_threshold(50_000, 20, 100)
     _allow_many_connections()
-    server = SiloServer(_config(create_app(settings)), on_up or (lambda: None))
+    server = SiloServer(_config(create_app(settings), settings), on_up or (lambda: None))
     parent = multiprocessing.parent_process()
     if parent is not None:
         # A parent that was killed cannot tell its workers; they must not serve on without it.

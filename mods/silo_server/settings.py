@@ -31,6 +31,8 @@ class Settings:
     poll_seconds
         how often the event log is looked at without having been told of news: the safety net for a lost
         notification, and how SQLite's changes by another process are seen.
+    request_head_seconds, request_body_seconds
+        how long a client may take to send a request; a body gets a second more for each 8 KiB of it.
     event_log_size
         events kept for replay; a client that was away longer gets ``reset``.
     """
@@ -45,6 +47,8 @@ class Settings:
     max_file_bytes: int = 512 * MIB
     max_merge_entries: int = 20_000
     max_expanded_rows: int = 200_000
+    request_head_seconds: float = 20.0
+    request_body_seconds: float = 60.0
     session_seconds: float = 24 * 3600.0
     login_link_seconds: float = 3600.0
     login_failures: int = 5

@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from decimal import Decimal
 from enum import StrEnum
 from typing import Any, NamedTuple
+
+from silo.bom.numbers import plain
 
 
 class Role(StrEnum):
@@ -137,11 +139,8 @@ class Line(NamedTuple):
     state: LineState
 
 
-def dumps(value: Any) -> str:
-    """Compact JSON text, as stored and sent."""
-    return json.dumps(value, separators=(",", ":"), ensure_ascii=False)
-
-
-def number(value: float | None) -> float | int | None:
+def number(value: float | Decimal | None) -> float | int | None:
     """A count reads as a count: 12.0 is told as 12."""
+    if isinstance(value, Decimal):
+        return plain(value)
     return int(value) if value is not None and value == int(value) else value

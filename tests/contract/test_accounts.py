@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from server_testing import Answer, Api, Databases, bom, merge_body
+from server_testing import Answer, Api, Databases, bom, merge_body, wait_until
 from sqlalchemy import select
 
 from silo_server.db.tables import metadata
@@ -61,10 +61,13 @@ def test_a_token_is_shown_once_named_and_revocable(api: Api) -> None:
     assert re.fullmatch(r"silo_[0-9a-f]{40}", secret)
     mine = api.as_(secret)
     assert mine.get("/api/auth/me")["username"] == "admin"
-    listed = next(t for t in api.get("/api/auth/tokens") if t["id"] == made["id"])
-    assert (listed["name"], listed["prefix"]) == ("CI", secret[:9])
-    assert listed["last_used_at"] is not None
-    assert listed["expires_at"] is not None
+
+    def listed() -> Any:
+        return next(t for t in api.get("/api/auth/tokens") if t["id"] == made["id"])
+
+    assert (listed()["name"], listed()["prefix"]) == ("CI", secret[:9])
+    wait_until(lambda: listed()["last_used_at"] is not None, "the note of its last use")
+    assert listed()["expires_at"] is not None
     assert secret not in str(api.get("/api/auth/tokens"))
     api.good("DELETE", f"/api/auth/tokens/{made['id']}")
     mine.bad(401, "GET", "/api/auth/me")

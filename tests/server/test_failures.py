@@ -28,7 +28,7 @@ def server(tmp_path: Path) -> Iterator[RunningServer]:
     ("error", "status", "code"),
     [
         (ZeroDivisionError("secret inside"), 500, "server_fault"),
-        (OperationalError("SELECT secret inside", {}, Exception("x")), 503, "unavailable"),
+        (OperationalError("SELECT secret inside", {}, Exception("x")), 503, "busy"),
         (DataError("INSERT secret inside", {}, Exception("x")), 400, "rejected"),
         (IntegrityError("INSERT secret inside", {}, Exception("x")), 409, "conflict"),
         (UnicodeEncodeError("utf-8", "secret inside", 0, 1, "lone"), 400, "rejected"),
@@ -61,7 +61,7 @@ def test_a_database_that_is_away_is_503_and_not_ready(tmp_path: Path) -> None:
             away = path.rename(tmp_path / "away.db")
             path.mkdir()  # where the file was is now something that is no database
             try:
-                assert api.bad(503, "GET", "/api/items/BEFORE")["error"] == "unavailable"
+                assert api.bad(503, "GET", "/api/items/BEFORE")["error"] == "busy"
                 assert api.call("GET", "/ready").status == 503
                 assert api.get("/health")["mode"] == "degraded"
             finally:
@@ -79,7 +79,12 @@ def test_a_store_that_cannot_be_written_is_degraded(tmp_path: Path) -> None:
         running_server(f"sqlite:///{tmp_path / 'x.db'}", token="silo_failures", files_dir=blocked) as running,
         Api(running.base_url, None) as api,
     ):
-        assert api.get("/ready")["mode"] == "degraded"
+        answer = api.call("GET", "/ready")
+        assert (answer.status, answer.json()["mode"], answer.json()["files"]) == (
+            503,
+            "degraded",
+            "unwritable",
+        )
 
 
 def test_the_document_promises_only_what_we_answer(tmp_path: Path) -> None:

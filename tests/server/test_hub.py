@@ -13,9 +13,10 @@ from server_testing import Api
 
 from silo_server.db.engine import Database
 from silo_server.events.hub import RING_EVENTS
+from silo_server.json_values import dumps
 from silo_server.run import RunningServer, running_server
 from silo_server.services import events as log
-from silo_server.values import NewEvent, dumps
+from silo_server.values import NewEvent
 
 TOKEN = "silo_hub"
 

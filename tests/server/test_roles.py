@@ -46,6 +46,7 @@ TABLE: dict[tuple[str, str], str] = {
     ("POST", "/api/items/by-uuid"): VIEWER,  # a look-up with a long list; changes nothing
     ("GET", "/api/items/{part_number}"): VIEWER,
     ("PUT", "/api/items/{part_number}"): EDITOR,
+    ("PATCH", "/api/items/{part_number}/properties"): EDITOR,
     ("DELETE", "/api/items/{part_number}"): EDITOR,
     ("POST", "/api/items/{part_number}/unarchive"): EDITOR,
     ("POST", "/api/generate-part-number"): EDITOR,

@@ -317,3 +317,14 @@ def test_the_package_holds_its_files() -> None:
     folder = Path(silo_server.web.__file__).parent
     assert (folder / "templates" / "base.html").is_file()
     assert (folder / "static" / "style.css").is_file()
+
+
+def test_a_form_reads_quantities_as_people_type_them(api: Api, visitors: dict[str, Visitor]) -> None:
+    """What is ambiguous is refused with both readings, and what was typed stays in the form."""
+    parent, child = api.items(2)
+    refused = visitors[EDITOR].post(f"/items/{parent}/bom/lines", child=child, quantity="1,000")
+    assert refused.status == 400
+    assert b"1000 or 1" in refused.body
+    assert b'value="1,000"' in refused.body
+    assert visitors[EDITOR].post(f"/items/{parent}/bom/lines", child=child, quantity="1,5").status == 303
+    assert api.quantities(parent) == {child: 1.5}

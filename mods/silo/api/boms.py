@@ -58,9 +58,17 @@ class BomCalls(Caller):
         return reply.models(FlatLine, "flat_bom", *LISTS)
 
     def where_used(self, part_number: str, /) -> list[WhereUsedLine]:
-        """The parents that have this item on their BOM."""
-        reply = self._get(f"the uses of {part_number}", *_bom(part_number), "where-used")
-        return reply.models(WhereUsedLine, "where_used", "parents", *LISTS)
+        """The parents that have this item on their BOM; all of them, from however many pages."""
+        found: list[WhereUsedLine] = []
+        while True:
+            params: Params = {"offset": len(found)} if found else {}
+            subject = f"the uses of {part_number}"
+            reply = self._get(subject, *_bom(part_number), "where-used", params=params)
+            page = reply.models(WhereUsedLine, "where_used", "parents", *LISTS)
+            found.extend(page)
+            total = reply.headers.get("X-Total-Count", "")
+            if not page or not (total.isascii() and total.isdigit()) or len(found) >= int(total):
+                return found
 
     def merge_bom(
         self,

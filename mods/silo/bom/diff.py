@@ -21,6 +21,7 @@ from typing import Any
 
 from silo.bom.findings import Finding, Place
 from silo.bom.model import BomChange, BomDiff, BomEntry, QuantityChange
+from silo.bom.numbers import exact_sum
 
 # Two quantities closer than this, relatively, are one: lengths pass through databases as floats.
 RELATIVE_TOLERANCE = 1e-9
@@ -69,8 +70,8 @@ def _summed(lines: Iterable[_Line]) -> dict[str, float | None]:
     total: dict[str, float | None] = {}
     for line in lines:
         if line.part_number in total:
-            before = total[line.part_number]
-            total[line.part_number] = (before or 0.0) + (line.quantity or 0.0)
+            both = exact_sum((total[line.part_number] or 0.0, line.quantity or 0.0))
+            total[line.part_number] = float(both)
         else:
             total[line.part_number] = line.quantity
     return {pn: _whole(q) for pn, q in total.items()}

@@ -29,12 +29,16 @@ from sqlalchemy.dialects.postgresql import ARRAY
 
 from silo_server.db.engine import Tx
 
+FEW = 500
+
 
 def one_of(tx: Tx, column: ColumnElement[Any], values: Collection[Any]) -> ColumnElement[bool]:
     """``column`` is one of ``values``, as one parameter however many there are."""
     listed = list(values)
     if tx.postgres:
-        return column == any_(cast(literal(listed, ARRAY(column.type)), ARRAY(column.type)))
+        array = cast(literal(listed, ARRAY(column.type)), ARRAY(column.type))
+        # Looked for one by one a long array costs its length for every row; as a set of rows it is hashed.
+        return column == any_(array) if len(listed) < FEW else column.in_(select(func.unnest(array)))
     each = func.json_each(json.dumps(listed)).table_valued("value")
     return column.in_(select(each.c.value))
 

@@ -3,7 +3,12 @@
 
 Reads see one snapshot (SQLite: a transaction of its WAL; PostgreSQL: REPEATABLE READ, read only).
 
-Writes: SQLite has one writer at a time (``BEGIN IMMEDIATE``); inside a process a lock queues them fairly,
+Nothing waits for ever. Readers and writers have connections of their own, so that reads go on while a writer
+waits for another process, a locked row or a disk. Writers queue in a turnstile and are sent away (503,
+BusyError) where too many wait or it takes too long; PostgreSQL has time-outs for locks and statements, and a
+connection whose server does not answer at all is given up by us.
+
+Writes: SQLite has one writer at a time (``BEGIN IMMEDIATE``); inside a process the turnstile queues them,
 between processes SQLite's busy time-out does. On PostgreSQL writers of one BOM queue on the parent's row, and
 two advisory locks keep the rest in order: :data:`STRUCTURE_LOCK` while edges are added (so that two merges
 cannot close a cycle together), :data:`EVENT_LOCK` from the first event to the commit (so that event ids
@@ -12,9 +17,8 @@ become visible in their order, which replay by id relies on). They are always ta
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any
@@ -26,13 +30,23 @@ from silo.bom.errors import ReadOnlyError
 from silo_server.clock import Clock, stamp, utc_now
 from silo_server.db.tables import events, server_state
 from silo_server.settings import Settings
+from silo_server.turnstile import Turnstile
 from silo_server.values import SYSTEM, Actor, NewEvent
 
 STRUCTURE_LOCK = 0x51_10_0001
 EVENT_LOCK = 0x51_10_0002
 MIGRATION_LOCK = 0x51_10_0003
+LOGIN_LOCK = 0x51_10_0004
+ADMIN_LOCK = 0x51_10_0005
 EVENT_CHANNEL = "silo_events"
-BUSY_SECONDS = 60
+# [s] For so long a writer waits: in our own queue, and then for another process or another transaction.
+WAIT_SECONDS = 10
+# [s] For so long one statement may run; far more than the largest merge needs.
+READ_SECONDS, WRITE_SECONDS = 20, 40
+CONNECT_SECONDS = 5
+WRITERS_WAITING = 64
+# Connections to PostgreSQL, per process.
+READERS, WRITERS = 10, 6
 
 
 @dataclass(frozen=True)
@@ -58,10 +72,14 @@ class Tx:
         """Announce ``new`` together with the commit, or not at all."""
         self.pending.append(new)
 
+    def lock(self, key: int) -> None:
+        """From here to the commit nobody else has this lock; SQLite's writers are alone anyhow."""
+        if self.postgres:
+            self.conn.execute(select(func.pg_advisory_xact_lock(key)))
+
     def lock_structure(self) -> None:
         """From here to the commit nobody else adds a BOM edge."""
-        if self.postgres:
-            self.conn.execute(select(func.pg_advisory_xact_lock(STRUCTURE_LOCK)))
+        self.lock(STRUCTURE_LOCK)
 
 
 class Database:
@@ -70,11 +88,20 @@ class Database:
     def __init__(self, settings: Settings, clock: Clock = utc_now) -> None:
         self.settings = settings
         self.clock = clock
-        self.engine = _engine(settings)
         self.on_events: Callable[[], None] = lambda: None
-        self._reader = self.engine.execution_options(**_reader_options(settings))
-        self._writer = self.engine.execution_options(silo_write=True)
-        self._turn: AbstractContextManager[Any] = threading.Lock() if settings.is_sqlite else nullcontext()
+        # Token id → when it was used last, until a background thread writes it down.
+        self.token_uses: dict[int, str] = {}
+        if settings.is_sqlite:
+            # ``engine`` is for those who look after the database as a whole, such as the migrations.
+            self.engine = self._reads = self._writes = _sqlite_engine(settings)
+        else:
+            self.engine = _postgres_engine(settings, 1)
+            self._reads = _postgres_engine(settings, READERS, READ_SECONDS)
+            self._writes = _postgres_engine(settings, WRITERS, WRITE_SECONDS)
+        self._reader = self._reads.execution_options(**_reader_options(settings))
+        self._writer = self._writes.execution_options(silo_write=True)
+        places = 1 if settings.is_sqlite else WRITERS
+        self._turn = Turnstile(places, WRITERS_WAITING, WAIT_SECONDS, "changes")
 
     @contextmanager
     def read(self, actor: Actor = SYSTEM) -> Iterator[Tx]:
@@ -86,9 +113,9 @@ class Database:
     def write(self, actor: Actor = SYSTEM, *, even_when_read_only: bool = False) -> Iterator[Tx]:
         """All or nothing: state, history and events are committed together.
 
-        Raises ReadOnlyError while the server takes no changes.
+        Raises ReadOnlyError while the server takes no changes, BusyError where it would wait too long.
         """
-        with self._turn, self._writer.connect() as conn, conn.begin():
+        with self._turn.enter(), self._writer.connect() as conn, conn.begin():
             tx = Tx(conn, actor, self.clock(), self.settings)
             if not even_when_read_only and mode_of(tx) != "normal":
                 raise ReadOnlyError(
@@ -102,7 +129,8 @@ class Database:
 
     def close(self) -> None:
         """Give all connections back."""
-        self.engine.dispose()
+        for engine in (self.engine, self._reads, self._writes):
+            engine.dispose()
 
 
 def mode_of(tx: Tx) -> str:
@@ -141,16 +169,42 @@ def _reader_options(settings: Settings) -> dict[str, Any]:
     return {"isolation_level": "REPEATABLE READ", "postgresql_readonly": True}
 
 
-def _engine(settings: Settings) -> Engine:
+def _postgres_engine(settings: Settings, connections: int, seconds: float | None = None) -> Engine:
+    """``seconds``: how long one statement may take, None = as long as it takes."""
+    from silo_server.db.patience import connect
+
+    arguments: dict[str, Any] = {"connect_timeout": CONNECT_SECONDS}
+    if seconds is not None:
+        milliseconds = {
+            "statement_timeout": seconds,
+            "lock_timeout": WAIT_SECONDS,
+            "idle_in_transaction_session_timeout": seconds,
+        }
+        arguments["options"] = " ".join(f"-c {k}={int(v * 1000)}" for k, v in milliseconds.items())
+    engine = create_engine(
+        settings.sqlalchemy_url,
+        pool_size=connections,
+        max_overflow=0,
+        pool_timeout=WAIT_SECONDS,
+        pool_pre_ping=True,
+        connect_args=arguments,
+    )
+    if seconds is not None:
+        # A server that is frozen keeps none of its own time-outs.
+        event.listen(engine, "do_connect", lambda _d, _r, args, named: connect(seconds + 2, *args, **named))
+    return engine
+
+
+def _sqlite_engine(settings: Settings) -> Engine:
     path = settings.sqlite_path
-    if path is None:
-        return create_engine(settings.sqlalchemy_url, pool_size=8, max_overflow=8, pool_pre_ping=True)
+    assert path is not None  # the caller asked
     path.parent.mkdir(parents=True, exist_ok=True)
     engine = create_engine(
         settings.sqlalchemy_url,
-        connect_args={"timeout": BUSY_SECONDS, "check_same_thread": False},
+        connect_args={"timeout": WAIT_SECONDS, "check_same_thread": False},
         pool_size=16,
         max_overflow=32,
+        pool_timeout=WAIT_SECONDS,
     )
     event.listen(engine, "connect", _prepare_sqlite)
     event.listen(engine, "begin", _begin_sqlite)

@@ -47,7 +47,7 @@ class TokenBody(Body):
     """``POST /api/auth/tokens``; ``expires_in_days`` null = until revoked."""
 
     name: Annotated[str, Field(min_length=1, max_length=200)]
-    expires_in_days: Annotated[float, Field(gt=0, le=3650)] | None = None
+    expires_in_days: Annotated[float, Field(gt=0, le=3650, strict=True)] | None = None
 
 
 class NewUserBody(Body):
@@ -123,7 +123,7 @@ def create_token(server: ServerDep, caller: Viewer, body: TokenBody) -> dict[str
     """Make a token of one's own role. The secret is in this answer and never again."""
     with server.db.write(caller, even_when_read_only=True) as tx:
         token, secret = credentials.create_token(tx, _user_id(caller), body.name, days=body.expires_in_days)
-    return {**_token(token), "token": secret}
+        return {**_token(token), "token": secret}
 
 
 @router.delete("/auth/tokens/{token_id}", status_code=204, responses=WRITE_ERRORS)
@@ -151,7 +151,7 @@ def create_user(server: ServerDep, caller: Admin, body: NewUserBody) -> dict[str
         user = accounts.create_user(
             tx, body.username, body.role, display_name=body.display_name, password=body.password
         )
-    return _user(user)
+        return _user(user)
 
 
 @router.put("/users/{username}", responses=WRITE_ERRORS)
@@ -159,7 +159,7 @@ def change_user(server: ServerDep, caller: Admin, username: str, body: UserChang
     """Change a user's role, name, password, or let nobody in under this name any more."""
     with server.db.write(caller, even_when_read_only=True) as tx:
         user = accounts.change_user(tx, username, **body.model_dump())
-    return _user(user)
+        return _user(user)
 
 
 @router.post("/users/{username}/login-link", status_code=201, responses=WRITE_ERRORS)
@@ -168,7 +168,7 @@ def create_login_link(server: ServerDep, caller: Admin, username: str) -> dict[s
     with server.db.write(caller, even_when_read_only=True) as tx:
         secret = logins.create_login_link(tx, username)
         audit.note(tx, "login_link.created", username)
-    return {"path": f"/login/link/{secret}"}
+        return {"path": f"/login/link/{secret}"}
 
 
 @router.get("/admin/audit", responses=READ_ERRORS)

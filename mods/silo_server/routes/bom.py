@@ -70,7 +70,7 @@ def add_line(
     values = {**body.model_dump(), "reference_designators": tuple(body.reference_designators)}
     with server.db.write(caller) as tx:
         edited = edits.add_line(tx, part_number, edits.NewLine(**values), expected)
-    return _edited(edited, 201)
+        return _edited(edited, 201)
 
 
 @router.put("/{child}", response_model=LineOut, responses=WRITE_ERRORS)
@@ -85,7 +85,7 @@ def change_line(
     """Change a line. Another quantity on an assembly line makes it a manual override."""
     with server.db.write(caller) as tx:
         edited = edits.change_line(tx, part_number, child, line_changes(body), expected)
-    return _edited(edited, 200)
+        return _edited(edited, 200)
 
 
 @router.delete("/{child}", status_code=204, responses=WRITE_ERRORS)
@@ -123,7 +123,7 @@ def get_expanded(
 ) -> Response:
     """The tree as rows, parents before children; quantities per one parent, and in total."""
     with server.db.read(caller) as tx:
-        graph = tree.load_graph(tx, get_item(tx, part_number))
+        graph = tree.load_graph(tx, get_item(tx, part_number), None if depth == tree.MAX_DEPTH else depth)
     rows = tree.expand(graph, depth, server.settings.max_expanded_rows)
     return raw_json(render_expanded(rows))
 
@@ -204,14 +204,20 @@ def get_mass(server: ServerDep, caller: Viewer, part_number: str) -> dict[str, A
     }
 
 
-@router.get("/where-used", responses=READ_ERRORS)
+@router.get("/where-used", response_model=list[dict[str, Any]], responses=READ_ERRORS)
 def get_where_used(
-    server: ServerDep, caller: Viewer, part_number: str, indirect: bool = False
-) -> list[dict[str, Any]]:
-    """The parents; with ``indirect`` theirs as well."""
+    server: ServerDep,
+    caller: Viewer,
+    part_number: str,
+    indirect: bool = False,
+    limit: Annotated[int, Query(ge=1, le=1000)] = 1000,
+    offset: Annotated[int, Query(ge=0, le=10_000_000)] = 0,
+) -> Response:
+    """The parents; with ``indirect`` theirs as well. ``X-Total-Count`` says how many there are in all."""
     with server.db.read(caller) as tx:
-        found = tree.where_used(tx, get_item(tx, part_number), indirect=indirect)
-    return [
+        item = get_item(tx, part_number)
+        found, total = tree.where_used(tx, item, indirect=indirect, limit=limit, offset=offset)
+    rows = [
         {
             "parent_part_number": usage.parent.part_number,
             "parent_id": usage.parent.uuid,
@@ -226,6 +232,7 @@ def get_where_used(
         }
         for usage in found
     ]
+    return json_answer(rows, headers={"X-Total-Count": str(total)})
 
 
 def line_changes(body: LineChangeBody) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from starlette.responses import Response
 
 from silo.api.wire import ErrorBody
 from silo.bom.errors import AuthError, ForbiddenError, RejectedError
+from silo_server.background import Probe
 from silo_server.db.engine import Database
 from silo_server.events.hub import Hub
 from silo_server.files import FileStore
@@ -52,6 +53,7 @@ class Server:
     db: Database
     hub: Hub
     files: FileStore
+    probe: Probe
 
 
 def server_of(request: Request) -> Server:
@@ -115,7 +117,11 @@ async def _check_csrf(request: Request, actor: Actor) -> None:
 
 
 def json_answer(value: Any, status: int = 200, headers: Mapping[str, str] | None = None) -> Response:
-    """``value`` as JSON, by the quick writer that pydantic brings along."""
+    """``value`` as JSON, by the quick writer that pydantic brings along.
+
+    It writes all that :mod:`silo_server.json_values` lets in. Call it before the commit: an answer that
+    cannot be written must not leave anything behind.
+    """
     return raw_json(pydantic_core.to_json(value), status, headers)
 
 

@@ -5,10 +5,20 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Query
+import anyio.to_thread
+from fastapi import APIRouter, Query, Request
 from starlette.responses import Response
 
-from silo_server.routes.context import READ_ERRORS, WRITE_ERRORS, Editor, ServerDep, Viewer, json_answer
+from silo.bom.errors import RejectedError
+from silo_server.routes.context import (
+    READ_ERRORS,
+    WRITE_ERRORS,
+    Editor,
+    ServerDep,
+    Viewer,
+    json_answer,
+    json_body,
+)
 from silo_server.routes.models import (
     ItemChangeBody,
     ItemOut,
@@ -17,6 +27,7 @@ from silo_server.routes.models import (
     NumberBody,
     NumberOut,
     Short,
+    Text,
     UuidsBody,
 )
 from silo_server.routes.render import item_to_wire
@@ -26,6 +37,15 @@ from silo_server.services.numbering import preview_number
 
 router = APIRouter(prefix="/api", tags=["items"])
 
+PATCH_BODY = {
+    "requestBody": {
+        "required": True,
+        "content": {
+            media_type: {"schema": {"type": "object"}}
+            for media_type in ("application/merge-patch+json", "application/json")
+        },
+    }
+}
 Limit = Annotated[int, Query(ge=1, le=1000)]
 Offset = Annotated[int, Query(ge=0, le=10_000_000)]
 Word = Annotated[Short, Query()]
@@ -92,7 +112,7 @@ def create_item(server: ServerDep, caller: Editor, body: NewItemBody) -> Respons
     )
     with server.db.write(caller) as tx:
         item, made = service.create_item(tx, new)
-    return json_answer(item_to_wire(item), 201 if made else 200)
+        return json_answer(item_to_wire(item), 201 if made else 200)
 
 
 @router.get("/items/by-uuid/{uuid}", response_model=ItemOut, responses=READ_ERRORS)
@@ -125,7 +145,32 @@ def change_item(server: ServerDep, caller: Editor, part_number: str, body: ItemC
     change = service.ItemChange(**body.model_dump())
     with server.db.write(caller) as tx:
         item = service.change_item(tx, part_number, change)
-    return json_answer(item_to_wire(item))
+        return json_answer(item_to_wire(item))
+
+
+@router.patch(
+    "/items/{part_number}/properties",
+    response_model=ItemOut,
+    responses=WRITE_ERRORS,
+    openapi_extra=PATCH_BODY,
+)
+async def patch_properties(
+    server: ServerDep,
+    caller: Editor,
+    part_number: str,
+    request: Request,
+    comment: Annotated[Text, Query()] = "",
+) -> Response:
+    """Change some properties by a JSON merge patch (RFC 7386): null removes one, the rest stays."""
+    patch = await json_body(request)
+    if not isinstance(patch, dict):
+        raise RejectedError("body: wanted a JSON object with the properties to change")
+
+    def work() -> Response:
+        with server.db.write(caller) as tx:
+            return json_answer(item_to_wire(service.patch_properties(tx, part_number, patch, comment)))
+
+    return await anyio.to_thread.run_sync(work)
 
 
 @router.delete("/items/{part_number}", status_code=204, responses=WRITE_ERRORS)
@@ -141,7 +186,7 @@ def unarchive_item(server: ServerDep, caller: Editor, part_number: str) -> Respo
     """Bring an archived item back."""
     with server.db.write(caller) as tx:
         item = service.unarchive_item(tx, part_number)
-    return json_answer(item_to_wire(item))
+        return json_answer(item_to_wire(item))
 
 
 @router.post("/generate-part-number", response_model=NumberOut, responses=READ_ERRORS)

@@ -3,10 +3,20 @@
 
 from __future__ import annotations
 
-import json
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    StringConstraints,
+    WithJsonSchema,
+)
+
+from silo.bom.numbers import LARGEST_QUANTITY, read_quantity
+from silo_server.services.merge_request import quantity_problem
 
 
 def _no_nul(text: str) -> str:
@@ -20,16 +30,37 @@ Text = Annotated[str, StringConstraints(max_length=10_000), AfterValidator(_no_n
 Short = Annotated[str, StringConstraints(max_length=200), AfterValidator(_no_nul)]
 
 
-def _json_numbers(value: dict[str, Any]) -> dict[str, Any]:
-    # Python reads NaN and Infinity where JSON has none; whoever reads them back could not.
-    try:
-        json.dumps(value, allow_nan=False)
-    except (ValueError, RecursionError):
-        raise ValueError("wanted JSON values, got NaN, Infinity or too deep a nesting") from None
+# What may be in it is one rule for all ways in, which the services keep (silo_server.json_values).
+Properties = dict[str, Any]
+
+
+def _amount(value: object) -> object:
+    if isinstance(value, str):
+        reading = read_quantity(value, points_are_decimal=True)
+        if reading.value is None:
+            raise ValueError(reading.problem)
+        return float(reading.value)
+    problem = quantity_problem(value)
+    if problem is not None:
+        raise ValueError(problem)
     return value
 
 
-Properties = Annotated[dict[Short, Any], AfterValidator(_json_numbers)]
+# JSON's true and false are no numbers, and 1.5 or "2" no whole one.
+Whole = Annotated[int, Field(strict=True)]
+# A quantity: a number, or text as people type it.
+Amount = Annotated[
+    float,
+    BeforeValidator(_amount),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": "number", "exclusiveMinimum": 0, "maximum": LARGEST_QUANTITY},
+                {"type": "string", "pattern": "^[1-9][0-9]{0,8}([.,][0-9]{1,2})?$"},
+            ]
+        }
+    ),
+]
 
 
 class Body(BaseModel):
@@ -192,13 +223,13 @@ class NewLineBody(Body):
     """``POST /api/items/{pn}/bom``."""
 
     child_part_number: Short
-    quantity: float = 1
+    quantity: Amount = 1
     rel_type: Short = "component"
     unit: Short | None = None
     reference_designators: list[Short] = Field(default_factory=list, max_length=10_000)
     find_number: Short | None = None
     notes: Text | None = None
-    child_revision: Annotated[int, Field(ge=0, le=1_000_000)] | None = None
+    child_revision: Annotated[Whole, Field(ge=0, le=1_000_000)] | None = None
     source: Short = "manual"
     metadata: Properties = Field(default_factory=dict)
 
@@ -206,12 +237,12 @@ class NewLineBody(Body):
 class LineChangeBody(Body):
     """``PUT /api/items/{pn}/bom/{child}``: only the keys that are there are changed; null clears."""
 
-    quantity: float | None = None
+    quantity: Amount | None = None
     rel_type: Short | None = None
     unit: Short | None = None
     reference_designators: list[Short] | None = Field(None, max_length=10_000)
     find_number: Short | None = None
     notes: Text | None = None
-    child_revision: Annotated[int, Field(ge=0, le=1_000_000)] | None = None
+    child_revision: Annotated[Whole, Field(ge=0, le=1_000_000)] | None = None
     source: Short | None = None
     metadata: Properties | None = None

@@ -23,7 +23,7 @@ from silo_server.routes.context import (
     etag_of,
     json_answer,
 )
-from silo_server.routes.models import Body, Short, Text
+from silo_server.routes.models import Body, Short, Text, Whole
 from silo_server.services import history
 from silo_server.services import review as service
 from silo_server.services.items import get_item
@@ -52,14 +52,14 @@ class ResolveBody(Body):
 class RestoreBody(Body):
     """``POST …/bom/restore``: the change whose state comes back (0 = the empty BOM)."""
 
-    change_id: Annotated[int, Field(ge=0, le=2**62)]
+    change_id: Annotated[Whole, Field(ge=0, le=2**62)]
     reason: Text | None = None
 
 
 class UndoBody(Body):
     """``POST …/bom/undo``."""
 
-    change_id: Annotated[int, Field(ge=1, le=2**62)]
+    change_id: Annotated[Whole, Field(ge=1, le=2**62)]
 
 
 @router.get("/review", responses=READ_ERRORS)
@@ -96,7 +96,7 @@ def resolve(
     decisions = [service.Decision(d.child_part_number, d.action, d.reason) for d in body.decisions]
     with server.db.write(caller) as tx:
         change_id, version = service.resolve(tx, part_number, decisions, expected)
-    return _changed(change_id, version)
+        return _changed(change_id, version)
 
 
 @router.get("/history", responses=READ_ERRORS)
@@ -192,7 +192,7 @@ def restore(
     """Bring an earlier state back, as a new change."""
     with server.db.write(caller) as tx:
         change_id, version = history.restore(tx, part_number, body.change_id, body.reason, expected)
-    return _changed(change_id, version)
+        return _changed(change_id, version)
 
 
 @router.post("/undo", responses=WRITE_ERRORS)
@@ -202,7 +202,7 @@ def undo(
     """Take one change back, as a new change; 409 where its lines changed again since."""
     with server.db.write(caller) as tx:
         change_id, version = history.undo(tx, part_number, body.change_id, expected)
-    return _changed(change_id, version)
+        return _changed(change_id, version)
 
 
 def find_point(tx: Tx, item: Item, text: str) -> int:
@@ -213,13 +213,14 @@ def find_point(tx: Tx, item: Item, text: str) -> int:
         return history.change_at(tx, item, "9999")
     try:
         when = datetime.fromisoformat(text.replace(" ", "+"))
-    except ValueError:
+        at = stamp(when) if when.tzinfo is not None else ""
+    except (ValueError, OverflowError):
         raise RejectedError(
             f"from, to: wanted a change id, a time such as 2026-02-08T22:15:00Z, or now, got {text!r}"
         ) from None
     if when.tzinfo is None:
         raise RejectedError(f"from, to: wanted a time with its zone (such as …Z), got {text!r}")
-    return history.change_at(tx, item, stamp(when))
+    return history.change_at(tx, item, at)
 
 
 def change_to_wire(change: history.Change) -> dict[str, Any]:

@@ -85,7 +85,7 @@ def add_revision(server: ServerDep, caller: Editor, part_number: str, body: Revi
     with server.db.write(caller) as tx:
         item = items.get_item(tx, part_number, lock=True)
         revision = revisions.add_revision(tx, item, comment=body.comment, properties=body.properties)
-    return json_answer(revision_to_wire(item.part_number, revision), 201)
+        return json_answer(revision_to_wire(item.part_number, revision), 201)
 
 
 @router.post(
@@ -104,7 +104,7 @@ async def upload_file(server: ServerDep, caller: Editor, part_number: str, reque
         if isinstance(raw, UploadFile) or not is_text(comment or "", 10_000):
             raise RejectedError("comment, properties: wanted texts of at most 10 000 characters")
         properties = _properties(raw)
-        revision = await anyio.to_thread.run_sync(
+        return await anyio.to_thread.run_sync(
             _store,
             server,
             caller,
@@ -114,7 +114,6 @@ async def upload_file(server: ServerDep, caller: Editor, part_number: str, reque
             properties,
             _idempotency_key(request),
         )
-    return json_answer(revision_to_wire(part_number, revision), 201)
 
 
 @router.get("/file", response_class=Response, responses={**READ_ERRORS, **BINARY})
@@ -158,16 +157,17 @@ def _store(
     comment: str,
     properties: dict[str, Any] | None,
     key: str | None,
-) -> Revision:
+) -> Response:
     with server.db.read(caller) as tx:
         items.get_item(tx, part_number)  # before anything is written to the disk
     stored = server.files.keep(file.filename or "file", file.file)
     with server.db.write(caller) as tx:
         item = items.get_item(tx, part_number, lock=True)
         merged = None if properties is None else {**item.properties, **properties}
-        return revisions.add_revision(
+        revision = revisions.add_revision(
             tx, item, comment=comment, properties=merged, file=stored, idempotency_key=key
         )
+        return json_answer(revision_to_wire(item.part_number, revision), 201)
 
 
 def _idempotency_key(request: Request) -> str | None:

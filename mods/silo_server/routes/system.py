@@ -5,20 +5,19 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-import anyio.to_thread
 from fastapi import APIRouter, Query, Request
 from pydantic import BaseModel
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.responses import Response
 
 from silo.bom.errors import RejectedError
+from silo_server.background import HEALTH_SECONDS, READY_SECONDS, State
 from silo_server.db.engine import mode_of
 from silo_server.db.state import put_state
 from silo_server.events.stream import EventStream
 from silo_server.routes.context import (
     READ_ERRORS,
     Admin,
-    Server,
     ServerDep,
     Viewer,
     find_actor,
@@ -49,22 +48,25 @@ class ModeBody(BaseModel):
 
 @router.get("/health")
 async def health(server: ServerDep) -> dict[str, Any]:
-    """The process lives; says also in which mode."""
-    mode, _ = await anyio.to_thread.run_sync(_look, server)
-    return {"status": "ok", "mode": mode}
+    """The process lives; says also in which mode. Waits for nothing that others wait for."""
+    state = await server.probe.look(HEALTH_SECONDS) or server.probe.last
+    return {"status": "ok", "mode": state.mode}
 
 
 @router.get("/ready", responses={503: {"description": "The database or the file store is not there"}})
 async def ready(server: ServerDep) -> Response:
-    """The server can do its work: 200, or 503 while the database is away."""
-    mode, database = await anyio.to_thread.run_sync(_look, server)
+    """The server can do its work: 200, or 503 while the database or the file store is away or full."""
+    state = await server.probe.look(READY_SECONDS) or State(
+        "degraded", "unreachable", server.probe.last.files
+    )
     body = {
-        "status": "ready" if database else "not ready",
-        "mode": mode,
-        "database": "ok" if database else "unreachable",
+        "status": "ready" if state.ready else "not ready",
+        "mode": state.mode,
+        "database": state.database,
+        "files": state.files,
         "sse_clients": server.hub.listeners,
     }
-    return json_answer(body, 200 if database else 503)
+    return json_answer(body, 200 if state.ready else 503)
 
 
 @router.get(
@@ -116,7 +118,7 @@ def set_mode(server: ServerDep, caller: Admin, body: ModeBody) -> dict[str, Any]
         audit.note(tx, "mode.set", body.mode)
         mode = mode_of(tx)
         events.server_state(tx, mode)
-    return {"mode": mode}
+        return {"mode": mode}
 
 
 def _event_id(text: str | None) -> int | None:
@@ -125,12 +127,3 @@ def _event_id(text: str | None) -> int | None:
     if not (text.isascii() and text.isdigit() and len(text) <= 18):
         raise RejectedError(f"Last-Event-ID: wanted a number, got {text[:40]!r}")
     return int(text)
-
-
-def _look(server: Server) -> tuple[str, bool]:
-    try:
-        with server.db.read() as tx:
-            mode = mode_of(tx)
-    except SQLAlchemyError:
-        return "degraded", False
-    return (mode if server.files.healthy() else "degraded"), True

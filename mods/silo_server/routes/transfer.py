@@ -3,12 +3,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+import os
+from collections.abc import Iterator
+from tempfile import SpooledTemporaryFile
+from typing import IO, Annotated, Any, cast
 
 import anyio.to_thread
 from fastapi import APIRouter, Query, Request
 from starlette.datastructures import UploadFile
-from starlette.responses import Response
+from starlette.responses import Response, StreamingResponse
 
 from silo.bom.errors import RejectedError
 from silo_server.routes.context import (
@@ -29,6 +32,8 @@ from silo_server.values import Item
 
 router = APIRouter(prefix="/api/items/{part_number}/bom", tags=["bom transfer"])
 
+SPOOL_BYTES = 1024 * 1024
+CHUNK = 64 * 1024
 XLSX = "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet"
 
 
@@ -58,7 +63,9 @@ def export_csv(server: ServerDep, caller: Viewer, part_number: str, view: View =
     """The BOM as CSV (RFC 4180, UTF-8); cells that would run as formulas are made text."""
     with server.db.read(caller) as tx:
         root, rows = exports.export_rows(tx, part_number, view)
-    return _file(exports.to_csv(rows), "text/csv; charset=utf-8; header=present", root, view, "csv")
+    out = _spool()
+    exports.to_csv(rows, out)
+    return _file(out, "text/csv; charset=utf-8; header=present", root, view, "csv")
 
 
 @router.get("/export.xlsx", response_class=Response, responses=_content(XLSX))
@@ -66,7 +73,9 @@ def export_xlsx(server: ServerDep, caller: Viewer, part_number: str, view: View 
     """The BOM as a workbook."""
     with server.db.read(caller) as tx:
         root, rows = exports.export_rows(tx, part_number, view)
-    return _file(exports.to_xlsx(rows, root.part_number), XLSX, root, view, "xlsx")
+    out = _spool()
+    exports.to_xlsx(rows, root.part_number, out)
+    return _file(out, XLSX, root, view, "xlsx")
 
 
 @router.get("/export.json", responses=READ_ERRORS)
@@ -93,16 +102,16 @@ async def import_csv(
     """
     data, name = await _uploaded(request)
 
-    def work() -> tuple[imports.ImportPlan, int | None]:
+    def work() -> Response:
+        records = imports.read_csv(data, server.settings.max_merge_entries)
         if dry_run:
             with server.db.read(caller) as tx:
-                return imports.plan_import(tx, part_number, data), None
+                return json_answer(plan_to_wire(imports.plan_import(tx, part_number, records), dry_run))
         with server.db.write(caller) as tx:
-            return imports.apply_import(tx, part_number, data, name, expected)
+            plan, version = imports.apply_import(tx, part_number, records, name, expected)
+            return json_answer(plan_to_wire(plan, dry_run), headers={"ETag": etag_of(version)})
 
-    plan, version = await anyio.to_thread.run_sync(work)
-    headers = {} if version is None else {"ETag": etag_of(version)}
-    return json_answer(plan_to_wire(plan, dry_run), headers=headers)
+    return await anyio.to_thread.run_sync(work)
 
 
 def plan_to_wire(plan: imports.ImportPlan, dry_run: bool) -> dict[str, Any]:
@@ -135,7 +144,20 @@ async def _uploaded(request: Request) -> tuple[bytes, str | None]:
         return await file.read(), file.filename
 
 
-def _file(data: bytes, media_type: str, root: Item, view: View, suffix: str) -> Response:
+def _spool() -> IO[bytes]:
+    # On the disk where it is large: ten exports at once must not take the memory of ten whole files.
+    return cast(IO[bytes], SpooledTemporaryFile(max_size=SPOOL_BYTES))
+
+
+def _sent(out: IO[bytes]) -> Iterator[bytes]:
+    with out:
+        while chunk := out.read(CHUNK):
+            yield chunk
+
+
+def _file(out: IO[bytes], media_type: str, root: Item, view: View, suffix: str) -> Response:
     stem = "".join(c if c.isascii() and (c.isalnum() or c in "-_.") else "_" for c in root.part_number)
     disposition = f'attachment; filename="{stem}-bom-{view.value}.{suffix}"'
-    return Response(data, media_type=media_type, headers={"Content-Disposition": disposition})
+    headers = {"Content-Disposition": disposition, "Content-Length": str(out.seek(0, os.SEEK_END))}
+    out.seek(0)
+    return StreamingResponse(_sent(out), media_type=media_type, headers=headers)

@@ -16,10 +16,13 @@ from silo_server.db.engine import Tx
 from silo_server.db.tables import sessions, users
 from silo_server.errors import DuplicateError
 from silo_server.services import audit
+from silo_server.turnstile import Turnstile
 from silo_server.values import Role
 
 MIN_PASSWORD = 10
 MAX_PASSWORD = 200
+# Each hash takes 64 MiB for as long as it takes.
+_HASHING = Turnstile(places=2, waiting=16, seconds=10, who="log-ins")
 USERNAME_FORM = re.compile(r"[A-Za-z0-9][A-Za-z0-9._@-]{0,63}")
 
 
@@ -44,7 +47,8 @@ def _hasher() -> PasswordHasher:
 @cache
 def _decoy() -> str:
     # Verified against when there is no such user, so that the answer's time does not tell.
-    return _hasher().hash("a password that nobody has")
+    with _HASHING.enter():
+        return _hasher().hash("a password that nobody has")
 
 
 def to_user(row: Row[tuple[object, ...]]) -> User:
@@ -131,17 +135,33 @@ def change_user(
     return get_user(tx, username)
 
 
-def check_password(tx: Tx, username: str, password: str) -> User | None:
-    """The user where name and password fit, else None; takes as long for an unknown name."""
+@dataclass(frozen=True, slots=True)
+class Claimed:
+    """The user that somebody says to be, with the hash of the password that would prove it."""
+
+    user: User
+    password_hash: str | None
+
+
+def claimed_user(tx: Tx, username: str) -> Claimed | None:
+    """The user of this name, to be checked with :func:`password_fits` once the transaction is over."""
     row = tx.conn.execute(select(users).where(users.c.username_key == username.casefold())).one_or_none()
-    stored = row.password_hash if row is not None and row.password_hash else _decoy()
-    try:
-        _hasher().verify(stored, password[:MAX_PASSWORD])
-    except (VerificationError, InvalidHashError):
-        return None
-    if row is None or row.password_hash is None or not row.active:
-        return None
-    return to_user(row)
+    return None if row is None else Claimed(to_user(row), row.password_hash)
+
+
+def password_fits(claimed: Claimed | None, password: str) -> bool:
+    """True where the password is that of an active user; takes as long for an unknown name.
+
+    Not to be called inside a transaction: a hash takes long, and 64 MiB. BusyError where too many wait.
+    """
+    known = claimed is not None and claimed.password_hash is not None
+    stored = claimed.password_hash if claimed is not None and claimed.password_hash else _decoy()
+    with _HASHING.enter():
+        try:
+            _hasher().verify(stored, password[:MAX_PASSWORD])
+        except (VerificationError, InvalidHashError):
+            return False
+    return known and claimed is not None and claimed.user.active
 
 
 def hash_password(password: str) -> str:
@@ -150,7 +170,8 @@ def hash_password(password: str) -> str:
         raise RejectedError(
             f"password: wanted {MIN_PASSWORD} to {MAX_PASSWORD} characters, got {len(password)}"
         )
-    return _hasher().hash(password)
+    with _HASHING.enter():
+        return _hasher().hash(password)
 
 
 def _active_admins(tx: Tx) -> int:

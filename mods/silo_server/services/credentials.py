@@ -12,6 +12,7 @@ from sqlalchemy import insert, select, update
 
 from silo.bom.errors import NotFoundError
 from silo_server.clock import stamp
+from silo_server.db.bulk import update_rows
 from silo_server.db.engine import Database, Tx
 from silo_server.db.tables import api_tokens, users
 from silo_server.services import audit
@@ -124,10 +125,21 @@ def actor_by_token(db: Database, secret: str, address: str) -> Actor | None:
     if row is None:
         return None
     if row.last_used_at is None or row.last_used_at < stale:
-        _touch(db, row.id)
+        db.token_uses[row.id] = stamp(db.clock())
     return Actor(row.username, Role(row.role), row.user_id, row.display_name, "token", address)
 
 
-def _touch(db: Database, token_id: int) -> None:
+def note_token_uses(db: Database) -> None:
+    """Write down when tokens were used last; what cannot be written now is kept for the next time.
+
+    No request waits for this, or fails with it: reading must work while nothing can be written.
+    """
+    used = dict(db.token_uses)
+    if not used:
+        return
     with db.write(even_when_read_only=True) as tx:
-        tx.conn.execute(update(api_tokens).where(api_tokens.c.id == token_id).values(last_used_at=tx.stamp))
+        rows = [{"id": token_id, "last_used_at": when} for token_id, when in sorted(used.items())]
+        update_rows(tx, api_tokens, "id", rows)
+    for token_id, when in used.items():
+        if db.token_uses.get(token_id) == when:
+            del db.token_uses[token_id]

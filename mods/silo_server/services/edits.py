@@ -11,6 +11,7 @@ from silo.bom.diff import same_quantity
 from silo.bom.errors import RejectedError
 from silo_server.db.engine import Tx
 from silo_server.errors import DuplicateError
+from silo_server.json_values import json_problem
 from silo_server.services import events
 from silo_server.services.changes import (
     ChangeKind,
@@ -149,6 +150,8 @@ def check_state(state: LineState) -> None:
         value = getattr(state, name)
         if value is not None and len(value) > limit:
             problems.append(f"{name}: wanted at most {limit} characters, got {len(value)}")
+    if state.metadata and (problem := json_problem(state.metadata)):
+        problems.append(f"metadata: {problem}")
     if problems:
         raise RejectedError("; ".join(problems), problems)
 

@@ -18,7 +18,8 @@ from silo_server.clock import wire
 from silo_server.db.engine import Tx
 from silo_server.db.state import get_state, put_state
 from silo_server.db.tables import events
-from silo_server.values import Item, NewEvent, Revision, dumps
+from silo_server.json_values import dumps
+from silo_server.values import Item, NewEvent, Revision
 
 HORIZON = "event_horizon"
 

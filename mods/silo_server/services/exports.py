@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from enum import StrEnum
-from typing import Any
+from typing import IO, Any
 
 from silo_server.clock import wire
 from silo_server.db.engine import Tx
@@ -54,38 +54,38 @@ FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "�
 Row = dict[str, Any]
 
 
-def export_rows(tx: Tx, part_number: str, view: View) -> tuple[Item, list[Row]]:
-    """The item, and its BOM's rows by column name."""
+def export_rows(tx: Tx, part_number: str, view: View) -> tuple[Item, Iterator[Row]]:
+    """The item, and its BOM's rows by column name, made one by one."""
     root = get_item(tx, part_number)
-    graph = load_graph(tx, root)
+    graph = load_graph(tx, root, 1 if view is View.SINGLE else None)
     if view is View.FLAT:
         flat = flatten(graph)
         children = by_ids(tx, {row.line.child_id for row in flat})
-        return root, [
+        return root, (
             _row(row.line, children, str(n), 1, number(row.total), number(row.total), flat=True)
             for n, row in enumerate(flat, start=1)
-        ]
+        )
     occurrences = expand(graph, 1 if view is View.SINGLE else MAX_DEPTH, tx.settings.max_expanded_rows)
     children = by_ids(tx, {o.line.child_id for o in occurrences})
     numbers = _item_numbers([o.depth for o in occurrences])
-    return root, [
+    return root, (
         _row(o.line, children, item, o.depth, number(o.line.state.quantity), number(o.total))
         for o, item in zip(occurrences, numbers, strict=True)
-    ]
+    )
 
 
-def to_csv(rows: Sequence[Row]) -> bytes:
-    """RFC 4180: commas, CRLF, quotes doubled; UTF-8."""
-    text = io.StringIO(newline="")
+def to_csv(rows: Iterable[Row], out: IO[bytes]) -> None:
+    """Write RFC 4180: commas, CRLF, quotes doubled; UTF-8."""
+    text = io.TextIOWrapper(out, "utf-8", newline="")
     writer = csv.writer(text, lineterminator="\r\n")
     writer.writerow(COLUMNS)
     for row in rows:
         writer.writerow([safe_cell(row.get(column)) for column in COLUMNS])
-    return text.getvalue().encode("utf-8")
+    text.detach()
 
 
-def to_xlsx(rows: Sequence[Row], title: str) -> bytes:
-    """A workbook with one sheet; texts are texts, whatever they begin with."""
+def to_xlsx(rows: Iterable[Row], title: str, out: IO[bytes]) -> None:
+    """Write a workbook with one sheet; texts are texts, whatever they begin with."""
     from openpyxl import Workbook
     from openpyxl.cell import WriteOnlyCell
 
@@ -102,12 +102,10 @@ def to_xlsx(rows: Sequence[Row], title: str) -> bytes:
     sheet.append([cell(column) for column in COLUMNS])
     for row in rows:
         sheet.append([cell(row.get(column)) for column in COLUMNS])
-    out = io.BytesIO()
     book.save(out)
-    return out.getvalue()
 
 
-def to_json(root: Item, view: View, rows: Sequence[Row]) -> dict[str, Any]:
+def to_json(root: Item, view: View, rows: Iterable[Row]) -> dict[str, Any]:
     """The rows under machine names."""
     names = {column: column.lower().replace(" ", "_") for column in COLUMNS}
     return {

@@ -7,7 +7,6 @@ Change 0 is the empty BOM before everything.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
@@ -17,6 +16,7 @@ from sqlalchemy import func, select
 from silo.bom.errors import ConflictError, NotFoundError
 from silo_server.db.engine import Tx
 from silo_server.db.tables import bom_change_lines, bom_changes, bom_conflicts
+from silo_server.json_values import loads
 from silo_server.services import events
 from silo_server.services.changes import (
     ChangeKind,
@@ -27,7 +27,7 @@ from silo_server.services.changes import (
     check_version,
 )
 from silo_server.services.items import by_ids, get_item
-from silo_server.services.lines import lines_of, state_from_json
+from silo_server.services.lines import lines_of, stored_state
 from silo_server.values import Item, LineState
 
 
@@ -148,8 +148,7 @@ def state_at(tx: Tx, parent: Item, change_id: int) -> list[PastLine]:
     ).all()
     children = by_ids(tx, {row.child_id for row in rows})
     return [
-        PastLine(row.line_id, children[row.child_id], row.position, state_from_json(json.loads(row.after)))
-        for row in rows
+        PastLine(row.line_id, children[row.child_id], row.position, stored_state(row.after)) for row in rows
     ]
 
 
@@ -265,7 +264,7 @@ def _changes(tx: Tx, conditions: Sequence[Any], limit: int) -> list[Change]:
             document_revision=row.document_revision,
             sync_id=row.sync_id,
             refers_to=row.refers_to,
-            decisions=json.loads(row.decisions) if row.decisions else (),
+            decisions=loads(row.decisions) if row.decisions else (),
             line_count=row.line_count,
         )
         for row in tx.conn.execute(query)
@@ -282,7 +281,7 @@ def _difference(child: Item, before: LineState | None, after: LineState | None) 
 
 
 def _state(text: str | None) -> LineState | None:
-    return None if text is None else state_from_json(json.loads(text))
+    return None if text is None else stored_state(text)
 
 
 def _state_of(line: PastLine | None) -> LineState | None:

@@ -11,12 +11,14 @@ import csv
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 from sqlalchemy import select
 
 from silo.bom.errors import RejectedError
 from silo.bom.headers import Role, find_roles, missing_columns
+from silo.bom.numbers import common_mark, parse_number, read_quantity
 from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import items
@@ -44,6 +46,12 @@ ROLES = (
 NEEDED = (Role.PART_NUMBER, Role.QUANTITY)
 HEADER_WITHIN = 40
 """The header must be among this many first lines (title blocks are a few lines long)."""
+
+
+MAX_COLUMNS = 200
+
+# (row number, field → text)
+Record = tuple[int, dict[str, str]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,10 +83,9 @@ class ImportPlan:
         return sum(row.status == status for row in self.rows)
 
 
-def plan_import(tx: Tx, part_number: str, data: bytes) -> ImportPlan:
-    """Read ``data`` and say what an import would do, row by row; changes nothing."""
+def plan_import(tx: Tx, part_number: str, records: Sequence[Record]) -> ImportPlan:
+    """Say what an import of the rows of :func:`read_csv` would do, row by row; changes nothing."""
     parent = get_item(tx, part_number)
-    records = read_csv(data, tx.settings.max_merge_entries)
     lines = {(line.child_part_number.casefold(), line.state.rel_type): line for line in lines_of(tx, parent)}
     keys = {record.get("part_number", "").casefold() for _, record in records}
     query = select(items.c.id, items.c.part_number_key, items.c.archived_at)
@@ -99,15 +106,15 @@ def plan_import(tx: Tx, part_number: str, data: bytes) -> ImportPlan:
 
 
 def apply_import(
-    tx: Tx, part_number: str, data: bytes, file_name: str | None, expected: int | None
+    tx: Tx, part_number: str, records: Sequence[Record], file_name: str | None, expected: int | None
 ) -> tuple[ImportPlan, int]:
-    """Import ``data`` as one change; RejectedError lists every problem, and then nothing was changed.
+    """Import the rows of :func:`read_csv` as one change. Returns what was done, and the BOM's version.
 
-    Returns what was done, and the BOM's version.
+    RejectedError lists every problem, and then nothing was changed.
     """
     parent = get_item(tx, part_number, lock=True)
     check_version(parent, expected)
-    plan = plan_import(tx, part_number, data)
+    plan = plan_import(tx, part_number, records)
     if plan.problems:
         raise RejectedError(
             f"{len(plan.problems)} problems in the file, so nothing was imported: {plan.problems[0]}",
@@ -129,44 +136,66 @@ def apply_import(
     return plan, version
 
 
-def read_csv(data: bytes, max_rows: int) -> list[tuple[int, dict[str, str]]]:
-    """(row number, field → text) of each row that says anything; RejectedError where this is no BOM."""
-    table, start, delimiter = _table(_decode(data))
-    if len(table) - start > max_rows + 1:
-        raise TooLargeError(f"file: this server takes at most {max_rows} rows, got {len(table) - start - 1}")
+def read_csv(data: bytes, max_rows: int) -> list[Record]:
+    """The rows that say anything; RejectedError where this is no BOM, TooLargeError beyond ``max_rows``.
+
+    Needs no database: to be called before a transaction begins, which others would wait for.
+    """
+    table, start, delimiter = _table(_decode(data), max_rows)
     at = find_roles(table[start], ROLES)
     records = []
     for number, cells in enumerate(table[start + 1 :], start=start + 2):
         record = {role.value: plain_cell(cells[i].strip()) for role, i in at.items() if i < len(cells)}
         if any(record.values()):
-            record["decimal_comma"] = "1" if delimiter != "," else ""
             records.append((number, record))
+    return _with_exact_quantities(records, points_are_decimal=delimiter == ",")
+
+
+def _with_exact_quantities(records: list[Record], *, points_are_decimal: bool) -> list[Record]:
+    """Quantities as plain numerals where they can be read; what is wrong with one stands beside it.
+
+    The whole column decides what "1,234" means; in a file separated by commas, a point is a decimal point.
+    """
+    texts = [record.get("quantity", "") for _, record in records]
+    mark = common_mark(number.mark for text in texts if (number := parse_number(text)))
+    for (_, record), text in zip(records, texts, strict=True):
+        reading = read_quantity(text, mark, points_are_decimal=points_are_decimal)
+        record["quantity"] = "" if reading.value is None else str(reading.value)
+        if reading.problem:
+            record["quantity_problem"] = reading.problem
     return records
 
 
-def _table(text: str) -> tuple[list[list[str]], int, str]:
+def _table(text: str, max_rows: int) -> tuple[list[list[str]], int, str]:
     """(cells, index of the header row, delimiter), by the delimiter with which there is a header."""
     broken: csv.Error | None = None
     near = ""
     for delimiter in (",", ";", "\t"):
+        rows = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
         try:
-            table = list(csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True))
+            table: list[list[str]] = []
+            for index, row in enumerate(islice(rows, HEADER_WITHIN)):
+                table.append(row)
+                at = find_roles(row[:MAX_COLUMNS], ROLES)
+                missing = missing_columns(row[:MAX_COLUMNS], at, NEEDED)
+                # A line with one of the two, and another cell beside it, is a header that lacks the other.
+                if missing and len(row) > 1 and set(NEEDED) & at.keys():
+                    near = near or f"file: in line {index + 1}, {missing}"
+                if not missing:
+                    table.extend(islice(rows, max_rows + 1))
+                    if len(table) - index - 1 > max_rows:
+                        raise TooLargeError(f"file: this server takes at most {max_rows} rows, got more")
+                    return table, index, delimiter
         except csv.Error as error:
             broken = error
-            continue
-        for index, row in enumerate(table[:HEADER_WITHIN]):
-            at = find_roles(row, ROLES)
-            missing = missing_columns(row, at, NEEDED)
-            if not missing:
-                return table, index, delimiter
-            # A line with one of the two, and another cell beside it, is a header that lacks the other.
-            if len(row) > 1 and set(NEEDED) & at.keys():
-                near = near or f"file: in line {index + 1}, {missing}"
     if near:
         raise RejectedError(near)
     if broken is not None:
         raise RejectedError(f"file: wanted CSV, got something that does not read as such ({broken})")
-    raise RejectedError("file: wanted a header row with 'Part number' and 'Quantity', found none")
+    raise RejectedError(
+        f"file: wanted a header row with 'Part number' and 'Quantity' among the first {HEADER_WITHIN} rows, "
+        "found none"
+    )
 
 
 def _plan_row(
@@ -205,11 +234,10 @@ def _plan_row(
 
 def _changes(record: Mapping[str, str], problems: list[str]) -> dict[str, Any]:
     changes: dict[str, Any] = {}
-    text = record.get("quantity", "")
-    try:
-        changes["quantity"] = float(text.replace(",", ".") if record.get("decimal_comma") else text)
-    except ValueError:
-        problems.append(f"Quantity: wanted a number, got {text!r}")
+    if "quantity_problem" in record:
+        problems.append(f"Quantity: {record['quantity_problem']}")
+    else:
+        changes["quantity"] = float(record["quantity"])
     for name in ("unit", "find_number", "notes"):
         if name in record:
             changes[name] = record[name] or None
@@ -219,9 +247,10 @@ def _changes(record: Mapping[str, str], problems: list[str]) -> dict[str, Any]:
         changes["reference_designators"] = tuple(record["reference_designators"].replace(",", " ").split())
     if "child_revision" in record:
         revision = record["child_revision"]
-        if revision and not (revision.isascii() and revision.isdigit() and len(revision) < 7):
-            problems.append(f"Revision: wanted a whole number, got {revision!r}")
-        changes["child_revision"] = int(revision) if revision.isdigit() else None
+        known = revision.isascii() and revision.isdigit() and len(revision) < 7
+        if revision and not known:
+            problems.append(f"Revision: wanted a whole number, got {revision[:40]!r}")
+        changes["child_revision"] = int(revision) if known else None
     return changes
 
 

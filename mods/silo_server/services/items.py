@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import uuid as uuids
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,6 +16,7 @@ from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import items
 from silo_server.errors import DuplicateError
+from silo_server.json_values import check_json, loads, merge_patch
 from silo_server.schema.catalog import ITEM_TYPES, Category, find_schema
 from silo_server.services import events, revisions
 from silo_server.services.numbering import check_number, take_number
@@ -70,7 +70,7 @@ def to_item(row: Any) -> Item:
         sourcing_type=row.sourcing_type,
         long_description=row.long_description,
         thumbnail_key=row.thumbnail_key,
-        properties=json.loads(row.properties),
+        properties=loads(row.properties),
         current_revision=row.current_revision,
         bom_version=row.bom_version,
         created_at=row.created_at,
@@ -218,6 +218,14 @@ def change_item(tx: Tx, part_number: str, change: ItemChange) -> Item:
     after = get_item(tx, number)
     events.item_updated(tx, after)
     return after
+
+
+def patch_properties(tx: Tx, part_number: str, patch: Mapping[str, Any], comment: str = "") -> Item:
+    """Change the properties that a JSON merge patch (RFC 7386) names; a new revision where one differs."""
+    check_json("properties", patch)
+    item = get_item(tx, part_number, lock=True)
+    change = ItemChange(properties=merge_patch(dict(item.properties), dict(patch)), comment=comment)
+    return change_item(tx, part_number, change)
 
 
 def archive_item(tx: Tx, part_number: str) -> None:

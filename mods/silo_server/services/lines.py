@@ -3,8 +3,7 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
@@ -16,7 +15,8 @@ from silo_server.clock import wire
 from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import bom_lines, items
-from silo_server.values import Item, Line, LineState, dumps, number
+from silo_server.json_values import MAX_DEPTH, dumps, loads
+from silo_server.values import Item, Line, LineState, number
 
 STATE_COLUMNS = (
     bom_lines.c.quantity,
@@ -82,7 +82,7 @@ def _state(
         source,
         rel_type,
         unit,
-        tuple(json.loads(reference_designators)),
+        tuple(loads(reference_designators)),
         find_number,
         notes,
         child_revision,
@@ -90,7 +90,7 @@ def _state(
         bool(override),
         cad_quantity,
         reason,
-        json.loads(metadata),
+        loads(metadata),
     )
 
 
@@ -140,9 +140,9 @@ def state_to_json(state: LineState) -> dict[str, Any]:
     return stored
 
 
-def state_from_json(stored: Mapping[str, Any]) -> LineState:
-    """The state that :func:`state_to_json` stored."""
-    values = dict(stored)
+def stored_state(text: str) -> LineState:
+    """The state that :func:`state_to_json` gave and history stored."""
+    values = dict(loads(text, MAX_DEPTH + 1))  # the metadata lie one level down
     if "reference_designators" in values:
         values["reference_designators"] = tuple(values["reference_designators"])
     return replace(LineState(values.pop("quantity"), values.pop("source")), **values)

@@ -12,7 +12,7 @@ from sqlalchemy import delete, func, insert, select
 
 from silo.bom.errors import AuthError
 from silo_server.clock import stamp
-from silo_server.db.engine import Database, Tx
+from silo_server.db.engine import LOGIN_LOCK, Database, Tx
 from silo_server.db.tables import login_failures, login_links, sessions, users
 from silo_server.errors import TooManyAttemptsError
 from silo_server.services import accounts, audit
@@ -35,16 +35,21 @@ class NewSession:
 def log_in(db: Database, username: str, password: str, address: str) -> NewSession:
     """Begin a session; AuthError where name or password is wrong, TooManyAttemptsError after too many."""
     actor = Actor(username[:64], Role.VIEWER, address=address)
-    with db.read(actor) as tx:
-        _check_rate(tx, username, address)
-        user = accounts.check_password(tx, username, password)
+    # An attempt counts as failed from the moment it is made: what comes at the same time is counted as well.
     with db.write(actor, even_when_read_only=True) as tx:
-        if user is None:
-            _note_failure(tx, username, address)
-        else:
-            audit.note(tx, "login")
-            return _begin(tx, user.id, user.username)
-    raise AuthError(WRONG)
+        tx.lock(LOGIN_LOCK)
+        _check_rate(tx, username, address)
+        attempt = _note_attempt(tx, username, address)
+        claimed = accounts.claimed_user(tx, username)
+    if not accounts.password_fits(claimed, password):
+        with db.write(actor, even_when_read_only=True) as tx:
+            audit.note(tx, "login.failed", username[:64])
+        raise AuthError(WRONG)
+    assert claimed is not None  # a password fits nobody else
+    with db.write(actor, even_when_read_only=True) as tx:
+        tx.conn.execute(delete(login_failures).where(login_failures.c.id == attempt))
+        audit.note(tx, "login")
+        return _begin(tx, claimed.user.id, claimed.user.username)
 
 
 def create_login_link(tx: Tx, username: str) -> str:
@@ -151,12 +156,12 @@ def _check_rate(tx: Tx, username: str, address: str) -> None:
             raise TooManyAttemptsError(f"too many failed logins; try again in {wait} seconds", wait)
 
 
-def _note_failure(tx: Tx, username: str, address: str) -> None:
+def _note_attempt(tx: Tx, username: str, address: str) -> int:
     old = stamp(tx.at - timedelta(seconds=tx.settings.login_window_seconds))
     tx.conn.execute(delete(login_failures).where(login_failures.c.at <= old))
-    tx.conn.execute(
-        insert(login_failures).values(
-            username_key=username.casefold()[:64], address=address[:64], at=tx.stamp
-        )
-    )
-    audit.note(tx, "login.failed", username[:64])
+    attempt: int = tx.conn.execute(
+        insert(login_failures)
+        .values(username_key=username.casefold()[:64], address=address[:64], at=tx.stamp)
+        .returning(login_failures.c.id)
+    ).scalar_one()
+    return attempt

@@ -21,6 +21,7 @@ from silo.bom.model import QuantityChange
 from silo_server.db.bulk import insert_rows, one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import bom_conflicts, bom_syncs, items
+from silo_server.json_values import dumps
 from silo_server.services import events
 from silo_server.services.changes import (
     ChangeKind,
@@ -35,7 +36,7 @@ from silo_server.services.items import get_item
 from silo_server.services.lines import lines_of
 from silo_server.services.merge_answer import answer_of, event_of
 from silo_server.services.merge_request import MergeOrder
-from silo_server.values import Item, Line, LineState, dumps
+from silo_server.values import Item, Line, LineState
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,13 +11,12 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from typing import Any, TypeGuard
 
 from silo.bom.errors import RejectedError
+from silo.bom.numbers import LARGEST_QUANTITY, as_decimal
 from silo_server.errors import TooLargeError
-
-# Keeps every product down a tree of 20 levels finite.
-MAX_QUANTITY = 1e9
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +68,8 @@ def read_merge_order(body: Any, max_entries: int) -> MergeOrder:
             entries.append(entry)
         if problem is not None:
             problems.append((index, problem))
+    if not problems:
+        problems = _sums_too_large(entries)
     return MergeOrder(entries, problems, sync_id, bool(dry_run), *document)
 
 
@@ -84,9 +85,21 @@ def quantity_problem(value: Any) -> str | None:
     if isinstance(value, bool) or not isinstance(value, int | float):
         return f"wanted a number, got {_shown(value)}"
     # A huge integer has no float; comparing it does no harm where converting it would.
-    if not 0 < value <= MAX_QUANTITY or not math.isfinite(value):
+    if not 0 < value <= LARGEST_QUANTITY or not math.isfinite(value):
         return f"wanted a number above 0 and at most 1e9, got {_shown(value)}"
     return None
+
+
+def _sums_too_large(entries: Sequence[OrderEntry]) -> list[tuple[int, str]]:
+    """A child that is named several times counts as the sum, which has the limit that one entry has."""
+    sums: dict[str, Decimal] = {}
+    problems = []
+    for entry in entries:
+        sums[entry.key] = sums.get(entry.key, Decimal(0)) + as_decimal(entry.quantity)
+        if sums[entry.key] > LARGEST_QUANTITY:
+            text = f"entries[{entry.index}].quantity: all entries of {entry.part_number!r} add up to over 1e9"
+            problems.append((entry.index, text))
+    return problems
 
 
 def _entry(index: int, raw: Any) -> tuple[OrderEntry | None, str | None]:

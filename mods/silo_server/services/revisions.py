@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -13,9 +12,10 @@ from sqlalchemy import Row, func, insert, select, update
 from silo.bom.errors import ConflictError, NotFoundError
 from silo_server.db.engine import Tx
 from silo_server.db.tables import items, revisions
+from silo_server.json_values import check_json, dumps, loads
 from silo_server.services import events
 from silo_server.services.search import index_item
-from silo_server.values import Item, Revision, dumps
+from silo_server.values import Item, Revision
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +43,8 @@ def add_revision(
 
     The caller holds the item's lock; the unique key on (item, number) guards the rest.
     """
+    if properties is not None:
+        check_json("properties", properties)
     if idempotency_key is not None:
         earlier = _by_key(tx, item, idempotency_key, file)
         if earlier is not None:
@@ -141,7 +143,7 @@ def _to_revision(row: Row[Any]) -> Revision:
         revision_number=row.revision_number,
         comment=row.comment,
         status=row.status,
-        properties=json.loads(row.properties),
+        properties=loads(row.properties),
         file_name=row.file_name,
         file_checksum=row.file_checksum,
         file_size=row.file_size,

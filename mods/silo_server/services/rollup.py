@@ -8,14 +8,15 @@ but the sub-assembly itself states ``mass_kg``, that is taken for the whole of i
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from typing import Any
 
+from silo.bom.numbers import exact_product, exact_sum, read_number
 from silo_server.db.engine import Tx
 from silo_server.services.items import by_ids
-from silo_server.services.tree import Graph, flatten, order_of
+from silo_server.services.tree import Exact, Graph, added, flatten, multiplied, order_of
 from silo_server.values import Item, Line
 
 DEFAULT_CURRENCY = "EUR"
@@ -27,7 +28,7 @@ class CostRow:
 
     part_number: str
     name: str
-    quantity: float
+    quantity: Exact
     unit: str | None
     unit_cost: float | None
     currency: str | None
@@ -49,7 +50,7 @@ class MassRow:
 
     part_number: str
     name: str
-    quantity: float
+    quantity: Exact
     unit_mass: float | None
     total: float | None
     is_assembly: bool = False
@@ -69,18 +70,19 @@ def roll_up_cost(tx: Tx, graph: Graph) -> CostRollup:
     """Flat BOM times standard cost."""
     flat = flatten(graph)
     items = by_ids(tx, {row.line.child_id for row in flat})
-    rows, totals, missing = [], dict[str, float](), []
+    rows, totals, missing = [], dict[str, Decimal](), []
     for row in flat:
         item = items[row.line.child_id]
         cost = positive_number(item.properties, "standard_cost")
         currency = str(item.properties.get("currency") or DEFAULT_CURRENCY) if cost is not None else None
-        total = cost * row.total if cost is not None else None
+        total = exact_product((cost, row.total)) if cost is not None else None
         if total is None or currency is None:
             missing.append(item.part_number)
         else:
-            totals[currency] = totals.get(currency, 0.0) + total
-        rows.append(CostRow(item.part_number, item.name, row.total, row.unit, cost, currency, total))
-    return CostRollup(rows, totals, missing)
+            totals[currency] = exact_sum((totals.get(currency, Decimal(0)), total))
+        shown = None if total is None else float(total)
+        rows.append(CostRow(item.part_number, item.name, row.total, row.unit, cost, currency, shown))
+    return CostRollup(rows, {name: float(total) for name, total in totals.items()}, missing)
 
 
 def roll_up_mass(tx: Tx, graph: Graph) -> MassRollup:
@@ -89,23 +91,23 @@ def roll_up_mass(tx: Tx, graph: Graph) -> MassRollup:
     children = {line.child_id for below in graph.lines.values() for line in below}
     items = {**by_ids(tx, children), graph.root.id: graph.root}
     stands_for_itself = _stated_assemblies(graph, order, items)
-    factors = {graph.root.id: 1.0}
-    amounts: dict[int, float] = {}
+    factors: dict[int, Exact] = {graph.root.id: 1}
+    amounts: dict[int, Exact] = {}
     lines: dict[int, Line] = {}
     for item_id in order:
         if item_id not in factors or item_id in stands_for_itself:
             continue
         for line in graph.components(item_id):
-            amount = factors[item_id] * line.state.quantity
+            amount = multiplied(factors[item_id], line)
             if graph.components(line.child_id) and line.child_id not in stands_for_itself:
-                factors[line.child_id] = factors.get(line.child_id, 0.0) + amount
+                factors[line.child_id] = added(factors.get(line.child_id, 0), amount, line)
             else:
-                amounts[line.child_id] = amounts.get(line.child_id, 0.0) + amount
+                amounts[line.child_id] = added(amounts.get(line.child_id, 0), amount, line)
                 lines.setdefault(line.child_id, line)
     rows = [_mass_row(items[i], amounts[i], i in stands_for_itself) for i in lines]
     return MassRollup(
         rows,
-        math.fsum(row.total for row in rows if row.total is not None),
+        float(exact_sum(row.total for row in rows if row.total is not None)),
         [row.part_number for row in rows if row.total is None],
         positive_number(graph.root.properties, "mass_kg"),
     )
@@ -114,13 +116,11 @@ def roll_up_mass(tx: Tx, graph: Graph) -> MassRollup:
 def positive_number(properties: Mapping[str, Any], name: str) -> float | None:
     """A property as a number of at least 0, None where it is absent or no such number."""
     value = properties.get(name)
-    if isinstance(value, bool) or not isinstance(value, int | float | str):
+    if isinstance(value, str):
+        value = read_number(value, points_are_decimal=True).value
+    if isinstance(value, bool) or not isinstance(value, int | float | Decimal):
         return None
-    try:
-        found = float(value)
-    except (ValueError, OverflowError):
-        return None
-    return found if math.isfinite(found) and 0 <= found < 1e15 else None
+    return float(value) if 0 <= value < 1e15 else None
 
 
 def _stated_assemblies(graph: Graph, order: Sequence[int], items: Mapping[int, Item]) -> set[int]:
@@ -141,7 +141,7 @@ def _stated_assemblies(graph: Graph, order: Sequence[int], items: Mapping[int, I
     return stated
 
 
-def _mass_row(item: Item, amount: float, is_assembly: bool) -> MassRow:
+def _mass_row(item: Item, amount: Exact, is_assembly: bool) -> MassRow:
     mass = positive_number(item.properties, "mass_kg")
-    total = mass * amount if mass is not None else None
+    total = float(exact_product((mass, amount))) if mass is not None else None
     return MassRow(item.part_number, item.name, amount, mass, total, is_assembly)

@@ -11,7 +11,6 @@ material, …) and the names of the uploaded files.
 
 from __future__ import annotations
 
-import json
 import re
 import unicodedata
 from collections.abc import Iterable, Iterator, Mapping
@@ -27,6 +26,7 @@ from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
 from silo_server.db.state import get_state, put_state
 from silo_server.db.tables import items, revisions
+from silo_server.json_values import loads
 
 # Counts up when the rules below change; the next start then makes the index anew.
 RULES = "1"
@@ -221,7 +221,7 @@ def _ends(word: str) -> frozenset[str]:
 
 def _limited(texts: Iterable[str], properties: str) -> set[str]:
     found: set[str] = set()
-    for written in [*texts, *_texts(json.loads(properties))]:
+    for written in [*texts, *_texts(loads(properties))]:
         words = words_of(written)
         found.update(words)
         if len(words) > 1 and len(written) <= LONGEST_WORD and any(c.isdigit() for c in written):

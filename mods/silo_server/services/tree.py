@@ -7,13 +7,16 @@ multiplied is multiplied here. Only ``component`` lines are followed.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from typing import NamedTuple
 
-from sqlalchemy import literal, select
+from sqlalchemy import ColumnElement, Select, func, literal, select
 
-from silo.bom.errors import CycleError
+from silo.bom.errors import ConflictError, CycleError
+from silo.bom.numbers import as_decimal
+from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import bom_lines, items
 from silo_server.errors import TooLargeError
@@ -22,6 +25,10 @@ from silo_server.services.lines import select_lines, to_line
 from silo_server.values import Item, Line
 
 MAX_DEPTH = 20
+# What quantities multiply and add up to, at most: exact as a JSON number, and more than anybody orders.
+MAX_TOTAL = 10**15
+# Totals are exact: counts as they are, lengths and masses as decimals.
+Exact = int | Decimal
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +49,7 @@ class Occurrence(NamedTuple):
     line: Line
     parent_part_number: str
     depth: int
-    total: float
+    total: Exact
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +58,7 @@ class FlatRow:
 
     line: Line
     unit: str | None
-    total: float
+    total: Exact
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,19 +73,29 @@ class Usage:
     depth: int
 
 
-def load_graph(tx: Tx, root: Item) -> Graph:
-    """All lines below ``root``, each once."""
-    reach = select(literal(root.id, items.c.id.type).label("item_id")).cte("reach", recursive=True)
-    reach = reach.union(select(bom_lines.c.child_id).join(reach, bom_lines.c.parent_id == reach.c.item_id))
-    query = (
-        select_lines()
-        .where(bom_lines.c.parent_id.in_(select(reach.c.item_id)))
-        .order_by(bom_lines.c.parent_id, bom_lines.c.position)
-    )
+def load_graph(tx: Tx, root: Item, depth: int | None = None) -> Graph:
+    """All lines below ``root``, each once; of the first ``depth`` levels only, where that is given."""
+    query = select_lines().order_by(bom_lines.c.parent_id, bom_lines.c.position)
+    if depth == 1:
+        query = query.where(bom_lines.c.parent_id == root.id)
+    else:
+        query = query.where(bom_lines.c.parent_id.in_(_reach(root, depth)))
     lines: dict[int, list[Line]] = {}
     for row in tx.conn.execute(query).all():
         lines.setdefault(row[1], []).append(to_line(row))
     return Graph(root, lines)
+
+
+def _reach(root: Item, depth: int | None) -> Select[tuple[int]]:
+    """The ids of the items whose lines belong to the first ``depth`` levels, or to all."""
+    first = select(literal(root.id, items.c.id.type).label("item_id"), literal(1).label("level"))
+    reach = first.cte("reach", recursive=True)
+    # Without an end the level stays 1, so that every item is visited once, and a ring ends.
+    level = reach.c.level if depth is None else reach.c.level + 1
+    below = select(bom_lines.c.child_id, level).join(reach, bom_lines.c.parent_id == reach.c.item_id)
+    if depth is not None:
+        below = below.where(reach.c.level < depth)
+    return select(reach.union(below).c.item_id)
 
 
 def expand(graph: Graph, depth: int, limit: int) -> list[Occurrence]:
@@ -86,12 +103,13 @@ def expand(graph: Graph, depth: int, limit: int) -> list[Occurrence]:
     order_of(graph)  # finds a cycle before it is walked
     rows: list[Occurrence] = []
     graph_lines = graph.lines
-    stack = [(graph.root.part_number, 1, 1.0, iter(graph_lines.get(graph.root.id, ())))]
+    one: Exact = 1
+    stack = [(graph.root.part_number, 1, one, iter(graph_lines.get(graph.root.id, ())))]
     while stack:
         parent, level, factor, lines = stack[-1]
         for line in lines:
             state = line.state
-            total = factor * state.quantity
+            total = multiplied(factor, line)
             rows.append(Occurrence(line, parent, level, total))
             below = graph_lines.get(line.child_id)
             if below and level < depth and state.rel_type == "component":
@@ -109,40 +127,87 @@ def expand(graph: Graph, depth: int, limit: int) -> list[Occurrence]:
 
 def flatten(graph: Graph) -> list[FlatRow]:
     """The leaf parts with their total quantities, in the order the tree shows them first."""
-    factors = {graph.root.id: 1.0}
-    totals: dict[tuple[int, str | None], float] = {}
+    factors: dict[int, Exact] = {graph.root.id: 1}
+    totals: dict[tuple[int, str | None], Exact] = {}
     shown: dict[tuple[int, str | None], Line] = {}
     for item_id in order_of(graph):
         for line in graph.components(item_id):
-            amount = factors[item_id] * line.state.quantity
+            amount = multiplied(factors[item_id], line)
             if graph.components(line.child_id):
-                factors[line.child_id] = factors.get(line.child_id, 0.0) + amount
+                factors[line.child_id] = added(factors.get(line.child_id, 0), amount, line)
             else:
                 key = (line.child_id, line.state.unit)
-                totals[key] = totals.get(key, 0.0) + amount
+                totals[key] = added(totals.get(key, 0), amount, line)
                 shown.setdefault(key, line)
     return [FlatRow(line, key[1], totals[key]) for key, line in shown.items()]
 
 
-def where_used(tx: Tx, item: Item, *, indirect: bool = False) -> list[Usage]:
-    """The parents of an item; with ``indirect`` also theirs, the nearest first, each line once."""
-    found: list[Usage] = []
-    seen = {item.id}
-    level, depth = [item.id], 1
-    while level and depth <= MAX_DEPTH:
-        rows = tx.conn.execute(
-            select(bom_lines).where(bom_lines.c.child_id.in_(level)).order_by(bom_lines.c.parent_id)
-        ).all()
-        parents = by_ids(tx, {row.parent_id for row in rows})
-        found.extend(
-            Usage(parents[r.parent_id], r.quantity, r.unit, r.rel_type, r.source, depth) for r in rows
+def multiplied(factor: Exact, line: Line) -> Exact:
+    """So much of the line's child for ``factor`` of its parent; ConflictError above :data:`MAX_TOTAL`."""
+    quantity = line.state.quantity
+    return _counted(factor * (int(quantity) if quantity.is_integer() else as_decimal(quantity)), line)
+
+
+def added(one: Exact, other: Exact, line: Line) -> Exact:
+    """The sum; ConflictError above :data:`MAX_TOTAL`."""
+    return _counted(one + other, line)
+
+
+def _counted(amount: Exact, line: Line) -> Exact:
+    if amount > MAX_TOTAL:
+        raise ConflictError(
+            f"the quantities above {line.child_part_number} multiply to more than {MAX_TOTAL:.0e}, which "
+            "nobody can mean; look for a wrong quantity on the way to it"
         )
-        level = [parent_id for parent_id in parents if parent_id not in seen]
+    return amount
+
+
+def where_used(
+    tx: Tx, item: Item, *, indirect: bool = False, limit: int = 1000, offset: int = 0
+) -> tuple[list[Usage], int]:
+    """A page of an item's parents, and how many there are in all.
+
+    With ``indirect`` also their parents, the nearest first, each line once; by part number in each level.
+    """
+    found: list[Usage] = []
+    total = 0
+    for depth, level in enumerate(_levels_above(tx, item, MAX_DEPTH if indirect else 1), start=1):
+        of_level = one_of(tx, bom_lines.c.child_id, level)
+        skip, room = max(0, offset - total), limit - len(found)
+        total += tx.conn.scalar(select(func.count()).select_from(bom_lines).where(of_level)) or 0
+        if room > 0 and offset < total:
+            found.extend(_uses(tx, of_level, depth, room, skip))
+    return found, total
+
+
+def _levels_above(tx: Tx, item: Item, levels: int) -> Iterator[list[int]]:
+    """The item, then what uses it, then what uses that; each item in its nearest level only."""
+    seen = {item.id}
+    level = [item.id]
+    for depth in range(1, levels + 1):
+        yield level
+        if depth == levels:
+            return
+        query = select(bom_lines.c.parent_id).where(one_of(tx, bom_lines.c.child_id, level)).distinct()
+        level = [parent_id for parent_id in tx.conn.scalars(query) if parent_id not in seen]
         seen.update(level)
-        depth += 1
-        if not indirect:
-            break
-    return sorted(found, key=lambda usage: (usage.depth, usage.parent.part_number))
+        if not level:
+            return
+
+
+def _uses(tx: Tx, of_level: ColumnElement[bool], depth: int, limit: int, offset: int) -> list[Usage]:
+    # By code point on both databases, as the list of items.
+    order = items.c.part_number_key.collate("C") if tx.postgres else items.c.part_number_key
+    rows = tx.conn.execute(
+        select(bom_lines)
+        .join(items, items.c.id == bom_lines.c.parent_id)
+        .where(of_level)
+        .order_by(order, bom_lines.c.id)
+        .limit(limit)
+        .offset(offset)
+    ).all()
+    parents = by_ids(tx, {row.parent_id for row in rows})
+    return [Usage(parents[r.parent_id], r.quantity, r.unit, r.rel_type, r.source, depth) for r in rows]
 
 
 def order_of(graph: Graph) -> list[int]:

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Request
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Request
 from starlette.datastructures import FormData
 from starlette.responses import Response
 
@@ -18,6 +20,7 @@ from silo_server.web.render import page
 router = APIRouter(include_in_schema=False)
 
 LIFETIMES = (30, 90, 365)
+TokenId = Annotated[int, Path(ge=1, le=2**62)]
 
 
 @router.get("/account")
@@ -40,7 +43,7 @@ def create_token(request: Request, server: ServerDep, caller: Reader, form: Form
 
 
 @router.post("/account/tokens/{token_id}/revoke")
-def revoke_token(server: ServerDep, caller: Reader, token_id: int, form: Form) -> Response:
+def revoke_token(server: ServerDep, caller: Reader, token_id: TokenId, form: Form) -> Response:
     """Revoke a token: one's own, or anybody's for an admin."""
     owner = None if caller.role is Role.ADMIN else _user_id(caller)
     with server.db.write(caller, even_when_read_only=True) as tx:

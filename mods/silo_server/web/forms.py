@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import AsyncIterator
 from typing import Annotated
 from urllib.parse import quote
@@ -13,6 +12,7 @@ from starlette.datastructures import FormData
 from starlette.responses import RedirectResponse, Response
 
 from silo.bom.errors import RejectedError
+from silo.bom.numbers import read_quantity
 from silo_server.web.render import NOTICE_COOKIE
 
 NOTICE_SECONDS = 60
@@ -53,15 +53,11 @@ def whole(form: FormData, name: str) -> int | None:
 
 
 def amount(form: FormData, name: str) -> float:
-    """A number as people type it, with a point or a comma; RejectedError where it is none."""
-    value = text(form, name)
-    try:
-        found = float(value.replace(",", "."))
-    except ValueError:
-        found = math.nan
-    if not math.isfinite(found):
-        raise RejectedError(f"{name}: wanted a number such as 4 or 2.5, got {value!r}")
-    return found
+    """A quantity as people type it (``silo.bom.numbers``); RejectedError says what is wrong with it."""
+    reading = read_quantity(text(form, name))
+    if reading.value is None:
+        raise RejectedError(f"{name}: {reading.problem}")
+    return float(reading.value)
 
 
 def back(path: str, notice: str = "") -> Response:

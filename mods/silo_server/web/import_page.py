@@ -66,8 +66,9 @@ def apply(request: Request, server: ServerDep, caller: Writer, part_number: str,
     """Write it; where the BOM changed since the check, check again instead."""
     upload = _carried(form)
     try:
+        records = imports.read_csv(upload.data, server.settings.max_merge_entries)
         with server.db.write(caller) as tx:
-            plan, _ = imports.apply_import(tx, part_number, upload.data, upload.name, whole(form, "version"))
+            plan, _ = imports.apply_import(tx, part_number, records, upload.name, whole(form, "version"))
     except VersionConflictError:
         problem = "The BOM was changed by somebody else since the file was checked; nothing was imported."
         return _show(request, server, caller, part_number, upload, problem, 412)
@@ -86,9 +87,10 @@ def _show(
     problem: str = "",
     status: int = 200,
 ) -> Response:
+    records = imports.read_csv(upload.data, server.settings.max_merge_entries) if upload else ()
     with server.db.read(caller) as tx:
         item = get_item(tx, part_number)
-        plan = imports.plan_import(tx, part_number, upload.data) if upload else None
+        plan = imports.plan_import(tx, part_number, records) if upload else None
     rows = plan.rows if plan else ()
     said = {row.row: changes(row.before, row.after) for row in rows if row.before and row.after}
     # What is wrong, and what would change, is worth reading; rows that are as they were are not.

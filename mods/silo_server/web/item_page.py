@@ -10,7 +10,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Request
 from starlette.responses import Response
 
-from silo.bom.errors import CycleError
+from silo.bom.errors import ConflictError
 from silo_server.db.engine import Tx
 from silo_server.errors import TooLargeError
 from silo_server.routes.context import ServerDep
@@ -25,6 +25,7 @@ router = APIRouter(include_in_schema=False)
 # A tree with more lines than this helps nobody; it is shown less deep, and the exports have all of it.
 MOST_LINES = 2000
 MOST_ROWS = 5000
+MOST_USES = 200
 
 
 @dataclass
@@ -32,7 +33,7 @@ class Node:
     """A line of the tree with what lies below it."""
 
     line: Line
-    total: float
+    total: tree.Exact
     below: list[Node] = field(default_factory=list)
 
 
@@ -43,13 +44,17 @@ def item_page(
     caller: Reader,
     part_number: str,
     view: Annotated[str, Query(max_length=10)] = "tree",
+    used_from: Annotated[int, Query(ge=0, le=10_000_000)] = 0,
 ) -> Response:
-    """The item and everything around it; ``view=flat`` shows the leaf parts with their totals."""
+    """The item and everything around it; ``view=flat`` shows the leaf parts with their totals.
+
+    ``used_from`` pages through where it is used.
+    """
     with server.db.read(caller) as tx:
         item = get_item(tx, part_number, include_archived=True)
         shown = _structure(tx, item, flat=view == "flat")
         history = revisions.list_revisions(tx, item)
-        used = tree.where_used(tx, item, indirect=True)
+        used, uses = tree.where_used(tx, item, indirect=True, limit=MOST_USES, offset=used_from)
     return page(
         request,
         "item.html",
@@ -58,6 +63,9 @@ def item_page(
         view="flat" if view == "flat" else "tree",
         revisions=history,
         used=used,
+        uses=uses,
+        used_from=used_from,
+        most_uses=MOST_USES,
         **shown,
     )
 
@@ -69,7 +77,7 @@ def _structure(tx: Tx, item: Item, *, flat: bool) -> dict[str, Any]:
         return values
     try:
         cost, mass = rollup.roll_up_cost(tx, graph), rollup.roll_up_mass(tx, graph)
-    except CycleError as error:
+    except ConflictError as error:
         return {**values, "problem": str(error)}
     values |= {"cost": cost, "mass": mass}
     if flat:

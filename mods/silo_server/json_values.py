@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""JSON that users give us (properties, a line's metadata): what is let in, how it is stored, how it is read.
+
+One guard (:func:`json_problem`) stands on every way in. What it accepts, :func:`dumps` and
+``routes.context.json_answer`` can always write. :func:`loads` reads values that were stored before there was
+a guard: what could not be sent to anybody becomes text, so that the item can be read and mended.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+from silo.bom.errors import RejectedError
+
+MAX_DEPTH = 32
+MAX_BYTES = 256 * 1024
+MAX_KEY = 200
+MAX_WHOLE = 2**63
+
+
+def dumps(value: Any) -> str:
+    """Compact JSON text, as stored and sent."""
+    return json.dumps(value, separators=(",", ":"), ensure_ascii=False)
+
+
+def loads(stored: str, deepest: int = MAX_DEPTH) -> Any:
+    """The value of JSON text from the database, always one that can be sent on.
+
+    NaN and Infinity, numbers that are too long, and what lies deeper than ``deepest`` come as text.
+    """
+    if not _suspicious(stored):
+        return json.loads(stored)
+    try:
+        value = json.loads(stored, parse_constant=str, parse_float=_float, parse_int=_whole)
+        return _cut(value, deepest)
+    except (ValueError, RecursionError):
+        return {"unreadable": stored[:1000]}
+
+
+def json_problem(value: Any) -> str | None:
+    """What is wrong with a JSON value that a user gave, None where nothing is."""
+    stack = [(value, 1)]
+    while stack:
+        part, depth = stack.pop()
+        if depth > MAX_DEPTH and isinstance(part, dict | list | tuple):
+            return f"wanted at most {MAX_DEPTH} levels of nesting, got more"
+        if isinstance(part, dict):
+            for key in part:
+                if len(key) > MAX_KEY or not _is_text(key):
+                    return f"wanted keys of at most {MAX_KEY} characters of valid text, got {key[:60]!r}"
+            stack.extend((below, depth + 1) for below in part.values())
+        elif isinstance(part, list | tuple):
+            stack.extend((below, depth + 1) for below in part)
+        elif problem := _scalar_problem(part):
+            return problem
+    size = len(dumps(value).encode())
+    if size > MAX_BYTES:
+        return f"wanted at most {MAX_BYTES // 1024} KiB of JSON, got {size // 1024} KiB"
+    return None
+
+
+def check_json(name: str, value: Any) -> None:
+    """Raise RejectedError, naming the field, unless the value may be stored."""
+    problem = json_problem(value)
+    if problem is not None:
+        raise RejectedError(f"{name}: {problem}", [f"{name}: {problem}"])
+
+
+def merge_patch(target: Any, patch: Any) -> Any:
+    """``target`` after a JSON merge patch (RFC 7386): null removes a member, objects merge.
+
+    The patch has passed the guard, which bounds how deep this goes.
+    """
+    if not isinstance(patch, dict):
+        return patch
+    merged = dict(target) if isinstance(target, dict) else {}
+    for key, value in patch.items():
+        if value is None:
+            merged.pop(key, None)
+        else:
+            merged[key] = merge_patch(merged.get(key), value)
+    return merged
+
+
+def _scalar_problem(value: Any) -> str | None:
+    if isinstance(value, str):
+        return None if _is_text(value) else "wanted text, got a character that is no valid Unicode (or NUL)"
+    if isinstance(value, float) and not math.isfinite(value):
+        return f"wanted finite numbers, got {value}"
+    if isinstance(value, int) and not -MAX_WHOLE <= value < MAX_WHOLE:
+        return "wanted whole numbers of at most 63 bits, got a longer one; send it as text"
+    return None
+
+
+def _is_text(text: str) -> bool:
+    return "\x00" not in text and (text.isascii() or not any("\ud800" <= c <= "\udfff" for c in text))
+
+
+def _suspicious(stored: str) -> bool:
+    # Cheap, and true for every text that is not plainly fine: this is asked for each row that is read.
+    return (
+        stored.count("{") + stored.count("[") > MAX_DEPTH
+        or "NaN" in stored
+        or "Infinity" in stored
+        or len(stored) > 4000  # room for a whole number that Python refuses to read
+    )
+
+
+def _float(text: str) -> float | str:
+    value = float(text)
+    return value if math.isfinite(value) else text
+
+
+def _whole(text: str) -> int | str:
+    return int(text) if len(text) < 20 else text
+
+
+def _cut(value: Any, levels: int) -> Any:
+    if levels < 1 and isinstance(value, dict | list):
+        try:
+            return dumps(value)
+        except RecursionError:
+            return "…"
+    if isinstance(value, dict):
+        return {key: _cut(below, levels - 1) for key, below in value.items()}
+    if isinstance(value, list):
+        return [_cut(below, levels - 1) for below in value]
+    return value

@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Values that nobody means, on every way in: refused with a sentence, and nobody else is harmed."""
+
+from __future__ import annotations
+
+import io
+import itertools
+import json
+import struct
+import zipfile
+from typing import Any
+from urllib.parse import quote, urlencode
+
+import pytest
+from server_testing import Api, bom, form_body
+
+from silo_server.run import RunningServer
+from silo_server.services.items import get_item
+
+DEPTHS = [33, 260, 900, 20_000]
+
+
+def nested(depth: int) -> str:
+    """A JSON object with so many levels, as text: Python's own writer gives up at a thousand."""
+    return '{"a":' * depth + "1" + "}" * depth
+
+
+HOSTILE = {
+    **{f"{depth} levels": nested(depth) for depth in DEPTHS},
+    "NaN": '{"m": NaN}',
+    "Infinity": '{"m": -Infinity}',
+    "an infinite number": '{"m": 1e999}',
+    "a long key": json.dumps({"k" * 201: 1}),
+    "a deep long key": json.dumps({"a": [{"k" * 201: 1}]}),
+    "a long whole number": '{"m": ' + "9" * 100 + "}",
+    "a whole number that Python refuses": '{"m": ' + "9" * 5000 + "}",
+    "half a surrogate pair": '{"m": "\\ud800"}',
+    "NUL": '{"m": "\\u0000"}',
+    "300 KiB": json.dumps({"m": "x" * 300 * 1024}),
+}
+WAYS = ["item", "item change", "item patch", "revision", "upload", "line", "line change"]
+
+
+def send(api: Api, way: str, text: str) -> Any:
+    """Send a JSON object as properties or metadata on one of the ways in; (answer, item it was about)."""
+    parent, child = api.items(2)
+    api.good("POST", bom(parent), {"child_part_number": child})
+    quoted = quote(parent, safe="")
+    if way == "upload":
+        form, form_headers = form_body({"file": ("x.FCStd", b"x"), "properties": text})
+        return api.call("POST", f"/api/items/{quoted}/file", body=form, headers=form_headers), parent
+    if way == "item patch":
+        body = text
+        method, path = "PATCH", f"/api/items/{quoted}/properties"
+    elif way == "item":
+        method, path, body = "POST", "/api/items", f'{{"part_number":"{parent}-2","properties":{text}}}'
+    elif way == "item change":
+        method, path, body = "PUT", f"/api/items/{quoted}", f'{{"properties":{text}}}'
+    elif way == "revision":
+        method, path, body = "POST", f"/api/items/{quoted}/revisions", f'{{"properties":{text}}}'
+    elif way == "line":
+        method, path = "POST", bom(parent)
+        body = f'{{"child_part_number":"{child}","rel_type":"reference","metadata":{text}}}'
+    else:
+        method, path, body = "PUT", bom(parent, child), f'{{"metadata":{text}}}'
+    headers = {"Content-Type": "application/json"}
+    return api.call(method, path, body=body.encode(), headers=headers), parent
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_value_that_cannot_be_served_is_refused(api: Api, way: str, name: str) -> None:
+    """400, nothing is stored, and all that lists the item works afterwards."""
+    answer, parent = send(api, way, HOSTILE[name])
+    assert answer.status == 400, (answer.status, answer.body[:300])
+    assert answer.json()["message"]
+    assert api.get(f"/api/items/{parent}")["properties"] == {}
+    assert [line["metadata"] for line in api.get(bom(parent))] == [{}]
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_what_is_let_in_is_served_as_it_was_sent(api: Api, way: str) -> None:
+    """The deepest and strangest value that the guard lets in comes back whole, everywhere."""
+    value: Any = {"k" * 200: [1, 0.1, True, None, "ü‘\u2028"], "n": 2**62}
+    for _ in range(30):
+        value = {"a": value}
+    answer, parent = send(api, way, json.dumps(value))
+    assert answer.status in (200, 201), answer.body[:300]
+    found = api.get("/api/items/search?q=" + parent)[0]
+    lines = api.get(bom(parent))
+    told = lines[-1]["metadata"] if way.startswith("line") else found["properties"]
+    if way != "item":
+        assert told == value
+    for rest in ("expanded", "flat", "history", "export.json"):
+        assert api.get(bom(parent, rest))
+
+
+def test_a_value_that_was_stored_before_the_guard_can_be_read_and_mended(
+    api: Api, server: RunningServer
+) -> None:
+    """A database of an older version may hold what is refused now: it is served as text, and replaced."""
+    from sqlalchemy import update
+
+    from silo_server.db.tables import bom_lines, items
+
+    parent, child = api.items(2)
+    api.good("POST", bom(parent), {"child_part_number": child})
+    db = server.app.state.server.db
+    for poison in (nested(300), nested(990), '{"m": NaN, "n": Infinity}', '{"m": ' + "9" * 5000 + "}"):
+        with db.write() as tx:
+            item = get_item(tx, parent)
+            tx.conn.execute(update(items).where(items.c.id == item.id).values(properties=poison))
+            tx.conn.execute(update(bom_lines).where(bom_lines.c.parent_id == item.id).values(metadata=poison))
+        shown = api.get(f"/api/items/{parent}")["properties"]
+        json.dumps(shown, allow_nan=False)
+        assert shown
+        assert api.get(bom(parent))[0]["metadata"] == shown
+        for path in ("/api/items?search=" + parent, bom(parent, "expanded"), bom(parent, "export.csv")):
+            assert api.call("GET", path).status == 200
+        page = api.call("GET", f"/items/{parent}", headers={"Accept": "text/html"})
+        assert page.status == 200
+        api.good("PUT", f"/api/items/{parent}", {"properties": {"m": 1}})
+        api.good("PUT", bom(parent, child), {"metadata": {"m": 2}})
+        assert api.get(f"/api/items/{parent}")["properties"] == {"m": 1}
+        assert api.get(bom(parent))[0]["metadata"] == {"m": 2}
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"change_id": False}, {"change_id": True}, {"change_id": "0"}, {"change_id": 0.0}, {"change_id": None}],
+)
+def test_restore_takes_a_whole_number_and_nothing_that_looks_like_one(api: Api, change: Any) -> None:
+    """``false`` is not change 0, the empty BOM."""
+    parent, child = api.items(2)
+    api.good("POST", bom(parent), {"child_part_number": child})
+    api.bad(400, "POST", bom(parent, "restore"), change)
+    assert list(api.lines(parent)) == [child]
+
+
+@pytest.mark.parametrize(
+    "moment",
+    [
+        "0001-01-01T00:00:00+14:00",
+        "9999-12-31T23:59:59-14:00",
+        "0001-01-01T00:00:00Z",
+        "2026-02-30T00:00:00Z",
+        "²",
+        "1" * 40,
+        "",
+    ],
+)
+def test_a_moment_at_the_end_of_the_calendar(api: Api, moment: str) -> None:
+    """An answer or a 400, never a fault."""
+    parent, child = api.items(2)
+    api.good("POST", bom(parent), {"child_part_number": child})
+    for name in ("from", "to"):
+        assert api.call("GET", bom(parent, "compare") + "?" + urlencode({name: moment})).status in (200, 400)
+
+
+@pytest.mark.parametrize("revision", ["²", "5" * 5000, "-1", "1.0", "٣", "1e3"])
+def test_a_revision_in_a_csv_that_is_no_number(api: Api, revision: str) -> None:
+    """Told with its row."""
+    parent, child = api.items(2)
+    text = f"Part number,Quantity,Revision\r\n{child},1,{revision}\r\n"
+    headers = {"Content-Type": "text/csv"}
+    answer = api.bad(400, "POST", bom(parent, "import"), body=text.encode(), headers=headers)
+    assert "row 2: Revision" in answer["problems"][0]
+
+
+@pytest.mark.parametrize("number", ["9" * 23, "0", "-1", "²", "1.5"])
+def test_the_number_of_a_token_that_is_none(api: Api, number: str) -> None:
+    """On the page as in the API."""
+    path = "/" + quote(number)
+    assert api.call("DELETE", "/api/auth/tokens" + path).status == 400
+    headers = {"Content-Type": "application/x-www-form-urlencoded"}
+    assert api.call("POST", f"/account/tokens{path}/revoke", body=b"", headers=headers).status in (400, 403)
+
+
+def test_quantities_that_multiply_beyond_all_sense(api: Api) -> None:
+    """A chain of a billion pieces each says so, whoever asks; single levels still show where."""
+    chain = api.items(40)
+    for above, below in itertools.pairwise(chain):
+        api.good("POST", bom(above), {"child_part_number": below, "quantity": 1e9})
+    for rest in ("flat", "cost", "mass", "expanded", "export.csv?view=flat", "export.json?view=indented"):
+        answer = api.bad(409, "GET", bom(chain[0], rest))
+        assert "multiply" in answer["message"]
+    assert api.get(bom(chain[0], "expanded?depth=1"))[0]["total_quantity"] == 1e9
+    assert api.call("GET", f"/items/{chain[0]}", headers={"Accept": "text/html"}).status == 200
+
+
+def test_thumbnails_that_are_damaged_or_bombs(api: Api) -> None:
+    """The file is kept as it is, without a picture: the picture is worth no error."""
+    number = api.item()
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_LZMA) as archive:
+        archive.writestr("thumbnails/Thumbnail.png", b"\x89PNG\r\n\x1a\n" + bytes(1000))
+    damaged = bytearray(out.getvalue())
+    start = damaged.index(b"Thumbnail.png") + len("Thumbnail.png")
+    damaged[start + 6 : start + 40] = b"\xff" * 34
+    end = b"PK\x05\x06" + struct.pack("<HHHHIIH", 0, 0, 0xFFFF, 0xFFFF, 50 * 2**20, 0, 0)
+    for content in (bytes(damaged), b"x" * 100 + end, b"PK\x05\x06", b"", b"PK\x05\x06" + bytes(21)):
+        body, headers = form_body({"file": ("x.FCStd", content)})
+        made = api.good("POST", f"/api/items/{number}/file", body=body, headers=headers)
+        assert made["thumbnail_key"] is None

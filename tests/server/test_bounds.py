@@ -1,0 +1,245 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What one caller may take of the server: memory, threads, connections, time under the write lock."""
+
+from __future__ import annotations
+
+import ast
+import itertools
+import socket
+import threading
+import uuid
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import pytest
+from server_testing import Api, bom
+
+import silo_server
+from silo.bom.errors import BusyError, RejectedError
+from silo_server.db.bulk import insert_rows
+from silo_server.db.engine import Database
+from silo_server.db.tables import bom_lines, items
+from silo_server.errors import TooLargeError
+from silo_server.run import running_server
+from silo_server.services import imports, tree
+from silo_server.services.items import NewItem, create_item, get_item
+from silo_server.services.lines import state_columns
+from silo_server.settings import Settings
+from silo_server.turnstile import Turnstile
+from silo_server.values import LineState
+
+PARENTS = 66_000  # more than PostgreSQL takes as parameters of one statement
+
+
+def used_everywhere(db: Database) -> str:
+    """A bolt with :data:`PARENTS` parents, which are all in one top assembly."""
+    with db.write() as tx:
+        bolt = create_item(tx, NewItem(part_number="BOLT", name="Bolt"))[0]
+        top = create_item(tx, NewItem(part_number="TOP", name="Top"))[0]
+        row = {
+            "item_type": "assembly",
+            "name": "n",
+            "description": "",
+            "properties": "{}",
+            "current_revision": 0,
+            "bom_version": 1,
+            "created_at": tx.stamp,
+            "created_by": "x",
+            "updated_at": tx.stamp,
+            "updated_by": "x",
+        }
+        numbers = [f"p-{n:06}" for n in range(PARENTS)]
+        made = [{**row, "uuid": str(uuid.uuid4()), "part_number": n, "part_number_key": n} for n in numbers]
+        insert_rows(tx, items, made)
+        found = tx.conn.execute(items.select().where(items.c.part_number.like("p-%"))).all()
+        state = state_columns(LineState(1.0, "assembly"))
+        pairs = [(p.id, bolt.id) for p in found] + [(top.id, p.id) for p in found]
+        insert_rows(
+            tx,
+            bom_lines,
+            [
+                {"id": str(uuid.uuid4()), "parent_id": parent, "child_id": child, "position": n, **state}
+                for n, (parent, child) in enumerate(pairs)
+            ],
+        )
+    return "BOLT"
+
+
+def test_where_used_of_a_bolt_that_is_used_everywhere(db: Database) -> None:
+    """It comes in pages, the nearest first, each use once, whatever the number of parents."""
+    number = used_everywhere(db)
+    with db.read() as tx:
+        bolt = get_item(tx, number)
+        first, total = tree.where_used(tx, bolt, indirect=True, limit=3)
+        border, _ = tree.where_used(tx, bolt, indirect=True, limit=3, offset=PARENTS - 1)
+        direct = tree.where_used(tx, bolt, limit=1)[1]
+        past, _ = tree.where_used(tx, bolt, indirect=True, limit=3, offset=2 * PARENTS)
+    assert (total, direct, past) == (2 * PARENTS, PARENTS, [])
+    assert [(use.parent.part_number, use.depth) for use in first] == [(f"p-{n:06}", 1) for n in range(3)]
+    assert [(use.parent.part_number, use.depth) for use in border] == [
+        (f"p-{PARENTS - 1:06}", 1),
+        ("TOP", 2),
+        ("TOP", 2),
+    ]
+
+
+def test_one_level_reads_one_level(db: Database) -> None:
+    """``depth`` bounds what is read, not only what is shown."""
+    with db.write() as tx:
+        chain = [create_item(tx, NewItem(part_number=f"C{n}", name="c"))[0] for n in range(6)]
+        state = state_columns(LineState(2.0, "manual"))
+        for above, below in itertools.pairwise(chain):
+            row = {"id": str(uuid.uuid4()), "parent_id": above.id, "child_id": below.id, "position": 1}
+            insert_rows(tx, bom_lines, [{**row, **state}])
+    with db.read() as tx:
+        read = {depth: tree.load_graph(tx, chain[0], depth) for depth in (1, 2, 4, None)}
+    assert {depth: len(graph.lines) for depth, graph in read.items()} == {1: 1, 2: 2, 4: 4, None: 5}
+    assert [row.total for row in tree.expand(read[4], 4, 100)] == [2, 4, 8, 16]
+
+
+def test_a_file_that_is_no_bom_is_not_read_to_its_end() -> None:
+    """The header is looked for near the top; what stands at the end of such a file does not matter."""
+    rows = b"a;b,c\td\n" * 5000
+    with pytest.raises(RejectedError, match="found none"):
+        imports.read_csv(rows + b'"never closed', 20_000)
+    with pytest.raises(TooLargeError):
+        imports.read_csv(b"Part number,Quantity\n" + b"A,1\n" * 21 + b'"never closed', 20)
+    late = b"x\n" * (imports.HEADER_WITHIN - 1) + b"Part number,Quantity\nA,1\n"
+    assert imports.read_csv(late, 20)[0][1]["part_number"] == "A"
+
+
+def test_guesses_that_come_at_once_are_all_counted(url: str, tmp_path: Path) -> None:
+    """Twenty-four wrong passwords at the same moment: five are looked at, the others are told to wait."""
+    guesses = 24
+    with running_server(url, token="silo_guess", files_dir=tmp_path) as server:
+        with Api(server.base_url, "silo_guess") as api:
+            api.good("POST", "/api/users", {"username": "ann", "password": "the right password"})
+        gate, statuses = threading.Barrier(guesses), Counter[int]()
+
+        def guess(number: int) -> None:
+            with Api(server.base_url) as api:
+                gate.wait(30)
+                body = {"username": "ann", "password": f"wrong password {number}"}
+                statuses[api.call("POST", "/api/auth/login", body).status] += 1
+
+        threads = [threading.Thread(target=guess, args=(n,)) for n in range(guesses)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join(60)
+    assert statuses[401] == 5
+    assert statuses[429] + statuses[503] == guesses - 5
+
+
+def test_a_turnstile_lets_in_so_many_and_no_more() -> None:
+    """Places, waiting room, and patience are bounded; what left makes room again."""
+    turnstile = Turnstile(places=2, waiting=1, seconds=0.05, who="tests")
+    with turnstile.enter(), turnstile.enter():
+        with pytest.raises(BusyError, match="took longer"), turnstile.enter():
+            pass
+        inside, go = threading.Event(), threading.Event()
+        patient = Turnstile(places=1, waiting=1, seconds=30, who="tests")
+
+        def wait() -> None:
+            with patient.enter():
+                inside.set()
+                go.wait(30)
+
+        first = threading.Thread(target=wait)
+        first.start()
+        inside.wait(30)
+        second = threading.Thread(target=wait)
+        second.start()
+        while not patient.full:
+            pass
+        with pytest.raises(BusyError, match="too many tests"), patient.enter():
+            pass
+        go.set()
+        first.join(30)
+        second.join(30)
+        with patient.enter():
+            pass
+    with turnstile.enter():
+        pass
+
+
+@pytest.mark.parametrize(
+    ("sent", "answered"),
+    [
+        ([b""], b""),
+        ([b"POST /api/items HTTP/1.1\r\nHost: x\r\n"], b""),
+        (
+            [
+                b"POST /api/auth/login HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\n"
+                b"Content-Length: 100\r\n\r\nhalf"
+            ],
+            b"HTTP/1.1 408",
+        ),
+        ([b"GET /health HTTP/1.1\r\nHost: x\r\n\r\n", b"GET /hea"], b"HTTP/1.1 200"),
+        ([b"POST /logout HTTP/1.1\r\nHost: x\r\nContent-Length: 9\r\n\r\nh", b"a"], b"HTTP/1.1 303"),
+    ],
+    ids=["nothing", "half a head", "half a body", "half a second request", "a body nobody read"],
+)
+def test_half_a_request_is_not_waited_for_for_ever(
+    tmp_path: Path, sent: list[bytes], answered: bytes
+) -> None:
+    """The server hangs up by itself; it says why where there was a request to answer."""
+    url = f"sqlite:///{tmp_path / 'x.db'}"
+    settings = Settings(database_url=url, request_head_seconds=0.2, request_body_seconds=0.2)
+    with running_server(url, token="silo_half", settings=settings) as server:
+        parts = urlsplit(server.base_url)
+        with socket.create_connection((parts.hostname, parts.port), timeout=30) as connection:
+            got = b""
+            for part in sent:
+                connection.sendall(part)
+                got += connection.recv(65536)
+            while chunk := connection.recv(65536):
+                got += chunk
+        assert got.startswith(answered)
+        with Api(server.base_url, "silo_half") as api:
+            assert api.item()
+
+
+def returned_late(function: ast.FunctionDef | ast.AsyncFunctionDef) -> list[str]:
+    """What a function returns after its last transaction that writes; functions inside it count alone."""
+    own = list(own_nodes(function))
+    blocks = [node for node in own if isinstance(node, ast.With) and ".write(" in ast.unparse(node.items[0])]
+    end = max((block.end_lineno or 0 for block in blocks), default=10**9)
+    returns = [node.value for node in own if isinstance(node, ast.Return) and node.lineno > end]
+    said = [ast.unparse(value) for value in returns if value is not None]
+    return [text for text in said if not text.startswith("Response(status_code=204")]
+
+
+def own_nodes(function: ast.AST) -> Iterator[ast.AST]:
+    """The nodes of a function without those of functions inside it."""
+    for node in ast.iter_child_nodes(function):
+        if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            yield node
+            yield from own_nodes(node)
+
+
+def test_every_answer_is_written_before_the_commit() -> None:
+    """An answer that cannot be written must undo the change: no route renders after its transaction."""
+    routes = Path(silo_server.__file__).parent / "routes"
+    late = {
+        f"{path.name} {node.name}": said
+        for path in routes.glob("*.py")
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and (said := returned_late(node))
+    }
+    assert late == {}
+
+
+def test_an_export_is_whole_and_says_its_length(url: str, tmp_path: Path) -> None:
+    """It is streamed from the disk; a client still knows how much is to come."""
+    with (
+        running_server(url, token="silo_export", files_dir=tmp_path) as server,
+        Api(server.base_url, "silo_export") as api,
+    ):
+        parent, child = api.items(2)
+        api.merge(parent, {child: 2})
+        for suffix in ("csv", "xlsx"):
+            answer = api.call("GET", bom(parent, f"export.{suffix}"))
+            assert int(answer.headers["content-length"]) == len(answer.body) > 100
