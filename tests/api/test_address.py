@@ -100,3 +100,28 @@ def test_this_computer_is_known() -> None:
         True,
         False,
     ]
+
+
+@pytest.mark.parametrize(
+    "spelt",
+    [
+        "https://silo.example.com",
+        "HTTPS://Silo.Example.COM:443/",
+        " https://silo.example.com.// ",
+        "https://silo.example.com/api/",
+    ],
+)
+def test_all_spellings_of_one_address_are_one(spelt: str) -> None:
+    """What waits for a server is found by its address."""
+    address = ServerAddress.parse(spelt)
+    assert (address.web_root, address.api_root) == (
+        "https://silo.example.com",
+        "https://silo.example.com/api",
+    )
+
+
+def test_what_differs_stays_different() -> None:
+    """Another port, another path, an IPv6 address."""
+    assert ServerAddress.parse("http://a:8080/Silo//api/").web_root == "http://a:8080/Silo"
+    assert ServerAddress.parse("http://[::1]:80").web_root == "http://[::1]"
+    assert ServerAddress.parse("http://[::1]:443").web_root == "http://[::1]:443"

@@ -247,3 +247,118 @@ def test_a_rejected_merge_lists_everything(server: Any, client: SiloClient, answ
         client.merge_bom("A01-0001", REQUEST)
     assert list(caught.value.problems) == problems
     assert "entries[9]" in str(caught.value)
+
+
+# -- other moods of the real server ---------------------------------------------------------------------
+
+FOUND = {"id": "11111111-1111-4111-8111-111111111111", "part_number": "F01-0001"}
+
+
+def test_an_empty_list_may_be_null(server: Any, client: SiloClient) -> None:
+    """Go's nil."""
+    for path in ("bom", "bom/expanded", "bom/flat", "bom/where-used", "revisions"):
+        server.on(f"GET /api/items/A01-0001/{path}", "null")
+    server.on("GET /api/items/search", "null")
+    server.on("POST /api/items/by-uuid", "null")
+    number = "A01-0001"
+    for empty in (
+        client.get_bom(number),
+        client.get_bom_expanded(number),
+        client.get_bom_flat(number),
+        client.where_used(number),
+        client.revisions(number),
+        client.search_items("x"),
+    ):
+        assert empty == []
+    assert client.get_items_by_uuid([FOUND["id"]]) == {}
+
+
+@pytest.mark.parametrize("status", [403, 503, 404, 405, 429])
+def test_identities_are_read_by_get_where_a_post_is_refused(
+    server: Any, client: SiloClient, answer: Any, status: int
+) -> None:
+    """To viewers, and on a read-only server; asked once."""
+    server.on("POST /api/items/by-uuid", answer(status, {"error": "no"}))
+    server.on(f"GET /api/items/by-uuid/{FOUND['id']}", FOUND)
+    for _ in range(2):
+        assert list(client.get_items_by_uuid([FOUND["id"]])) == [FOUND["id"]]
+    assert len(server.paths("POST")) == (3 if status == 429 else 1)  # a busy server is asked again first
+
+
+STRICT = [
+    (400, {"error": "bad_request", "message": 'json: unknown field "sync_id"'}),
+    (422, {"detail": [{"loc": ["body", "id"], "msg": "Extra inputs are not permitted"}]}),
+    (400, "additional properties are not allowed"),
+]
+
+
+@pytest.mark.parametrize(("status", "said"), STRICT)
+def test_a_strict_server_gets_no_extensions(
+    server: Any, client: SiloClient, answer: Any, status: int, said: Any
+) -> None:
+    """One bare repeat, and from then on bare at once."""
+    server.on("POST /api/items", answer(status, said), answer(201, FOUND))
+    merge = "POST /api/items/A01-0001/bom/merge"
+    server.on(merge, {"diff": {"added": []}})
+    client.create_item("kindred-rd", "F01", "Bolt", idempotency_key=FOUND["id"], properties={"id": 1})
+    assert server.seen[0].json()["id"] == FOUND["id"]
+    assert (server.seen[1].json(), len(server.seen)) == (
+        {
+            "schema": "kindred-rd",
+            "category": "F01",
+            "description": "Bolt",
+            "item_type": "part",
+            "properties": {"id": 1},
+        },
+        2,
+    )
+    client.merge_bom(
+        "A01-0001",
+        MergeRequest(entries=[MergeEntry(child_part_number="F01-0001", quantity=2)], sync_id="s"),
+    )
+    assert server.seen[2].json() == {"entries": [{"child_part_number": "F01-0001", "quantity": 2}]}
+
+
+def test_another_refusal_is_not_repeated(server: Any, client: SiloClient, answer: Any) -> None:
+    """The category is unknown, not the key."""
+    server.on("POST /api/items", answer(400, {"error": "bad_request", "message": "unknown category Q99"}))
+    with pytest.raises(RejectedError, match="Q99"):
+        client.create_item("kindred-rd", "Q99", "Bolt", idempotency_key=FOUND["id"])
+    assert len(server.seen) == 1
+
+
+def test_a_dry_run_never_becomes_a_merge(server: Any, client: SiloClient, answer: Any) -> None:
+    """Without its key it would be one."""
+    server.on("POST /api/items/A01-0001/bom/merge", answer(400, 'unknown field "dry_run"'))
+    with pytest.raises(RejectedError):
+        client.merge_bom("A01-0001", MergeRequest(entries=[], dry_run=True))
+    assert len(server.seen) == 1
+
+
+@pytest.mark.parametrize("body", [{"item": FOUND}, {"data": FOUND}, {"part_number": "F01-0001"}], ids=repr)
+def test_a_new_item_may_come_wrapped(server: Any, client: SiloClient, answer: Any, body: Any) -> None:
+    """Created is created."""
+    server.on("POST /api/items", answer(201, body))
+    server.on("GET /api/items/F01-0001", FOUND)
+    assert client.create_item("kindred-rd", "F01", "Bolt").id == FOUND["id"]
+
+
+@pytest.mark.parametrize(
+    "listed",
+    [[{"name": "acme"}], ["acme"], {"schemas": [{"name": "acme"}]}, {"acme": {"version": 2}}],
+    ids=repr,
+)
+def test_the_only_schema_is_taken(server: Any, client: SiloClient, listed: Any) -> None:
+    """Whatever its name; asked once."""
+    server.on("GET /api/schemas", listed)
+    assert [client.find_schema("kindred-rd") for _ in range(2)] == ["acme", "acme"]
+    assert len(server.seen) == 2
+
+
+def test_one_of_several_schemas_is_a_persons_choice(server: Any, client: SiloClient) -> None:
+    """They are named, and how to choose."""
+    server.on("GET /api/schemas", [{"name": "acme"}, {"name": "beta"}])
+    with pytest.raises(InputError, match=r"acme, beta.*--schema"):
+        client.find_schema("kindred-rd")
+    server.on("GET /api/schemas/beta", {"name": "beta"})
+    assert client.find_schema("beta") == "beta"

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import email.utils
 import logging
+import re
 import socket
 import subprocess
 import threading
@@ -263,6 +264,41 @@ def test_a_redirect_to_the_login_page_means_the_token(server: Any, client: SiloC
         client.get_item("F01-0001")
 
 
+@pytest.mark.parametrize(
+    "location",
+    ["/login?next=%2Fapi", "/users/sign_in?a=b", "/auth/oidc?x", "http://sso.example.com/login?to=x"],
+)
+def test_an_expired_session_is_a_matter_of_the_token(
+    server: Any, client: SiloClient, answer: Any, location: str
+) -> None:
+    """With a query, on the server or at a portal; for questions and changes."""
+    server.on(GET, answer(302, headers={"Location": location}))
+    server.on("POST /api/items", answer(303, headers={"Location": location}))
+    with pytest.raises(AuthError, match="wants a login"):
+        client.get_item("F01-0001")
+    with pytest.raises(AuthError, match="wants a login"):
+        client.create_item("kindred-rd", "F01", "Bolt")
+
+
+def test_a_redirect_may_have_a_query(server: Any, client: SiloClient, answer: Any) -> None:
+    """A server address has none; what a server points at may."""
+    server.on(GET, answer(307, headers={"Location": "/v2/items?number=F01-0001"}))
+    server.on("GET /v2/items", ITEM)
+    assert client.get_item("F01-0001").part_number == "F01-0001"
+    assert server.seen[1].path == "/v2/items?number=F01-0001"
+
+
+@pytest.mark.parametrize("status", [301, 307])
+def test_https_on_another_port_says_which_address_to_use(
+    server: Any, client: SiloClient, answer: Any, status: int
+) -> None:
+    """The token would be left behind, and the refusal would read like a wrong token."""
+    server.on("*", answer(status, headers={"Location": "https://127.0.0.1:8443/api/x?y"}))
+    for ask in (lambda: client.get_item("F01-0001"), lambda: client.create_item("s", "F01", "Bolt")):
+        with pytest.raises(ConfigError, match=r"set https://127\.0\.0\.1:8443 as the server address"):
+            ask()
+
+
 def test_a_redirect_to_nowhere_is_an_error_in_plain_words(
     server: Any, client: SiloClient, answer: Any
 ) -> None:
@@ -287,6 +323,36 @@ def test_a_silent_server_is_given_up(server: Any, answer: Any) -> None:
     ):
         client.create_item("kindred-rd", "F01", "Bolt")
     server.ending.set()
+
+
+def test_an_upload_may_stall_for_longer_than_a_connection_takes(tmp_path: Path) -> None:
+    """The short time-out is for connecting only."""
+    path = tmp_path / "a.FCStd"
+    path.write_bytes(b"x" * 30_000_000)  # more than the buffers on the way hold
+    stalled, left = threading.Event(), [0]
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+
+        def serve() -> None:
+            conversation, _ = listening.accept()
+            with conversation:
+                head = b""
+                while b"\r\n\r\n" not in head:
+                    head += conversation.recv(4096)
+                stalled.wait(0.5)  # a line that stalls: five times the time for connecting
+                length = re.search(rb"Content-Length: (\d+)", head)
+                left[0] = int(length[1]) - len(head.partition(b"\r\n\r\n")[2]) if length else -1
+                while left[0] > 0:
+                    left[0] -= len(conversation.recv(1 << 20))
+                said = b'{"revision_number": 1}'
+                conversation.sendall(b"HTTP/1.1 201 x\r\nContent-Length: %d\r\n\r\n" % len(said) + said)
+
+        thread = threading.Thread(target=serve, daemon=True)
+        thread.start()
+        port = listening.getsockname()[1]
+        with SiloClient(f"http://127.0.0.1:{port}", timeout=(0.1, 20)) as client:
+            assert client.upload_file("F01-0001", path).revision_number == 1
+        thread.join(20)
+    assert left == [0]
 
 
 def test_a_dripping_server_is_given_up(server: Any, answer: Any) -> None:

@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from urllib.parse import SplitResult, quote, urljoin, urlsplit, urlunsplit
 
@@ -24,7 +25,7 @@ def origin_of(url: str) -> Origin:
 
     Raises :class:`ConfigError` where it is no http(s) URL.
     """
-    parts = _split(url)
+    parts = _http(url)
     return (parts.scheme, parts.hostname or "", parts.port or _DEFAULT_PORTS[parts.scheme])
 
 
@@ -46,10 +47,14 @@ class ServerAddress:
 
     @classmethod
     def parse(cls, text: str) -> ServerAddress:
-        """Read an address as a person writes it; raises :class:`ConfigError` with what to write instead."""
+        """Read an address as a person writes it; raises :class:`ConfigError` with what to write instead.
+
+        All spellings of one address give the same: capitals in the host, the scheme's own port, slashes at
+        the end or doubled. What waits for a server is found by this form.
+        """
         parts = _split(text.strip())
-        path = parts.path.rstrip("/")
-        bare = urlunsplit((parts.scheme, parts.netloc, "", "", ""))
+        path = re.sub("/+", "/", parts.path).rstrip("/")
+        bare = urlunsplit((parts.scheme, _netloc(parts), "", "", ""))
         if not path:
             return cls(api_root=bare + "/api", web_root=bare)
         return cls(api_root=bare + path, web_root=bare + path.removesuffix("/api"))
@@ -93,7 +98,22 @@ def _segment(text: str) -> str:
     return quote(text, safe="")
 
 
+def _netloc(parts: SplitResult) -> str:
+    host = (parts.hostname or "").rstrip(".")
+    name = f"[{host}]" if ":" in host else host
+    return name if parts.port in (None, _DEFAULT_PORTS[parts.scheme]) else f"{name}:{parts.port}"
+
+
 def _split(url: str) -> SplitResult:
+    """The parts of a server address."""
+    parts = _http(url)
+    if any(ord(c) <= 32 or ord(c) == 127 for c in url) or parts.query or parts.fragment:
+        raise ConfigError(f"{url!r}: a server address has no blanks, no ? and no #; {_ADVICE}")
+    return parts
+
+
+def _http(url: str) -> SplitResult:
+    """The parts of any http(s) URL."""
     try:
         parts = urlsplit(url)
         port_is_valid = parts.port is None or parts.port > 0
@@ -106,6 +126,4 @@ def _split(url: str) -> SplitResult:
         )
     if parts.scheme not in _DEFAULT_PORTS or not parts.hostname or not port_is_valid:
         raise ConfigError(f"{url!r} is no server address; {_ADVICE}")
-    if any(ord(c) <= 32 or ord(c) == 127 for c in url) or parts.query or parts.fragment:
-        raise ConfigError(f"{url!r}: a server address has no blanks, no ? and no #; {_ADVICE}")
     return parts

@@ -99,6 +99,8 @@ class BomCalls(Caller):
                 headers=headers,
                 repeatable=bool(request.sync_id or request.dry_run),
                 cancelled=cancelled,
+                # Without "dry_run" it would be a merge.
+                extensions=() if request.dry_run else ("source", "sync_id", "document"),
             )
         except NotFoundError as error:
             raise self._what_is_missing(part_number, error) from error

@@ -11,11 +11,21 @@ from uuid import UUID
 
 from silo.api.bodies import ItemBody, ItemChanges, NumberAnswer, NumberBody, UuidsBody, body
 from silo.api.caller import LISTS, Caller, Params
-from silo.api.replies import WebPageError
+from silo.api.failures import translated
+from silo.api.replies import Reply, WebPageError
 from silo.api.schemas import categories_of, schema_names
 from silo.api.transport import Cancel, stop_if
 from silo.api.wire import Item
-from silo.bom.errors import InputError, NotFoundError, RejectedError, RouteMissingError, SiloError
+from silo.bom.errors import (
+    BusyError,
+    ForbiddenError,
+    InputError,
+    NotFoundError,
+    ReadOnlyError,
+    RejectedError,
+    RouteMissingError,
+    SiloError,
+)
 
 MAX_UUIDS = 500
 """Identities in one batch question."""
@@ -77,7 +87,8 @@ class ItemCalls(Caller):
                 repeatable=True,
                 cancelled=cancelled,
             )
-        except NotFoundError:
+        except (NotFoundError, ForbiddenError, ReadOnlyError, BusyError):
+            # Not known here, or no POST for viewers and on a read-only server: GET is allowed all the same.
             self._has_batch = False
             return None
         except RejectedError:
@@ -165,9 +176,25 @@ class ItemCalls(Caller):
         }
         headers = {"Idempotency-Key": idempotency_key} if idempotency_key else {}
         reply = self._change(
-            "POST", "a new item", "items", body=body(ItemBody, values, "an item"), headers=headers
+            "POST",
+            "a new item",
+            "items",
+            body=body(ItemBody, values, "an item"),
+            headers=headers,
+            extensions=("id", "name"),
         )
-        return reply.model(Item)
+        return self._made(reply)
+
+    def _made(self, reply: Reply) -> Item:
+        """The item of an answer to its creation, bare or wrapped; else asked for by its number."""
+        said = reply.data()
+        for wrapped in ("item", "data", "result"):
+            if isinstance(said, dict) and "id" not in said and isinstance(said.get(wrapped), dict):
+                said = said[wrapped]
+        if isinstance(said, dict) and isinstance(said.get("part_number"), str) and "id" not in said:
+            return self.get_item(said["part_number"])
+        with translated(reply.where):
+            return Item.model_validate(said)
 
     def update_item(self, part_number: str, /, **changes: Any) -> Item:
         """Change fields of an item (those of :class:`silo.api.bodies.ItemChanges`).

@@ -107,7 +107,8 @@ class Reply:
     def models(self, kind: type[Model], *keys: str) -> list[Model]:
         """The answer as a list of models: a bare list, or an object that holds it under one of ``keys``."""
         data = self.data()
-        found = data if isinstance(data, list) else _under(data, keys)
+        # Go writes null for an empty list.
+        found = [] if data is None else data if isinstance(data, list) else _under(data, keys)
         if found is None:
             raise ServerFaultError(
                 f"{self.where.asked} answered no list where one was wanted ({', '.join(keys)})"
@@ -232,7 +233,6 @@ def _under(data: Any, keys: Sequence[str]) -> list[Any] | None:
         return None
     for key in keys:
         if key in data:
-            # Go writes null for an empty list.
             return data[key] if isinstance(data[key], list) else ([] if data[key] is None else None)
     return None
 

@@ -40,6 +40,7 @@ MAX_REDIRECTS = 5
 MAX_ERROR = 1 << 20
 _CAN_UNPACK = hasattr(urllib3.HTTPResponse, "read1")
 _CHUNK = 1 << 16
+_LOGIN = frozenset(("login", "log-in", "logon", "signin", "sign-in", "sign_in", "oauth2", "sso", "saml"))
 
 
 class Cancel(Protocol):
@@ -52,7 +53,7 @@ class Cancel(Protocol):
 
 @dataclass(frozen=True)
 class Timeouts:
-    """Seconds: to connect, between two pieces of an answer, and for a whole answer."""
+    """Seconds: to connect, between two pieces of a request or an answer, and for a whole answer."""
 
     connect: float = 5.0
     read: float = 30.0
@@ -125,7 +126,7 @@ class Transport:
         self._retries = retries
         self._token = clean_token(token)
         self._verify = verify
-        self._session = session or _new_session()
+        self._session = session or _new_session(timeouts.read)
         self._max_bytes, self._clock = max_bytes, clock
 
     @property
@@ -274,9 +275,14 @@ def _check_redirect(
     call: Call, home: ServerAddress, here: Origin, there: Origin, target: str, status: int
 ) -> None:
     shown = f"{there[0]}://{urlsplit(target).netloc}"
-    path = urlsplit(target).path.rstrip("/")
-    if path.endswith("/login") and there[1] == here[1]:
-        raise AuthError(f"{home.host} wants a login; give a valid token (SILO_API_TOKEN, or the settings)")
+    if _is_login(urlsplit(target).path):
+        at = "" if there[1] == here[1] else f" at {shown}"
+        raise AuthError(
+            f"{home.host} wants a login{at}: there is no token, or it is not valid any more. "
+            "Give a valid token (SILO_API_TOKEN, or the settings)"
+        )
+    if here[0] == "http" and there[:2] == ("https", here[1]) and not may_carry_token(here, there):
+        raise ConfigError(f"{home.host} is served by https: set {shown} as the server address")
     if here[0] == "https" and there[0] == "http":
         raise ServerFaultError(f"{home.host} redirects from https to {shown}, which is not secure: refused")
     if call.writing and not (status in (307, 308) and may_carry_token(here, there)):
@@ -286,9 +292,52 @@ def _check_redirect(
         )
 
 
-def _new_session() -> requests.Session:
+def _is_login(path: str) -> bool:
+    words = path.lower().strip("/").split("/")
+    return bool(_LOGIN.intersection(words)) or words[:2] == ["auth", "oidc"]
+
+
+class _Adapter(HTTPAdapter):
+    """Connections that wait for the server as long in sending as in reading.
+
+    urllib3 leaves the time-out of connecting, which is short, on a new socket until the request is sent: an
+    upload over a line that stalls for some seconds would break.
+    """
+
+    def __init__(self, patience: float) -> None:
+        self._patience = patience
+        super().__init__(pool_connections=4, pool_maxsize=16, max_retries=0)
+
+    def init_poolmanager(self, *args: Any, **options: Any) -> None:
+        super().init_poolmanager(*args, **options)
+        self._make_patient(self.poolmanager)
+
+    def proxy_manager_for(self, *args: Any, **options: Any) -> Any:
+        return self._make_patient(super().proxy_manager_for(*args, **options))
+
+    def _make_patient(self, manager: Any) -> Any:
+        kinds = dict(manager.pool_classes_by_scheme)
+        manager.pool_classes_by_scheme = {
+            name: _patient(pool, self._patience) for name, pool in kinds.items()
+        }
+        return manager
+
+
+def _patient(pool: Any, patience: float) -> Any:
+    """The pool's class with connections that take ``patience`` once they are made."""
+
+    class Connection(pool.ConnectionCls):  # type: ignore[misc]
+        def connect(self) -> None:
+            super().connect()
+            if self.sock is not None:
+                self.sock.settimeout(patience)
+
+    return type(pool.__name__, (pool,), {"ConnectionCls": Connection})
+
+
+def _new_session(patience: float) -> requests.Session:
     session = requests.Session()
-    adapter = HTTPAdapter(pool_connections=4, pool_maxsize=16, max_retries=0)
+    adapter = _Adapter(patience)
     session.mount("http://", adapter)
     session.mount("https://", adapter)
     # The token is the only thing that says who we are; a session cookie would outlive its withdrawal.
