@@ -21,18 +21,14 @@ COMMITS = 6
 
 def commits(one: Any, doc: Any) -> None:
     """The first commit imports modules, which is done once per FreeCAD; it is told apart."""
-    from silo.workbench.commit import flow as commit_flow
+    from silo.workbench.freecad import live_desk
 
     pulse = Pulse()
     saves: list[Times] = []
     walks: list[Times] = []
-    commit_flow.LiveDocuments.save = staticmethod(pulse.timed(commit_flow.saving.save, saves))
-    one.commits._taker = commit_flow.Taker(
-        commit_flow.LiveDocuments(),
-        pulse.timed(commit_flow.take_snapshot, walks),
-        one.session.spool.hold,
-        commit_flow.new_key,
-    )
+    live_desk.LiveDocuments.save = staticmethod(pulse.timed(live_desk.saving.save, saves))
+    desk = one.commits._desk
+    desk.snapshot = pulse.timed(desk.snapshot, walks)
     told = []
     for number in range(COMMITS):
         doc.getObject("L0").ElementCount = 2 + number

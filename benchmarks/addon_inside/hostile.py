@@ -25,7 +25,6 @@ def fills(dialog: Any, pulse: Pulse) -> list[Times]:
 
 
 def story() -> None:
-    from silo.workbench.commit import flow as commit_flow
     from silo.workbench.preview.dialog import PreviewDialog
     from silo.workbench.register.dialog import RegisterDialog
 
@@ -37,17 +36,13 @@ def story() -> None:
     App.setActiveDocument(doc.Name)
     one.dock.show_and_raise()
     rest()
-    snapshots = [clocked(lambda: commit_flow.take_snapshot(doc)) for _ in range(3)]
+    snapshots = [clocked(lambda: one.commits.snapshot(doc)) for _ in range(3)]
     tell(snapshot=min(snapshots, key=lambda one: one["cpu"]))
 
     pulse = Pulse()
     walks: list[Times] = []
-    one.commits._taker = commit_flow.Taker(
-        commit_flow.LiveDocuments(),
-        pulse.timed(commit_flow.take_snapshot, walks),
-        one.session.spool.hold,
-        commit_flow.new_key,
-    )
+    desk = one.commits._desk
+    desk.snapshot = pulse.timed(desk.snapshot, walks)
     pulse.start()
     Gui.runCommand("Origin_Commit")
     spin(lambda: boxes("BOM not synced") and settled())

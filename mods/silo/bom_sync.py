@@ -146,6 +146,22 @@ def names_of(resolved: Resolved, lines: Iterable[Mapping[str, Any]] = ()) -> dic
     return names | {entry.part_number: entry.name or "" for entry in known if entry.part_number}
 
 
+def decide(resolved: Resolved, lines: Sequence[Mapping[str, Any]], *, allow_missing: bool = False) -> Outcome:
+    """What is to become of one assembly: unregistered, blocked, unchanged, or to be merged.
+
+    lines
+        the server's lines of the assembly.
+    allow_missing
+        sync although links are broken: what they stood for will read as unreferenced.
+    """
+    if resolved.assembly.part_number is None:
+        return Outcome(Status.UNREGISTERED, resolved)
+    plan, names = plan_merge(resolved.entries, lines), names_of(resolved, lines)
+    if blocking(resolved) and not allow_missing:
+        return Outcome(Status.BLOCKED, resolved, plan, names=names)
+    return Outcome(Status.MERGED if plan.news else Status.UNCHANGED, resolved, plan, names=names)
+
+
 def sync(
     resolved: Resolved,
     api: SyncApi,
@@ -159,26 +175,19 @@ def sync(
 
     sync_id
         names this attempt; the same id sent again gives the same answer and changes nothing twice.
-    allow_missing
-        sync although links are broken: what they stood for will read as unreferenced.
+    dry_run
+        compare, and send nothing.
     """
     number = resolved.assembly.part_number
-    if number is None:
-        return Outcome(Status.UNREGISTERED, resolved)
     try:
-        lines = server_lines(resolved, api)
-        names = names_of(resolved, lines)
-        plan = plan_merge(resolved.entries, lines)
-        if blocking(resolved) and not allow_missing:
-            return Outcome(Status.BLOCKED, resolved, plan, names=names)
-        if dry_run:
-            return Outcome(Status.DRY_RUN, resolved, plan, names=names)
-        if not plan.news:
-            return Outcome(Status.UNCHANGED, resolved, plan, names=names)
-        result = api.merge_bom(number, merge_request(resolved, sync_id, document))
+        outcome = decide(resolved, server_lines(resolved, api), allow_missing=allow_missing)
+        if dry_run and outcome.status in (Status.MERGED, Status.UNCHANGED):
+            return replace(outcome, status=Status.DRY_RUN)
+        if outcome.status is not Status.MERGED or number is None:
+            return outcome
+        return replace(outcome, result=api.merge_bom(number, merge_request(resolved, sync_id, document)))
     except SiloError as error:
         return Outcome(Status.FAILED, resolved, error=error)
-    return Outcome(Status.MERGED, resolved, plan, result, names=names)
 
 
 def merge_request(resolved: Resolved, sync_id: str, document: SourceDocument | None = None) -> MergeRequest:

@@ -10,10 +10,11 @@ from typing import Any
 import pytest
 
 from silo.api.arrived import MayHaveArrivedError, Sent, find_arrived
-from silo.api.outbox import Outbox, State
-from silo.api.policy import Backoff
 from silo.api.wire import Revision
 from silo.bom.errors import NotFoundError, UnreachableError
+from silo.outbox.entry import Commit, State
+from silo.outbox.send import send_all
+from silo.outbox.store import Store
 from silo.testing import FakeSilo
 
 OURS = b"our file"
@@ -93,20 +94,20 @@ def test_retry_after_a_look_sends_the_file(tmp_path: Path) -> None:
     silo, path = FakeSilo(), tmp_path / "a.FCStd"
     number = silo.create_item("kindred-rd", "M01", "Part").part_number
     path.write_bytes(OURS)
-    outbox = Outbox(tmp_path / "outbox.sqlite3", backoff=Backoff(first=0.0))
-    [entry] = outbox.add(silo.base_url, number, file=path)
+    outbox = Store(tmp_path / "outbox.sqlite3")
+    entry = outbox.add(Commit(str(path), 1.0, part_number=number, file=path))
 
     def lose(name: str) -> None:
         raise UnreachableError("the answer was lost")
 
     silo.after = lose
-    outbox.send_all(silo, force=True)
+    send_all(outbox, silo, force=True)
     silo.after = lambda _name: None
     stored = silo.items[number.casefold()]
     stored.revisions[0] = rev(1, file_key="x")
     stored.files.clear()
-    assert outbox.send_all(silo, force=True).rejected
-    assert outbox.pending()[0].state is State.REJECTED
+    assert send_all(outbox, silo, force=True).held
+    assert outbox.entries()[0].state is State.HELD
     outbox.retry(entry.id)
-    assert outbox.send_all(silo, force=True).delivered
-    assert (outbox.pending(), len(stored.revisions)) == ((), 2)
+    assert send_all(outbox, silo, force=True).sent
+    assert (outbox.entries(), len(stored.revisions)) == ((), 2)

@@ -71,7 +71,7 @@ def _told(
 
 def test_a_refused_bom_stays_with_its_reason(told: dict[str, Any]) -> None:
     """The file is in Silo; the BOM waits for a person."""
-    assert told["rejected"] == [[told["numbers"]["Gearbox"], "BOM", True]]
+    assert told["rejected"] == [[told["numbers"]["Gearbox"], False, True, "held"]]
     text = "\n".join(told["rejected_text"])
     assert "1 thing waits to be sent" in text
     assert told["numbers"]["Top"] in text
@@ -99,7 +99,7 @@ def test_discard_forgets_it_and_leaves_the_document(told: dict[str, Any]) -> Non
 def test_read_only_is_told_and_waited_out(told: dict[str, Any]) -> None:
     """Nothing is rejected for it, and nobody has to press anything."""
     assert "is read-only now. Commits wait here until it takes changes again." in told["read_only"]
-    assert [rejected for _title, _what, rejected in told["held"]] == [False] * len(told["held"])
+    assert {state for *_, state in told["held"]} == {"waiting"}
     assert told["released"].splitlines()[:2] == [
         f"BOM Updated: {told['numbers']['Other']} Other",
         "~1 qty changed",

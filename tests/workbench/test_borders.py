@@ -14,18 +14,20 @@ import pytest
 
 MODS = Path(__file__).resolve().parents[2] / "mods"
 WORKBENCH = MODS / "silo" / "workbench"
-# What runs in a worker thread, where no document and no widget may be touched.
+# What runs in a worker thread, where no document and no widget may be touched, and what runs in any test.
 WORKERS = (
+    "commit/flow",
+    "commit/plan",
+    "commit/snapshot",
     "pane/activity",
     "pane/banner",
     "pane/entries",
+    "pane/waiting",
     "preview/rows",
     "register/registering",
     "session/jobs",
     "session/online",
-    "session/sending",
     "session/session",
-    "session/spool",
     "settings/page_work",
     "settings/server",
     "settings/tokens",
@@ -60,8 +62,8 @@ def test_each_enters_through_one_file(outside: tuple[str, ...], entry: str) -> N
 
 
 @pytest.mark.parametrize("name", WORKERS)
-def test_workers_know_neither_documents_nor_widgets(name: str) -> None:
-    """They are given values, and hand values back."""
+def test_workers_and_flows_know_neither_freecad_nor_widgets(name: str) -> None:
+    """Workers are given values and hand values back; flows are given a desk."""
     forbidden = {
         "silo.workbench.freecad.host",
         "silo.workbench.gui.qt",

@@ -38,6 +38,20 @@ def may_carry_token(sender: Origin, receiver: Origin) -> bool:
     return sender == receiver or upgrade
 
 
+def canonical(url: str) -> str:
+    """One spelling for all addresses of one server: what waits for it is found again under any of them.
+
+    Text that is no address is given back as it is.
+    """
+    try:
+        address = ServerAddress.parse(url)
+        scheme, host, port = address.origin
+    except ConfigError:
+        return url.strip()
+    bare = f"[{host}]" if ":" in host else host
+    return f"{scheme}://{bare}:{port}{urlsplit(address.api_root).path}"
+
+
 @dataclass(frozen=True)
 class ServerAddress:
     """A Silo server: ``api_root`` for requests, ``web_root`` for pages and ``/ready``, without end slash."""

@@ -164,7 +164,7 @@ class SiloClient(ItemCalls, BomCalls):
         idempotency_key: str | None = None,
         cancelled: Cancel | None = None,
     ) -> Revision:
-        """Send a file as a new revision, streamed; never repeated by itself (see :mod:`silo.api.outbox`).
+        """Send a file as a new revision, streamed; never repeated by itself (see :mod:`silo.outbox`).
 
         Raises :class:`silo.bom.errors.DocumentError` for a file that cannot be read.
         """

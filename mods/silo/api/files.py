@@ -14,7 +14,7 @@ from silo.api.multipart import FileForm, Progress, upload_fields
 from silo.api.replies import error_of
 from silo.api.transport import MAX_ERROR, Call, Cancel, Transport
 from silo.api.wire import Revision
-from silo.bom.errors import DocumentError, ServerFaultError
+from silo.bom.errors import ConflictError, DocumentError
 from silo.durable import replacing
 
 MAX_DOWNLOAD = 4 << 30
@@ -55,9 +55,10 @@ def upload(
         revision = transport.send(call).model(Revision)
         stored = (revision.file_checksum or form.sha256).lower().removeprefix("sha256:")
         if stored != form.sha256:
-            raise ServerFaultError(
+            # Sending it again by itself would make a revision each time.
+            raise ConflictError(
                 f"{transport.address.host} stored another content than was sent for {subject} "
-                f"(revision {revision.revision_number}); send the file again"
+                f"(revision {revision.revision_number}); look at that revision, then send the file again"
             )
     return revision
 

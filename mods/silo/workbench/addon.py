@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from silo.workbench.freecad import host
@@ -13,12 +14,12 @@ from silo.workbench.settings.preferences import GROUP, Preferences
 from silo.workbench.words import plain, translate
 
 if TYPE_CHECKING:
+    from silo.outbox.send import Sent
     from silo.workbench.commit.flow import CommitFlow
     from silo.workbench.freecad.hooks import CommitHook
     from silo.workbench.pane.activity import Action
     from silo.workbench.preview.flow import PreviewFlow
     from silo.workbench.register.flow import RegisterFlow
-    from silo.workbench.session.sending import Sent
     from silo.workbench.session.session import Session, Shown
 
 # FreeCAD's window comes first; a server is not talked to before it stands.
@@ -28,7 +29,7 @@ TICK_MS = 20_000
 # Events may come by the hundred: the pane is drawn at most this often.
 DRAW_MS = 60
 # What a commit needs and that a worker may import.
-WITHOUT_WIDGETS = ("freecad.live", "commit.plan", "commit.decisions", "session.spool")
+WITHOUT_WIDGETS = ("freecad.live", "freecad.live_desk", "commit.flow")
 
 
 class AddOn:
@@ -45,6 +46,7 @@ class AddOn:
         self._hook: CommitHook | None = None
         self._drawn: Shown | None = None
         self._timer: Any = None
+        self._watch: Any = None
 
     # -- the session ------------------------------------------------------------------------------------
 
@@ -59,17 +61,28 @@ class AddOn:
         self.session.aside(
             "Getting ready",
             lambda _control: [import_module(f"silo.workbench.{name}") for name in WITHOUT_WIDGETS],
-            done=self._ready,
+            done=lambda _modules: None,
             failed=self._bug,
         )
         self._timer = qt.QtCore.QTimer()
         self._timer.timeout.connect(self.session.tick)
         self._timer.start(TICK_MS)
-        qt.QtCore.QCoreApplication.instance().aboutToQuit.connect(self.session.close)
+        qt.QtCore.QCoreApplication.instance().aboutToQuit.connect(self._end)
+        from silo.workbench.gui.closing import CloseWatch
+
+        self._watch = CloseWatch(host.main_window(), self._closing)
         self._find_foreign_commit()
 
-    def _ready(self, _modules: object) -> None:
-        import_module("silo.workbench.commit.flow")
+    def _closing(self) -> None:
+        """FreeCAD's window is asked to close: what was committed is saved and held before its documents
+        go."""
+        if self._commits is not None:
+            self._commits.finish()
+
+    def _end(self) -> None:
+        from silo.workbench.gui.closing import wait_for_disk
+
+        self.session.close(wait_for_disk)
 
     @property
     def session(self) -> Session:
@@ -92,8 +105,9 @@ class AddOn:
         """The commit flow; made when first needed."""
         if self._commits is None:
             from silo.workbench.commit.flow import CommitFlow
+            from silo.workbench.freecad.live_desk import LiveDesk
 
-            self._commits = CommitFlow(self.session, self.preferences)
+            self._commits = CommitFlow(self.session, self.preferences, LiveDesk())
         return self._commits
 
     @property
@@ -142,13 +156,11 @@ class AddOn:
 
     def _sent(self, sent: Sent) -> None:
         """A commit of this FreeCAD arrived."""
-        if sent.commit is None:
-            return
-        path = sent.commit.snapshot.path
+        path = sent.entry.path
         if self._previews is not None:
             self._previews.again(path)
         left = len(sent.resolved.unresolved) if sent.resolved is not None else 0
-        if left and self.preferences.flag("AskRegister") and self.commits.was_asked_for(sent.commit.key):
+        if left and self.preferences.flag("AskRegister") and self.commits.was_asked_for(sent.entry.key):
             self.register_path(path)
 
     def _bug(self, error: BaseException) -> None:
@@ -182,13 +194,12 @@ class AddOn:
     def hook_commit(self, name: str) -> None:
         """Sync the BOM after this command, which is not ours."""
         if self._hook is None:
-            from silo.workbench.commit.flow import has_identity
             from silo.workbench.freecad.hooks import CommitHook
 
             self._hook = CommitHook(
                 host,
                 ended=lambda doc: self.commits.sync_only(doc),
-                has_identity=has_identity,
+                has_identity=self.commits.has_identity,
                 later=qt.later,
             )
             host.main_window().workbenchActivated.connect(self._hook.connect)
@@ -271,11 +282,15 @@ class AddOn:
             self.show_objects(action.document, action.objects)
         elif action.do is Do.RETRY:
             if action.target:
-                self.session.retry(action.target)
+                self.session.retry(int(action.target))
             else:
                 self.session.retry_all()
+        elif action.do is Do.SEND_HERE:
+            self.session.send_here(int(number) for number in action.target.split(","))
+        elif action.do is Do.SAVE_COPY:
+            self._save_copy(int(action.target), action.document)
         elif action.do is Do.DISCARD:
-            self.session.discard(action.target)
+            self.session.discard(int(action.target))
         elif action.do is Do.STOP:
             self.session.cancel()
         elif action.do is Do.PREVIEW:
@@ -284,6 +299,12 @@ class AddOn:
             self.register_path(action.document)
         elif action.do is Do.SETTINGS:
             self.show_settings()
+
+    def _save_copy(self, entry_id: int, name: str) -> None:
+        """Ask where to, and write the file of something that waits."""
+        target = qt.ask_where_to_save(host.main_window(), translate("Silo", "Save a copy"), name)
+        if target:
+            self.session.save_copy(entry_id, Path(target))
 
     def open_page(self, url: str) -> None:
         """Open a page of the server in use; where no browser opens, the address is on the clipboard."""

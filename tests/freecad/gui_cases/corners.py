@@ -69,9 +69,8 @@ def partly_loaded(one: Any) -> None:
 def unnamed(one: Any) -> None:
     """A document that has no file: FreeCAD asks for a name; cancelled, nothing happens."""
     doc = App.newDocument("Nameless")
-    from silo.workbench.commit.dialog import refusal
-    from silo.workbench.commit.flow import LiveDocuments
-    from silo.workbench.commit.plan import plan
+    from silo.workbench.commit.plan import plan, refusal
+    from silo.workbench.freecad.live_desk import LiveDocuments
 
     tell(unnamed=refusal(plan(doc, LiveDocuments())))
     close_all()

@@ -64,7 +64,7 @@ def second_run(one: Any) -> None:
         # Nothing is opened and nothing is pressed: it goes by itself.
         wait(lambda: boxes("BOM Updated") and settled())
         wait(lambda: not one.session.shown.waiting)
-    tell(boxes=boxes("BOM Updated"), waiting=[w.title for w in one.session.shown.waiting])
+    tell(boxes=boxes("BOM Updated"), waiting=[w.label for w in one.session.shown.waiting])
 
 
 def story() -> None:

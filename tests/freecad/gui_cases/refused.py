@@ -35,13 +35,17 @@ def commit(doc: Any) -> None:
 
 
 def waiting(one: Any) -> list[Any]:
-    return [[w.title, w.what, w.rejected] for w in one.session.shown.waiting]
+    return [[w.part_number, w.file_left, w.bom_left, w.state.value] for w in one.session.shown.waiting]
+
+
+def held(one: Any) -> bool:
+    return any(w.state.value == "held" for w in one.session.shown.waiting)
 
 
 def refused(one: Any, gearbox: Any, other: Any) -> None:
     """The server knows the top below the gearbox, so the gearbox in the top would be a ring."""
     commit(gearbox.Document)
-    wait(lambda: any(w.rejected for w in one.session.shown.waiting) and settled())
+    wait(lambda: held(one) and settled())
     tell(rejected=waiting(one))
     wait(lambda: "Retry" in button_texts(one.dock))
     tell(rejected_text=labels(one.dock))
@@ -53,8 +57,8 @@ def refused(one: Any, gearbox: Any, other: Any) -> None:
 
     # Tried again too early: it stays. Mended on the server: it goes.
     press_soon(one.dock, "Retry")
-    wait(lambda: not any(w.rejected for w in one.session.shown.waiting))
-    wait(lambda: settled() and any(w.rejected for w in one.session.shown.waiting))
+    wait(lambda: not held(one))
+    wait(lambda: settled() and held(one))
     ask("mend")
     press_soon(one.dock, "Retry")
     wait(lambda: settled() and not waiting(one))
@@ -64,7 +68,7 @@ def refused(one: Any, gearbox: Any, other: Any) -> None:
 def discarded(one: Any, frame: Any) -> None:
     """Another one is refused; this time the person gives it up."""
     commit(frame.Document)
-    wait(lambda: any(w.rejected for w in one.session.shown.waiting) and settled())
+    wait(lambda: held(one) and settled())
     press_soon(one.dock, "Discard")
     wait(lambda: settled() and not waiting(one))
     tell(discarded=True, instances=len(frame.Group))

@@ -106,7 +106,7 @@ def story() -> None:
     commit(docs["top"], "offline")
     wait(lambda: len(one.session.shown.waiting) >= 2 and settled())
     wait(lambda: any("waits to be sent" in t or "wait to be sent" in t for t in labels(one.dock)))
-    tell(offline=labels(one.dock), waiting=[w.title for w in one.session.shown.waiting])
+    tell(offline=labels(one.dock), waiting=[w.label for w in one.session.shown.waiting])
     before = len(boxes("BOM Updated: " + numbers["Top"]))
     ask("server up")
     press(one.dock, "Try again")

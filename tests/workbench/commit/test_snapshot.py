@@ -3,16 +3,13 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import pytest
 from fakes import Doc, edit
 
-from silo.bom.errors import InputError
-from silo.bom.findings import Finding, FindingCode, Place, Severity
-from silo.bom.model import BomEntry, Extraction
-from silo.workbench.commit.snapshot import Snapshot, from_json, part_identity, take, to_json
+from silo.bom.findings import FindingCode
+from silo.workbench.commit.snapshot import Snapshot, part_identity, take
 
 
 def gearbox() -> tuple[Doc, Doc, Doc]:
@@ -122,49 +119,3 @@ def test_identity_of_the_only_marked_object() -> None:
     assert part_identity(doc) == "i"
     edit(other, SiloItemId="j")
     assert part_identity(doc) is None
-
-
-def test_json_and_back() -> None:
-    """A snapshot that waited on disk is the one that was taken."""
-    taken = take(gearbox()[0])
-    again = from_json(json.loads(json.dumps(to_json(taken))))
-    assert again == taken
-    assert again.extraction is not None
-    assert taken.extraction is not None
-    # These do not take part in equality, and are needed all the same.
-    assert again.extraction.entries[0].instances == taken.extraction.entries[0].instances
-    assert again.extraction.entries[0].label == taken.extraction.entries[0].label
-
-
-def test_shared_sub_assemblies_are_written_once() -> None:
-    """Twenty levels of pairs are a million instances and twenty nodes."""
-    entry = BomEntry("/v/0.FCStd", object_name="O")
-    for level in range(1, 21):
-        left = BomEntry(f"/v/{level}.FCStd", object_name="L", children=(entry,), is_assembly=True)
-        entry = BomEntry(f"/v/{level}.FCStd", object_name="R", children=(left, left), is_assembly=True)
-    finding = Finding(FindingCode.MIRRORED, Severity.WARNING, "m", (Place("/v/0.FCStd", "O"),))
-    taken = Snapshot("/v/t", "t", "id", Extraction(BomEntry("/v/t"), (entry,), (finding,)))
-    data = to_json(taken)
-    assert len(data["bom"]["table"]) == 42
-    again = from_json(data)
-    assert again.extraction is not None
-    assert again.extraction.findings == (finding,)
-
-
-@pytest.mark.parametrize(
-    "damage",
-    [
-        lambda data: data.pop("path"),
-        lambda data: data["bom"]["table"][0].update(children=[5]),
-        lambda data: data["bom"].update(entries=["x"]),
-        lambda data: data["bom"].update(findings=[{"code": "no such code"}]),
-        lambda data: data.update(format=99),
-        lambda data: data.update(bom=[]),
-    ],
-)
-def test_a_damaged_snapshot_is_told(damage: Any) -> None:
-    """Never half a BOM."""
-    data = json.loads(json.dumps(to_json(take(gearbox()[0]))))
-    damage(data)
-    with pytest.raises(InputError):
-        from_json(data)

@@ -13,11 +13,9 @@ from silo.bom.errors import InputError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.workbench.pane.activity import Activity, Do, Entry, entry_text
 from silo.workbench.pane.entries import MOST_IN_CONSOLE, console_lines, of_event, of_sent
-from silo.workbench.session.jobs import Control
-from silo.workbench.session.sending import Sent
 
 if TYPE_CHECKING:
-    from conftest import Vault
+    from vault import Vault
 
 
 def page(path: str) -> str:
@@ -28,10 +26,10 @@ def box(vault: Vault) -> Entry:
     return of_sent(vault.told[-1], page, now=0.0)
 
 
-def test_a_merge_is_the_box_of_the_spec(vault: Vault, control: Control) -> None:
+def test_a_merge_is_the_box_of_the_spec(vault: Vault) -> None:
     """Counts, the link to the server's page, and what has no number."""
     vault.commit(vault.snapshot(vault.part("Bolt", 12), vault.part("Cover", identity="no-item")))
-    vault.sending.run(vault.silo, control)
+    vault.send()
     assert entry_text(box(vault)).splitlines() == [
         f"BOM Updated: {vault.number} Top",
         "+1 added",
@@ -44,7 +42,7 @@ def test_a_merge_is_the_box_of_the_spec(vault: Vault, control: Control) -> None:
     assert view.target == page(f"/items/{vault.number}/bom")
 
 
-def test_however_much_is_broken_registering_stays_within_reach(vault: Vault, control: Control) -> None:
+def test_however_much_is_broken_registering_stays_within_reach(vault: Vault) -> None:
     """A thousand broken links must not push the button out of the box."""
     snapshot = vault.snapshot(vault.part("Cover", identity="no-item"), broken=True)
     assert snapshot.extraction is not None
@@ -55,35 +53,35 @@ def test_however_much_is_broken_registering_stays_within_reach(vault: Vault, con
         for n in range(1000)
     )
     vault.commit(replace(snapshot, extraction=replace(snapshot.extraction, findings=lost)))
-    vault.sending.run(vault.silo, control)
+    vault.send()
     made = box(vault)
     offered = [a.do for line in made.lines for a in line.actions if a.do is not Do.SHOW]
     assert offered == [Do.PREVIEW, Do.REGISTER]
     assert "… and 995 more lines; the preview shows all" in entry_text(made)
 
 
-def test_a_broken_link_can_be_shown_in_the_model(vault: Vault, control: Control) -> None:
+def test_a_broken_link_can_be_shown_in_the_model(vault: Vault) -> None:
     """By the objects that the finding names."""
     vault.commit(vault.snapshot(vault.part("Bolt"), broken=True))
-    vault.sending.run(vault.silo, control)
+    vault.send()
     (show,) = [a for line in box(vault).lines for a in line.actions]
     assert (show.do, show.document, show.objects) == (Do.SHOW, str(vault.top), ("Link",))
 
 
-def test_the_report_view_is_not_flooded(vault: Vault, control: Control) -> None:
+def test_the_report_view_is_not_flooded(vault: Vault) -> None:
     """The consolidation warnings of a large assembly are told up to a number, then how many more."""
     vault.commit(vault.snapshot(vault.part("Bolt", 4)))
-    vault.sending.run(vault.silo, control)
+    vault.send()
     (sent,) = vault.told
     assert sent.resolved is not None
     many = [
         Finding(FindingCode.CONSOLIDATION, Severity.WARNING, f"[Silo BOM] P{n} has 2 individual links.")
         for n in range(300)
     ]
-    lines = console_lines(Sent("A", resolved=replace(sent.resolved, findings=tuple(many))))
+    lines = console_lines(replace(sent, resolved=replace(sent.resolved, findings=tuple(many))))
     assert len(lines) == MOST_IN_CONSOLE + 1
     assert lines[-1] == f"[Silo BOM] … and {300 - MOST_IN_CONSOLE} more of these; the preview lists them all."
-    few = console_lines(Sent("A", resolved=replace(sent.resolved, findings=tuple(many[:3]))))
+    few = console_lines(replace(sent, resolved=replace(sent.resolved, findings=tuple(many[:3]))))
     assert few == tuple(f"[Silo BOM] P{n} has 2 individual links." for n in range(3))
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import os
 from typing import Any
 
-from silo.workbench.commit.plan import Plan, Row, State
+from silo.workbench.commit.plan import Plan, Row
 from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QtCore, QtGui, QtWidgets
 from silo.workbench.pane.activity import Tone
@@ -106,16 +106,3 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
             if item.checkState(0) == QtCore.Qt.CheckState.Checked:
                 rows.append(self._plan.rows[item.data(0, QtCore.Qt.ItemDataRole.UserRole)])
         return tuple(rows)
-
-
-def refusal(plan: Plan) -> str:
-    """Why the document itself cannot be committed; "" where it can."""
-    top = plan.top
-    if top.can_commit:
-        return ""
-    name = plain(os.path.basename(top.path) or top.label, 80)
-    if top.state is State.UNNAMED:
-        return translate("Silo", "{name} has no file yet. Save it under a name first.").replace(
-            "{name}", name
-        )
-    return f"{name}: {top.note}"

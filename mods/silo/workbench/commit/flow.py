@@ -1,7 +1,13 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""A commit from the press of the button to the worker: ask, save, snapshot, hand over. GUI thread.
+"""A commit from the press of the button to the outbox: ask, save, snapshot, keep. GUI thread.
 
-Each document is saved in a turn of the event loop of its own, so that the window stays alive between them.
+::
+
+    start ── plan ──▶ ask a person ──▶ turns: one document each ──▶ outbox (a worker)
+             refused: warn   └ no: nothing happens      └ a failure: a box, and the next document
+
+Each document has a turn of the event loop of its own, so that the window stays alive between them. FreeCAD
+and Qt come in through the :class:`~silo.workbench.commit.desk.Desk` only.
 """
 
 from __future__ import annotations
@@ -15,46 +21,25 @@ from pathlib import Path
 from typing import Any
 
 from silo.bom.errors import SiloError
-from silo.workbench.commit import snapshot
+from silo.outbox.entry import Commit, new_key
 from silo.workbench.commit.decisions import Decisions
-from silo.workbench.commit.dialog import CommitDialog, refusal
-from silo.workbench.commit.plan import Plan, Row, State, Taken, Taker, plan
+from silo.workbench.commit.desk import Desk
+from silo.workbench.commit.plan import Plan, Row, State, Taken, Taker, plan, refusal
 from silo.workbench.commit.snapshot import Snapshot
-from silo.workbench.freecad import host, live, saving
-from silo.workbench.gui import qt, widgets
 from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone
 from silo.workbench.session.session import Session
-from silo.workbench.session.spool import Commit, new_key
 from silo.workbench.settings.preferences import ALLOW, Preferences
 from silo.workbench.words import translate
-
-
-class LiveDocuments:
-    """FreeCAD's documents, as :class:`silo.workbench.commit.plan.Documents` wants them."""
-
-    linked = staticmethod(host.linked_documents)
-    is_partial = staticmethod(host.is_partial)
-    is_modified = staticmethod(saving.is_modified)
-    is_writable = staticmethod(saving.is_writable)
-    lost_assemblies = staticmethod(live.lost_assemblies)
-    save = staticmethod(saving.save)
-
-
-def take_snapshot(doc: Any) -> Snapshot:
-    """Snapshot of a live document; the assembly that is active in the 3D view decides between several."""
-    cached = live.cached_document(doc)
-    active = host.active_assembly() if host.has_gui() else None
-    hint = cached.getObject(active.Name) if active is not None and active.Document == doc else None
-    return snapshot.take(cached, assembly=hint, walk=live.extract_object)
 
 
 class CommitFlow:
     """Commits documents, one commit after another."""
 
-    def __init__(self, session: Session, preferences: Preferences) -> None:
-        self._session, self._preferences = session, preferences
-        self.decisions = Decisions()
-        self._taker = Taker(LiveDocuments(), take_snapshot, session.spool.hold, new_key)
+    def __init__(
+        self, session: Session, preferences: Preferences, desk: Desk, *, path: Path | None = None
+    ) -> None:
+        self._session, self._preferences, self._desk = session, preferences, desk
+        self.decisions = Decisions(path)
         self._turns: deque[tuple[Iterator[Taken], str]] = deque()
         self._asked_for: set[str] = set()
 
@@ -67,34 +52,53 @@ class CommitFlow:
         """True for the commit of a document that a person committed, not one below it."""
         return key in self._asked_for
 
+    def snapshot(self, doc: Any) -> Snapshot:
+        """A document as it is, without what a person has decided already (files that are one part)."""
+        taken = self._desk.snapshot(doc)
+        if taken.extraction is None:
+            return taken
+        return replace(taken, extraction=self.decisions.without_accepted(taken.extraction))
+
+    def has_identity(self, doc: Any) -> bool:
+        """True for a document that belongs to Silo."""
+        try:
+            return bool(self._desk.snapshot(doc).identity)
+        except SiloError:
+            return False
+
     def start(self, doc: Any) -> None:
         """Commit a document: ask where there is something to ask, then go on without waiting."""
         if not doc.FileName:
-            # FreeCAD's own dialog asks for the name.
-            host.run_command("Std_Save")
-        planned = plan(doc, LiveDocuments())
+            self._desk.save_as(doc)
+        planned = plan(doc, self._desk.documents)
         if text := refusal(planned):
             if planned.top.state is not State.UNNAMED:
-                widgets.warn(host.main_window(), translate("Silo", "Commit to Silo"), text)
+                self._desk.warn(translate("Silo", "Commit to Silo"), text)
             return
         rows, comment = planned.rows, ""
         if self._preferences.flag("AskComment") or not planned.is_simple:
-            dialog = CommitDialog(planned, host.main_window(), note=self._note(planned))
-            if not qt.run_dialog(dialog):
+            answer = self._desk.ask(planned, self._note(planned))
+            if answer is None:
                 return
-            rows, comment = dialog.chosen(), dialog.text()
+            rows, comment = answer
         self.run(rows, comment)
 
     def run(self, rows: tuple[Row, ...], comment: str = "") -> None:
         """Commit these documents, in order, after those of an earlier commit."""
-        self._turns.append((self._taker.each(rows), comment))
+        taker = Taker(self._desk.documents, self.snapshot, self._session.outbox.hold, new_key)
+        self._turns.append((taker.each(rows), comment))
         if len(self._turns) == 1:
-            qt.later(0, self._turn)
+            self._desk.later(self._turn)
+
+    def finish(self) -> None:
+        """Do at once what is left to do: FreeCAD is about to close the documents."""
+        while self._turns:
+            self._step()
 
     def sync_only(self, doc: Any) -> None:
         """Sync the BOM of a document whose file somebody else has committed (``Origin_Commit`` of a fork)."""
         try:
-            taken = take_snapshot(doc)
+            taken = self.snapshot(doc)
         except SiloError as error:
             self._tell_error(str(doc.Label), str(error))
             return
@@ -108,20 +112,21 @@ class CommitFlow:
         self.run((Row(doc, path, str(doc.Label), State.SAVED),), comment)
 
     def _turn(self) -> None:
-        if not self._turns:
-            return
-        steps, comment = self._turns[0]
         try:
-            taken = next(steps, None)
-        except Exception:
-            self._turns.popleft()
-            raise
+            if self._turns:
+                self._step()
+        finally:
+            # Whatever went wrong with one document, the others have their turn.
+            if self._turns:
+                self._desk.later(self._turn)
+
+    def _step(self) -> None:
+        steps, comment = self._turns[0]
+        taken = next(steps, None)
         if taken is None:
             self._turns.popleft()
         else:
             self._done(taken, comment)
-        if self._turns:
-            qt.later(0, self._turn)
 
     def _done(self, taken: Taken, comment: str) -> None:
         if taken.error is not None:
@@ -136,23 +141,18 @@ class CommitFlow:
             return
         if taken.row.is_top and with_file:
             self._asked_for.add(taken.key)
-        commit = Commit(
+        commit = commit_of(
+            taken.snapshot,
             key=taken.key,
-            snapshot=self.decided(taken.snapshot),
-            taken_at=time.time(),
             comment=comment,
             file=(taken.held or Path(taken.row.path)) if with_file else None,
             sync_bom=self._preferences.flag("SyncBom"),
             allow_missing=self._preferences.text("MissingLinks") == ALLOW,
         )
+        if commit is None:
+            return
         label = taken.row.label
         self._session.keep(commit, failed=lambda error: self._tell_error(label, str(error)))
-
-    def decided(self, taken: Snapshot) -> Snapshot:
-        """The snapshot without what a person has decided already (files that are one part)."""
-        if taken.extraction is None:
-            return taken
-        return replace(taken, extraction=self.decisions.without_accepted(taken.extraction))
 
     def _tell_error(self, label: str, text: str) -> None:
         self._session.add(
@@ -175,12 +175,30 @@ class CommitFlow:
         return ""
 
 
-def has_identity(doc: Any) -> bool:
-    """True for a document that belongs to Silo."""
-    try:
-        return bool(take_snapshot(doc).identity)
-    except SiloError:
-        return False
+def commit_of(
+    taken: Snapshot,
+    *,
+    key: str,
+    comment: str = "",
+    file: Path | None = None,
+    sync_bom: bool = True,
+    allow_missing: bool = False,
+) -> Commit | None:
+    """A snapshot as the outbox wants it; None where neither a file nor a BOM is to be sent."""
+    if file is None and (taken.extraction is None or not sync_bom):
+        return None
+    return Commit(
+        path=taken.path,
+        label=taken.label,
+        identity=taken.identity or "",
+        taken_at=time.time(),
+        key=key,
+        comment=comment,
+        file=file,
+        extraction=taken.extraction if sync_bom else None,
+        allow_missing=allow_missing,
+        remark=taken.problem,
+    )
 
 
 def not_in_silo(taken: Snapshot) -> Entry:

@@ -16,7 +16,7 @@ from typing import Any, Protocol
 
 from silo.bom.errors import SiloError
 from silo.workbench.commit.snapshot import Snapshot
-from silo.workbench.words import translate
+from silo.workbench.words import plain, translate
 
 
 class Documents(Protocol):
@@ -114,6 +114,19 @@ def plan(top: Any, documents: Documents) -> Plan:
     return Plan(tuple(rows))
 
 
+def refusal(plan: Plan) -> str:
+    """Why the document itself cannot be committed; "" where it can."""
+    top = plan.top
+    if top.can_commit:
+        return ""
+    name = plain(os.path.basename(top.path) or top.label, 80)
+    if top.state is State.UNNAMED:
+        return translate("Silo", "{name} has no file yet. Save it under a name first.").replace(
+            "{name}", name
+        )
+    return f"{name}: {top.note}"
+
+
 def leaves_first(top: Any) -> Iterable[Any]:
     """A document and all that it links to, each once, linked ones before those that link to them.
 
@@ -198,9 +211,13 @@ class Taker:
         """One document after another; a failure does not stop the others. GUI thread."""
         for row in rows:
             try:
-                yield self._one(row)
+                taken = self._one(row)
             except SiloError as error:
-                yield Taken(row, error=error)
+                taken = Taken(row, error=error)
+            except Exception as error:  # noqa: BLE001  # such as the ReferenceError of a document that was closed
+                problem = f"unexpected problem ({type(error).__name__}: {error})"
+                taken = Taken(row, error=SiloError(problem))
+            yield taken
 
     def _one(self, row: Row) -> Taken:
         if row.state is State.CHANGED:

@@ -2,13 +2,12 @@
 """A document as it was at one moment: what the worker needs to know of it, and nothing that is alive.
 
 Taken in the GUI thread in milliseconds; from then on the document may change, be closed, or FreeCAD may die.
-A snapshot goes through JSON and back unchanged, so it can wait on disk.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -18,10 +17,7 @@ from silo.bom.identity import META_KEY, identity_of
 from silo.bom.links import extract
 from silo.bom.model import Extraction
 from silo.bom.roots import NAME_ONE, choose_assembly
-from silo.bom.snapshot import from_plain, to_plain
 from silo.workbench.words import plain, translate
-
-FORMAT = 1
 
 
 @dataclass(frozen=True)
@@ -121,37 +117,3 @@ def _several(doc: Any, label: str) -> str:
         "Silo", "{name} holds {n} registered parts, so its file is no single item's and stays here."
     )
     return text.replace("{name}", plain(label, 80)).replace("{n}", str(count))
-
-
-# --- JSON ------------------------------------------------------------------------------------------------
-
-
-def to_json(snapshot: Snapshot) -> dict[str, Any]:
-    """Plain data that :func:`from_json` makes an equal snapshot of."""
-    data: dict[str, Any] = {
-        "format": FORMAT,
-        "path": snapshot.path,
-        "label": snapshot.label,
-        "identity": snapshot.identity,
-        "problem": snapshot.problem,
-    }
-    if snapshot.extraction is not None:
-        data["bom"] = to_plain(snapshot.extraction)
-    return data
-
-
-def from_json(data: Mapping[str, Any]) -> Snapshot:
-    """What :func:`to_json` wrote; :class:`InputError` where it is something else."""
-    try:
-        if data["format"] != FORMAT:
-            raise InputError(f"a snapshot of format {data['format']}; this silo-mod reads {FORMAT}")
-        bom = data.get("bom")
-        return Snapshot(
-            path=data["path"],
-            label=data["label"],
-            identity=data["identity"],
-            extraction=from_plain(bom) if bom is not None else None,
-            problem=data["problem"],
-        )
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise InputError(f"this snapshot cannot be read ({type(error).__name__}: {error})") from error

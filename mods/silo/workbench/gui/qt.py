@@ -26,6 +26,7 @@ __all__ = [
     "QtGui",
     "QtWidgets",
     "Relay",
+    "ask_where_to_save",
     "copy",
     "in_gui_thread",
     "later",
@@ -87,6 +88,11 @@ def open_url(url: str) -> bool:
 def tell_at_pointer(text: str) -> None:
     """A word where the person has just clicked; it goes away by itself."""
     QtWidgets.QToolTip.showText(QtGui.QCursor.pos(), text)
+
+
+def ask_where_to_save(parent: Any, title: str, name: str) -> str:
+    """The path that a person chose for a new file; "" where none was chosen."""
+    return str(QtWidgets.QFileDialog.getSaveFileName(parent, title, name)[0])
 
 
 def copy(text: str) -> None:

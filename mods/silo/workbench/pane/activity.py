@@ -37,6 +37,8 @@ class Do(StrEnum):
     PREVIEW = "preview"  # open the BOM preview
     DECIDE = "decide"  # same part or new part?
     RETRY = "retry"  # send what waits in the outbox
+    SEND_HERE = "send here"  # send what waits for another address to the server in use
+    SAVE_COPY = "save copy"  # write the file of what waits somewhere else
     DISCARD = "discard"  # drop what waits in the outbox
     STOP = "stop"  # end what a worker is doing
     SETTINGS = "settings"  # open the preferences

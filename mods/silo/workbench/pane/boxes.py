@@ -12,6 +12,7 @@ from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QtCore, QtWidgets
 from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone
 from silo.workbench.pane.banner import Banner
+from silo.workbench.pane.waiting import Row, meant_for_another, rows
 from silo.workbench.session.session import Shown
 from silo.workbench.words import counted, plain, translate
 
@@ -156,7 +157,7 @@ class BusyWidget(QtWidgets.QWidget):  # type: ignore[misc]
 
 
 class WaitingWidget(QtWidgets.QFrame):  # type: ignore[misc]
-    """What is not sent yet, and why, with Retry and Discard."""
+    """What is not sent yet, and why, with what can be done about it."""
 
     # Some hundred rows help nobody; all of them are sent all the same.
     MOST = 20
@@ -180,25 +181,25 @@ class WaitingWidget(QtWidgets.QFrame):  # type: ignore[misc]
         one = translate("Silo", "{n} thing waits to be sent")
         many = translate("Silo", "{n} things wait to be sent")
         self._layout.addWidget(widgets.label(counted(len(shown.waiting), one, many), bold=True))
-        # What needs a person comes first.
-        ordered = sorted(shown.waiting, key=lambda waiting: not waiting.rejected)
-        for waiting in ordered[: self.MOST]:
-            self._row(waiting)
+        ordered = rows(shown.waiting, shown.server.url)
+        for row in ordered[: self.MOST]:
+            self._row(row)
         left = len(ordered) - self.MOST
         if left > 0:
             self._layout.addWidget(
                 widgets.label(translate("Silo", "… and {n} more").replace("{n}", str(left)), Tone.QUIET)
             )
-        send = Action(Do.RETRY, translate("Silo", "Send now"))
-        self._layout.addLayout(buttons((send,), self._on_action))
+        send = [Action(Do.RETRY, translate("Silo", "Send now"))]
+        if len(away := meant_for_another(shown.waiting, shown.server.url)) > 1:
+            text = translate("Silo", "Send all {n} of another address to the server in use")
+            ids = ",".join(map(str, away))
+            send.append(Action(Do.SEND_HERE, text.replace("{n}", str(len(away))), target=ids))
+        self._layout.addLayout(buttons(send, self._on_action))
 
-    def _row(self, waiting: Any) -> None:
-        what = f"{plain(waiting.title, 80)} · {plain(waiting.what, 80)} · {_clock(waiting.since)}"
-        self._layout.addWidget(widgets.label(what, Tone.ERROR if waiting.rejected else Tone.PLAIN))
-        if waiting.reason:
-            self._layout.addWidget(widgets.label(plain(waiting.reason, 300), Tone.QUIET))
-        actions = [Action(Do.DISCARD, translate("Silo", "Discard"), target=waiting.id)]
-        if waiting.rejected:
-            actions.insert(0, Action(Do.RETRY, translate("Silo", "Retry"), target=waiting.id))
-        if waiting.rejected or waiting.reason:
-            self._layout.addLayout(buttons(actions, self._on_action))
+    def _row(self, row: Row) -> None:
+        what = f"{row.title} · {row.what} · {_clock(row.since)}"
+        self._layout.addWidget(widgets.label(what, Tone.ERROR if row.urgent else Tone.PLAIN))
+        if row.reason:
+            self._layout.addWidget(widgets.label(row.reason, Tone.QUIET))
+        if row.actions:
+            self._layout.addLayout(buttons(row.actions, self._on_action))

@@ -68,7 +68,7 @@ class Pane(QtWidgets.QWidget):  # type: ignore[misc]
         before, self._shown = self._shown, shown
         self._banner.draw(banner(shown))
         self._busy.draw(shown)
-        if before is None or before.waiting != shown.waiting:
+        if before is None or (before.waiting, before.server) != (shown.waiting, shown.server):
             self._waiting.draw(shown)
         today = time.strftime("%Y-%m-%d")
         if before is None or before.activity is not shown.activity or today != self._day:

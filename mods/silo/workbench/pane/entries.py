@@ -17,8 +17,8 @@ from silo.bom.model import BomEntry
 from silo.bom.naming import display_name
 from silo.bom.report import shorten
 from silo.bom_sync import Resolved, Status
+from silo.outbox.send import Sent
 from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone, shortened
-from silo.workbench.session.sending import Sent
 from silo.workbench.words import counted, plain, quantity, translate
 
 # Makes an absolute address of a page such as `resolve_url`; raises SiloError for another server's.
@@ -32,7 +32,7 @@ def of_sent(sent: Sent, page: Page, now: float | None = None) -> Entry:
     url = (sent.result.resolve_url if sent.result is not None else "") or f"/items/{sent.part_number}/bom"
     return Entry(
         key=f"sync:{sent.sync_id}" if sent.sync_id else f"commit:{sent.part_number}:{now}",
-        also=_revision_key(sent.part_number, sent.revision.revision_number) if sent.revision else "",
+        also=_revision_key(sent.part_number, sent.revision) if sent.revision else "",
         title=_title(sent),
         when=time.time() if now is None else now,
         tone=tone if tone in (Tone.WARNING, Tone.ERROR) else Tone.GOOD,
@@ -69,7 +69,7 @@ def _title(sent: Sent) -> str:
 def _name(sent: Sent) -> str:
     if sent.resolved is not None and sent.resolved.assembly.name:
         return sent.resolved.assembly.name
-    return sent.commit.snapshot.label if sent.commit is not None else ""
+    return sent.entry.label
 
 
 def _badges(sent: Sent) -> tuple[Line, ...]:
@@ -95,18 +95,18 @@ def badges(diff: MergeDiff, warnings: Iterable[MergeWarning] = ()) -> tuple[Line
 
 def _revision_lines(sent: Sent) -> tuple[Line, ...]:
     if sent.revision is not None:
-        text = translate("Silo", "Revision {n} uploaded").replace("{n}", str(sent.revision.revision_number))
-        comment = plain(sent.revision.comment, 120)
+        text = translate("Silo", "Revision {n} uploaded").replace("{n}", str(sent.revision))
+        comment = plain(sent.entry.comment, 120)
         return (Line(f"{text}: {comment}" if comment else text, Tone.PLAIN),)
-    if sent.commit is not None and sent.commit.file is not None:
+    if sent.entry.has_file:
         return (Line(translate("Silo", "The file is in Silo already"), Tone.QUIET),)
     return ()
 
 
 def _status_lines(sent: Sent) -> tuple[Line, ...]:
     lines = []
-    if sent.commit is not None and sent.commit.snapshot.problem:
-        lines.append(Line(sent.commit.snapshot.problem, Tone.WARNING))
+    if sent.entry.remark:
+        lines.append(Line(sent.entry.remark, Tone.WARNING))
     removed = len(sent.result.diff.removed) if sent.result is not None else 0
     if sent.status is Status.UNCHANGED and sent.plan is not None:
         removed = len(sent.plan.diff.removed)

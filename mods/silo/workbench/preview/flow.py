@@ -3,17 +3,16 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from silo.bom.errors import SiloError
-from silo.workbench.commit.flow import CommitFlow, take_snapshot
+from silo.outbox.entry import new_key
+from silo.workbench.commit.flow import CommitFlow, commit_of
 from silo.workbench.commit.snapshot import Snapshot
 from silo.workbench.freecad import host
 from silo.workbench.gui import widgets
 from silo.workbench.session.session import Session
-from silo.workbench.session.spool import Commit, new_key
 from silo.workbench.words import translate
 
 if TYPE_CHECKING:
@@ -63,7 +62,7 @@ class PreviewFlow:
 
     def _take(self, doc: Any) -> Snapshot | None:
         try:
-            return self._commits.decided(take_snapshot(doc))
+            return self._commits.snapshot(doc)
         except SiloError as error:
             widgets.warn(host.main_window(), translate("Silo", "BOM in Silo"), str(error))
             return None
@@ -114,5 +113,6 @@ class PreviewFlow:
             self._with_dialog(preview.snapshot.path, lambda dialog: dialog.fail(error))
 
         for taken in to_sync(preview, below=below):
-            commit = Commit(new_key(), taken, time.time(), allow_missing=allow_missing)
-            self._session.keep(commit, failed=failed)
+            commit = commit_of(taken, key=new_key(), allow_missing=allow_missing)
+            if commit is not None:
+                self._session.keep(commit, failed=failed)

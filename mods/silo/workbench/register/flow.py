@@ -12,7 +12,7 @@ from silo.bom.errors import DocumentError, SiloError
 from silo.bom.identity import walk_entries
 from silo.bom.model import BomEntry, Extraction
 from silo.registration import Journal, Registration
-from silo.workbench.commit.flow import CommitFlow, take_snapshot
+from silo.workbench.commit.flow import CommitFlow
 from silo.workbench.commit.snapshot import Snapshot
 from silo.workbench.freecad import host, live, saving
 from silo.workbench.freecad.open_in_others import OpenInOthers
@@ -50,7 +50,7 @@ class RegisterFlow:
     def start(self, doc: Any) -> None:
         """Show the components of a document that have no number."""
         try:
-            taken = self._commits.decided(take_snapshot(doc))
+            taken = self._commits.snapshot(doc)
         except SiloError as error:
             widgets.warn(host.main_window(), translate("Silo", "Register Components"), str(error))
             return

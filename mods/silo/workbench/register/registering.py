@@ -13,13 +13,13 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any
 
+from silo.api.revisions import other_name
 from silo.bom.errors import NotFoundError, SiloError
 from silo.bom.findings import FindingCode
 from silo.bom.identity import walk_entries
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.naming import Proposal, clean_name, crowded_files, propose
 from silo.registration import Journal, Registration, RegistrationApi, component_key, register, unclear
-from silo.workbench.commit.item_file import other_name
 from silo.workbench.register.on_disk import changed_since, sha256_or_nothing
 from silo.workbench.session.jobs import Control
 from silo.workbench.words import translate

@@ -8,8 +8,8 @@ thread (:class:`silo.workbench.gui.qt.Relay`), and in the tests wherever the tes
 
 from __future__ import annotations
 
-import queue
 import threading
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -88,41 +88,49 @@ class Worker:
         self._deliver = deliver
         self._on_busy = on_busy
         self._on_bug = on_bug
-        self._queue: queue.Queue[_Queued | None] = queue.Queue()
-        self._lock = threading.Lock()
+        self._change = threading.Condition()
         self._thread: threading.Thread | None = None
         self._current: _Queued | None = None
-        self._waiting: list[_Queued] = []
+        self._waiting: deque[_Queued] = deque()
         self._closed = False
 
     def submit(self, job: Job) -> bool:
         """Queue a job; False where an equal one (``same_as``) waits already, or the worker is closed."""
-        with self._lock:
+        with self._change:
             twice = job.same_as and any(q.job.same_as == job.same_as for q in self._waiting)
             if twice or self._closed:
                 return False
             queued = _Queued(job)
             queued.control = Control(lambda detail, fraction: self._tell(queued, detail, fraction))
             self._waiting.append(queued)
-            self._start()
-        self._queue.put(queued)
+            if self._thread is None:
+                # A daemon: a server that does not answer must not keep FreeCAD from closing.
+                self._thread = threading.Thread(target=self._work, name=self._name, daemon=True)
+                self._thread.start()
+            self._change.notify_all()
         return True
 
     def cancel(self) -> None:
         """Ask the running job to stop. Jobs that wait are kept."""
-        with self._lock:
+        with self._change:
             if self._current is not None:
                 self._current.control.cancelled.set()
 
+    def left(self, seconds: float = 0.0) -> int:
+        """How many jobs run or wait, after at most so many seconds for them to become none."""
+        with self._change:
+            self._change.wait_for(lambda: self._current is None and not self._waiting, seconds)
+            return len(self._waiting) + (self._current is not None)
+
     def close(self, timeout: float = 1.0) -> bool:
         """Ask the running job to end, drop the waiting ones. True where the thread has ended."""
-        with self._lock:
+        with self._change:
             self._closed = True
             self._waiting.clear()
             if self._current is not None:
                 self._current.control.cancelled.set()
             thread = self._thread
-        self._queue.put(None)
+            self._change.notify_all()
         if thread is not None:
             thread.join(timeout)
         return thread is None or not thread.is_alive()
@@ -130,28 +138,23 @@ class Worker:
     @property
     def idle(self) -> bool:
         """True where nothing runs and nothing waits."""
-        with self._lock:
-            return self._current is None and not self._waiting
+        return not self.left()
 
-    def _start(self) -> None:
-        if self._thread is None:
-            # A daemon: a server that does not answer must not keep FreeCAD from closing.
-            self._thread = threading.Thread(target=self._work, name=self._name, daemon=True)
-            self._thread.start()
+    def _next(self) -> _Queued | None:
+        with self._change:
+            self._change.wait_for(lambda: self._waiting or self._closed)
+            self._current = self._waiting.popleft() if self._waiting else None
+            return self._current
 
     def _work(self) -> None:
-        while (queued := self._queue.get()) is not None:
-            with self._lock:
-                if self._closed:
-                    return
-                self._waiting.remove(queued)
-                self._current = queued
+        while (queued := self._next()) is not None:
             self._tell(queued, "", None)
             with collection_off():
                 end = self._finish(queued)
-            with self._lock:
+            with self._change:
                 self._current = None
                 left = len(self._waiting)
+                self._change.notify_all()
             if end is not None:
                 self._deliver(end)
             if not left:

@@ -12,14 +12,15 @@ from typing import Any
 from silo.api.client import SiloClient
 from silo.api.config import resolve_server
 from silo.api.events import ConnectionState, EventListener, ServerEvent
-from silo.api.outbox import Outbox
 from silo.bom.errors import ConfigError
-from silo.folders import data_folder
+from silo.outbox.entry import Entry as Waiting
+from silo.outbox.send import Report, Sent, send_all
+from silo.outbox.store import Store
+from silo.outbox.takeover import of_commit_folder
 from silo.workbench.pane import entries
 from silo.workbench.pane.activity import Entry
 from silo.workbench.session.gui_thread_gc import collection_off
-from silo.workbench.session.sending import Sending, Sent
-from silo.workbench.session.spool import Spool
+from silo.workbench.session.jobs import Control
 from silo.workbench.settings.server import Known, Server, TokenStore, choose_server
 from silo.workbench.words import translate
 
@@ -36,8 +37,7 @@ class Online:
 
     def __init__(
         self,
-        spool: Spool,
-        folder: Path | None,
+        outbox: Store,
         *,
         entry: Callable[[Entry], None],
         sent: Callable[[Sent, tuple[str, ...]], None],
@@ -45,10 +45,9 @@ class Online:
         make_client: Callable[[Server], Any] | None = None,
     ) -> None:
         self._make_client = make_client or _client
-        folder = folder or data_folder()
+        self._outbox = outbox
         self._entry, self._sent, self._state = entry, sent, state
-        self.sending = Sending(spool, Outbox(folder / "outbox.sqlite3"), tell=self._tell)
-        self._last_ids = LastIds(folder / "last-events.json")
+        self._last_ids = LastIds(outbox.path.with_name("last-events.json"))
         self._client: SiloClient | None = None
         self._server = Server()
         self._listener: EventListener | None = None
@@ -61,6 +60,32 @@ class Online:
                 translate("Silo", "No Silo server is set up yet. Enter its address in the Silo preferences.")
             )
         return self._client
+
+    @property
+    def address(self) -> str:
+        """The server in use; "" where none is configured."""
+        return self._client.base_url if self._client is not None else ""
+
+    def take_over(self) -> tuple[str, ...]:
+        """Bring what an older version left waiting into the outbox; what could not be read now."""
+        with self._outbox.send_lock() as mine:
+            return of_commit_folder(self._outbox, self._outbox.path.with_name("commits")) if mine else ()
+
+    def send(self, control: Control, *, force: bool) -> Report:
+        """Send what waits for this server."""
+
+        def progress(waiting: Waiting, done: int, total: int) -> None:
+            text = translate("Silo", "{file} → {number}").replace("{file}", waiting.file_name)
+            control.progress(text.replace("{number}", waiting.part_number), done / total if total else None)
+
+        return send_all(
+            self._outbox,
+            self.client,
+            cancelled=control.cancelled,
+            on_progress=progress,
+            on_sent=self._tell,
+            force=force,
+        )
 
     def connect(self, known: Known, store: TokenStore, *, live: bool) -> Server:
         """Use the server that the settings name; begin to listen to it where ``live``."""
@@ -91,9 +116,7 @@ class Online:
         self._stop_listening()
         if self._client is not None:
             self._client.close()
-        self._client = (
-            SiloClient(server.url, server.token or None, verify=server.verify) if server.url else None
-        )
+        self._client = self._make_client(server) if server.url else None
         self._server = server
 
     def _listen(self, *, live: bool) -> None:

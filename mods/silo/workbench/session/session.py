@@ -1,36 +1,38 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """What goes on between FreeCAD and the server while FreeCAD runs: workers, connection, and what is shown.
 
-Methods are called in the GUI thread and return at once. Work is done by two workers, so that a commit is on
-disk at once even while the network hangs: one for the disk, one for the server. Results come back through
-``deliver``. No widgets here, and no FreeCAD.
+Methods are called in the GUI thread and return at once. Work is done by workers, so that a commit is on
+disk at once even while copies take long or the network hangs: for rows, for copies, for the server. Results
+come back through ``deliver``. No widgets here, and no FreeCAD, so that all of it runs in any test.
 """
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from silo.bom.errors import ConfigError, SiloError
+from silo.outbox.entry import Commit
+from silo.outbox.entry import Entry as Waiting
+from silo.outbox.store import Store
 from silo.workbench.pane.activity import Activity, Entry
 from silo.workbench.session.jobs import Busy, Control, Deliver, Job, Worker
-from silo.workbench.session.spool import Commit, Spool
 from silo.workbench.settings.server import Known, Server, TokenStore
 from silo.workbench.words import translate
 
 if TYPE_CHECKING:
     # These bring requests and pydantic with them, which only a worker may import (start-up time).
     from silo.api.client import SiloClient
+    from silo.outbox.send import Sent
     from silo.workbench.session.online import Online
-    from silo.workbench.session.sending import Sent, Waiting
 
 
 @dataclass(frozen=True)
 class Shown:
-    """Everything that the pane shows."""
+    """Everything that the pane shows. ``waiting`` is all that is in the outbox, oldest first."""
 
     server: Server = field(default_factory=Server)
     connection: str = "stopped"
@@ -68,7 +70,7 @@ class Session:
     store
         the keyring; asked in a worker only.
     folder
-        where commits and outbox are kept; the user's data folder unless told otherwise.
+        where the outbox is; the user's data folder unless told otherwise.
     make_client
         makes the client of a server; for tests.
     """
@@ -87,8 +89,9 @@ class Session:
         self._deliver, self._listener, self._folder = deliver, listener or Listener(), folder
         self._known, self._store = known, store
         self.shown = Shown()
-        self.spool = Spool(folder / "commits" if folder is not None else None)
+        self.outbox = Store(folder / "outbox.sqlite3" if folder is not None else None)
         bug = self._listener.bug
+        self._rows = Worker("silo-rows", deliver, on_bug=bug)
         self._disk = Worker("silo-disk", deliver, on_bug=bug)
         self._net = Worker("silo-network", deliver, on_busy=self._busy, on_bug=bug)
         # What a person waits for on the preference page must not queue behind a long upload.
@@ -112,9 +115,10 @@ class Session:
 
     def _connect(self, _control: Control) -> tuple[Server, tuple[Waiting, ...]]:
         online = self._need_online()
-        self.spool.sweep()
+        for text in online.take_over():
+            self._console(text)
         server = online.connect(self._known, self._store, live=self._live)
-        return server, online.sending.waiting()
+        return server, self.outbox.entries()
 
     def _need_online(self) -> Online:
         """Made in the worker: its import is what would hold up FreeCAD's start."""
@@ -122,14 +126,16 @@ class Session:
             from silo.workbench.session.online import Online
 
             self._online = Online(
-                self.spool,
-                self._folder,
+                self.outbox,
                 entry=lambda entry: self._deliver(lambda: self.add(entry)),
                 sent=lambda sent, lines: self._deliver(lambda: self._arrived(sent, lines)),
                 state=lambda kind, reason: self._deliver(lambda: self._connection(kind, reason)),
                 make_client=self._make_client,
             )
         return self._online
+
+    def _console(self, text: str) -> None:
+        self._deliver(lambda: self._listener.console(f"[Silo] {text}"))
 
     def _connected(self, result: tuple[Server, tuple[Waiting, ...]]) -> None:
         server, waiting = result
@@ -146,14 +152,25 @@ class Session:
     # -- commits ----------------------------------------------------------------------------------------
 
     def keep(self, commit: Commit, failed: Callable[[SiloError], None]) -> None:
-        """Put a commit on disk, then send it. ``failed`` is told where the disk does not take it."""
-        job = Job(
-            translate("Silo", "Keeping the commit"),
-            lambda _control: self.spool.add(commit),
-            done=lambda _kept: self.send(force=True),
-            failed=failed,
-        )
-        self._disk.submit(job)
+        """Put a commit on disk, then send it. ``failed`` is called where the disk does not take it.
+
+        Its row does not wait for the copies of others: from its row on, a commit is not lost whatever
+        happens.
+        """
+        title = translate("Silo", "Keeping the commit")
+
+        def stage(_control: Control) -> None:
+            self.outbox.stage(commit, self._online.address if self._online is not None else "")
+            self._disk.submit(
+                Job(
+                    title,
+                    lambda _control: self.outbox.finish(commit.key, commit.file),
+                    done=lambda _kept: self.send(force=True),
+                    failed=failed,
+                )
+            )
+
+        self._rows.submit(Job(title, stage, failed=failed))
 
     def send(self, *, force: bool) -> None:
         """Send what waits; ``force`` also what was to be tried later only."""
@@ -162,10 +179,11 @@ class Session:
             online = self._need_online()
             try:
                 online.need_client(self._known, self._store)
-                return online.sending.run(online.client, control, force=force), online.sending.waiting()
+                report = online.send(control, force=force)
             except ConfigError:
                 # Without a server all that waits is kept; the pane says what to do.
-                return None, online.sending.waiting()
+                report = None
+            return report, self.outbox.entries()
 
         self._net.submit(
             Job(
@@ -200,11 +218,20 @@ class Session:
         if self.shown.waiting and self._net.idle:
             self.send(force=False)
 
-    def retry(self, waiting_id: str) -> None:
-        """Send something rejected once more."""
-        self._with_sending(
-            lambda online: online.sending.retry(waiting_id), then=lambda: self.send(force=True)
-        )
+    def retry(self, entry_id: int) -> None:
+        """Send something that a person had to look at once more."""
+        self._change(lambda: self.outbox.retry(entry_id), send=True)
+
+    def send_here(self, entry_ids: Iterable[int]) -> None:
+        """Send entries that are meant for another address to the server in use."""
+        ids = tuple(entry_ids)
+
+        def move() -> None:
+            here = self._need_online().address
+            for entry_id in ids:
+                self.outbox.retry(entry_id, server=here)
+
+        self._change(move, send=True)
 
     def retry_all(self) -> None:
         """Send all that waits, now."""
@@ -212,21 +239,23 @@ class Session:
             self._online.retry_now()
         self.send(force=True)
 
-    def discard(self, waiting_id: str) -> None:
+    def discard(self, entry_id: int) -> None:
         """Forget something that waits; the document is not touched."""
-        self._with_sending(lambda online: online.sending.discard(waiting_id))
+        self._change(lambda: self.outbox.discard(entry_id))
 
-    def _with_sending(
-        self, change: Callable[[Online], None], then: Callable[[], None] = lambda: None
-    ) -> None:
+    def save_copy(self, entry_id: int, target: Path) -> None:
+        """Write the file of something that waits somewhere else."""
+        self._change(lambda: self.outbox.save_copy(entry_id, target))
+
+    def _change(self, change: Callable[[], None], *, send: bool = False) -> None:
         def run(_control: Control) -> tuple[Waiting, ...]:
-            online = self._need_online()
-            change(online)
-            return online.sending.waiting()
+            change()
+            return self.outbox.entries()
 
         def done(waiting: tuple[Waiting, ...]) -> None:
             self._show(waiting=waiting)
-            then()
+            if send:
+                self.send(force=True)
 
         self._disk.submit(Job(translate("Silo", "Outbox"), run, done=done, failed=self.problem))
 
@@ -286,17 +315,29 @@ class Session:
         """Stop what the network worker is doing."""
         self._net.cancel()
 
-    def close(self) -> None:
-        """FreeCAD ends. What is not sent waits on disk for the next time."""
-        for worker in (self._aside, self._disk, self._net):
+    def close(self, wait: Callable[[Callable[[float], int]], object] = lambda left: left(60.0)) -> None:
+        """FreeCAD ends: wait for the disk, never for the network. What is not sent waits for the next time.
+
+        wait
+            is given a function that waits for so many seconds and returns how much the disk still has to
+            do; it ends when that is nothing, or when a person wants no longer to wait.
+        """
+        self._net.cancel()
+        if self._left(0.0):
+            wait(self._left)
+        for worker in (self._aside, self._rows, self._disk, self._net):
             worker.close(0.5)
         if self._online is not None:
             self._online.close()
 
+    def _left(self, seconds: float) -> int:
+        # A row is followed by its copy, so the rows are asked first.
+        return self._rows.left(seconds) + self._disk.left(seconds)
+
     @property
     def idle(self) -> bool:
         """True where no worker has anything to do."""
-        return self._disk.idle and self._net.idle
+        return self._rows.idle and self._disk.idle and self._net.idle
 
     # -- what is shown ----------------------------------------------------------------------------------
 

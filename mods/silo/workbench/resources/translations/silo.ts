@@ -10,6 +10,11 @@
         </message>
         <message>
             <location filename="../../addon.py" />
+            <source>Save a copy</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../addon.py" />
             <source>[Silo] Not opened, for it is not on the Silo server in use: </source>
             <translation type="unfinished" />
         </message>
@@ -146,11 +151,6 @@
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../commit/dialog.py" />
-            <source>{name} has no file yet. Save it under a name first.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
             <location filename="../../commit/flow.py" />
             <source>Not committed: {name}</source>
             <translation type="unfinished" />
@@ -206,6 +206,11 @@
             <translation type="unfinished" />
         </message>
         <message>
+            <location filename="../../commit/plan.py" />
+            <source>{name} has no file yet. Save it under a name first.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
             <location filename="../../commit/snapshot.py" />
             <source>Make the one that is meant active: double-click it in the tree.</source>
             <translation type="unfinished" />
@@ -218,6 +223,23 @@
         <message>
             <location filename="../../dependencies.py" />
             <source>Silo needs the Python packages {names}. Install them with silo-mod install-addon, or with: {command} – then start FreeCAD again.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/closing.py" />
+            <location filename="../../settings/page.py" />
+            <source>Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/closing.py" />
+            <source>Your commits are being copied to the outbox. They are sent when FreeCAD is started the next time.
+Commits that are not copied by then may have to be committed again.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/closing.py" />
+            <source>Close without waiting</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -436,12 +458,7 @@
         </message>
         <message>
             <location filename="../../pane/boxes.py" />
-            <source>Discard</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/boxes.py" />
-            <source>Retry</source>
+            <source>Send all {n} of another address to the server in use</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -589,6 +606,56 @@
             <location filename="../../pane/entries.py" />
             <location filename="../../preview/dialog.py" />
             <source>View in Silo →</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>It is meant for {there}, which is not the server in use.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>A newer commit of it has arrived since; this one would undo it.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>Its file is being copied.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>Send to {host}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>Retry</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>Save a copy…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>Discard</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>file and BOM</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>BOM</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>file</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1001,33 +1068,8 @@
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../session/sending.py" />
-            <source>{name} carries the identity of {number}, whose file in Silo is {before}. Is it the same part under a new name? Press Retry. Is it a copy that became a new part? Press Discard, then choose Register Parts and in it: new part</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../session/sending.py" />
+            <location filename="../../session/online.py" />
             <source>{file} → {number}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../session/sending.py" />
-            <source>Silo does not know {name}; register it, or check that this is the right server</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../session/sending.py" />
-            <source>BOM</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../session/sending.py" />
-            <source>file and BOM</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../session/sending.py" />
-            <source>file</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1048,11 +1090,6 @@
         <message>
             <location filename="../../session/session.py" />
             <source>Outbox</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../settings/page.py" />
-            <source>Silo</source>
             <translation type="unfinished" />
         </message>
         <message>

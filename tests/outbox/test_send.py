@@ -5,9 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-import signal
 import sqlite3
-import subprocess
 import sys
 import threading
 from collections.abc import Iterator
@@ -17,10 +15,8 @@ from typing import Any
 import pytest
 
 from silo.api.client import SiloClient
-from silo.api.events import Backoff
-from silo.api.outbox import Outbox, State, default_path
-from silo.api.policy import Retries
-from silo.api.wire import MergeEntry, MergeRequest, MergeResult, Revision, SourceDocument
+from silo.api.policy import Backoff, Retries
+from silo.api.wire import MergeEntry, MergeRequest, MergeResult, SourceDocument
 from silo.bom.errors import (
     AuthError,
     CancelledError,
@@ -33,6 +29,9 @@ from silo.bom.errors import (
     SiloError,
     UnreachableError,
 )
+from silo.outbox.entry import Commit, Entry, State
+from silo.outbox.send import Report, Sent, send_all
+from silo.outbox.store import Store
 from silo.testing import FakeSilo
 
 
@@ -50,11 +49,42 @@ def clock() -> Clock:
     return Clock()
 
 
+class Outbox(Store):
+    """A store, and sending from it without chance."""
+
+    def put(
+        self,
+        server: str,
+        part_number: str,
+        *,
+        file: Path | None = None,
+        bom: MergeRequest | None = None,
+        comment: str = "",
+        **more: Any,
+    ) -> Entry:
+        return self.add(
+            Commit(
+                path=str(file or ""),
+                taken_at=self.clock(),
+                part_number=part_number,
+                file=file,
+                request=bom.model_dump_json(exclude_none=True) if bom else "",
+                comment=comment,
+                **more,
+            ),
+            server,
+        )
+
+    def send(self, silo: Any, **more: Any) -> Report:
+        return send_all(self, silo, backoff=Backoff(first=10, longest=100), chance=lambda: 0.0, **more)
+
+    def waiting(self) -> int:
+        return sum(entry.state is State.WAITING for entry in self.entries())
+
+
 @pytest.fixture
 def outbox(tmp_path: Path, clock: Clock) -> Outbox:
-    return Outbox(
-        tmp_path / "outbox.sqlite3", backoff=Backoff(first=10, longest=100), clock=clock, chance=lambda: 0.0
-    )
+    return Outbox(tmp_path / "outbox.sqlite3", clock=clock)
 
 
 @pytest.fixture
@@ -114,36 +144,37 @@ def log_of(silo: FakeSilo, part_number: str) -> list[str]:
 
 def test_a_commit_is_kept_as_it_was(outbox: Outbox, model: Path, clock: Clock) -> None:
     """File and BOM of one moment, whatever becomes of the file; also for the next process."""
-    outbox.add("http://s", TOP, file=model, comment="first", properties={"mass_kg": 1}, bom=bom(4))
+    outbox.put("http://s", TOP, file=model, comment="first", properties={"mass_kg": 1}, bom=bom(4))
     model.write_bytes(b"second state")
     model.unlink()
-    file, snapshot = Outbox(outbox.path).pending()
-    assert (file.kind, file.part_number, file.server, file.taken_at) == ("file", TOP, "http://s", clock.now)
-    assert file.payload["sha256"] == hashlib.sha256(b"first state").hexdigest()
-    assert (file.payload["file_name"], file.payload["size"]) == ("Top ä.FCStd", 11)
-    assert (outbox.path.parent / "outbox-files" / str(file.payload["copy"])).read_bytes() == b"first state"
-    assert snapshot.payload["sync_id"]
-    assert snapshot.payload["entries"] == [{"child_part_number": BOLT, "quantity": 4, "source": "assembly"}]
+    (entry,) = Outbox(outbox.path).entries()
+    assert (entry.part_number, entry.server, entry.taken_at) == (TOP, "http://s:80/api", clock.now)
+    assert (entry.file_left, entry.bom_left, entry.properties) == (True, True, {"mass_kg": 1})
+    assert (entry.file_name, entry.size) == ("Top ä.FCStd", 11)
+    assert entry.sha256 == hashlib.sha256(b"first state").hexdigest()
+    assert (outbox.copies / entry.copy).read_bytes() == b"first state"
+    assert MergeRequest.model_validate_json(outbox.bom(entry.id)[1]) == bom(4)
 
 
 def test_a_file_that_cannot_be_read_is_told_and_nothing_is_kept(outbox: Outbox, tmp_path: Path) -> None:
     """The commit says so now, not the sending later."""
-    with pytest.raises(DocumentError, match=r"gone\.FCStd.*nothing was put aside"):
-        outbox.add("http://s", TOP, file=tmp_path / "gone.FCStd", bom=bom())
+    with pytest.raises(DocumentError, match=r"gone\.FCStd.*nothing was kept"):
+        outbox.put("http://s", TOP, file=tmp_path / "gone.FCStd", bom=bom())
     with pytest.raises(InputError, match="neither a file nor a BOM"):
-        outbox.add("http://s", TOP)
+        outbox.put("http://s", TOP)
     with pytest.raises(InputError, match="JSON"):
-        outbox.add("http://s", TOP, file=tmp_path, properties={"mass": float("nan")})
-    assert outbox.pending() == ()
-    assert list((outbox.path.parent / "outbox-files").iterdir()) == []
+        outbox.put("http://s", TOP, file=tmp_path, properties={"mass": float("nan")})
+    assert outbox.entries() == ()
+    assert list(outbox.copies.iterdir()) == []
 
 
 @pytest.mark.skipif(os.name != "posix", reason="file modes are POSIX")
 def test_nobody_else_can_read_it(outbox: Outbox, model: Path) -> None:
     """Designs and comments are private: database, its companions, copies, folder."""
+    outbox.entries()
     reader = sqlite3.connect(outbox.path)
     reader.execute("SELECT * FROM entry").fetchall()
-    outbox.add("http://s", TOP, file=model, bom=bom())
+    outbox.put("http://s", TOP, file=model, bom=bom())
     found = [p for p in outbox.path.parent.iterdir() if p.name.startswith("outbox")]
     assert {p.name for p in found} >= {"outbox.sqlite3", "outbox.sqlite3-wal", "outbox.lock", "outbox-files"}
     copies = list((outbox.path.parent / "outbox-files").iterdir())
@@ -154,11 +185,12 @@ def test_nobody_else_can_read_it(outbox: Outbox, model: Path) -> None:
 
 def test_a_newer_outbox_is_not_touched(outbox: Outbox) -> None:
     """Two versions of the add-on on one computer."""
+    outbox.entries()
     db = sqlite3.connect(outbox.path)
     db.execute("PRAGMA user_version = 99")
     db.close()
     with pytest.raises(InputError, match="newer silo-mod"):
-        Outbox(outbox.path)
+        Outbox(outbox.path).entries()
 
 
 def test_what_is_no_outbox_is_told(tmp_path: Path) -> None:
@@ -167,7 +199,7 @@ def test_what_is_no_outbox_is_told(tmp_path: Path) -> None:
     path.write_bytes(b"no database at all, but long enough to be looked at" * 20)
     before = path.read_bytes()
     with pytest.raises(InputError, match="cannot be used"):
-        Outbox(path)
+        Outbox(path).entries()
     assert path.read_bytes() == before
 
 
@@ -175,7 +207,7 @@ def test_the_default_place_is_the_users_data_folder(tmp_path: Path, monkeypatch:
     """Where data that must not be lost belongs."""
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
     if sys.platform == "linux":
-        assert default_path() == tmp_path / "silo-mod" / "outbox.sqlite3"
+        assert Store().path == tmp_path / "silo-mod" / "outbox.sqlite3"
 
 
 # -- sending ------------------------------------------------------------------------------------------------
@@ -185,22 +217,23 @@ def test_what_waits_is_sent_in_order_and_forgotten(outbox: Outbox, silo: FakeSil
     """File before BOM, commit after commit; the copies go with their entries."""
     for number in (1, 2):
         model.write_bytes(b"state %d" % number)
-        outbox.add(silo.base_url, TOP, file=model, comment=f"c{number}", bom=bom(number))
-    seen = []
-    report = outbox.send_all(silo, on_delivery=lambda d: seen.append(d.entry.id))
+        outbox.put(silo.base_url, TOP, file=model, comment=f"c{number}", bom=bom(number))
+    seen: list[Sent] = []
+    report = outbox.send(silo, on_sent=seen.append)
     assert log_of(silo, TOP) == ["c1", "1", "c2", "2"]
-    assert [type(d.result) for d in report.delivered] == [Revision, MergeResult, Revision, MergeResult]
-    assert seen == [d.entry.id for d in report.delivered]
-    assert (report.waiting, report.stopped_by, outbox.pending()) == (0, None, ())
-    assert list((outbox.path.parent / "outbox-files").iterdir()) == []
+    assert [(sent.revision, sent.result is not None) for sent in report.sent] == [(1, True), (2, True)]
+    assert seen == report.sent
+    assert (report.stopped_by, outbox.entries()) == (None, ())
+    assert list(outbox.copies.iterdir()) == []
     assert silo.items[TOP.casefold()].revisions[-1].file_name == "Top ä.FCStd"
 
 
 def test_the_bom_learns_which_revision_its_file_became(outbox: Outbox, silo: FakeSilo, model: Path) -> None:
     """Offline that could not be known; the history wants it. Another commit's BOM is left alone."""
-    for _ in range(2):
+    for number in range(2):
+        model.write_bytes(b"state %d" % number)
         request = bom().model_copy(update={"document": SourceDocument(file="Top.FCStd")})
-        outbox.add(silo.base_url, TOP, file=model, bom=request)
+        outbox.put(silo.base_url, TOP, file=model, bom=request)
     seen: list[MergeRequest] = []
     merge = silo.merge_bom
 
@@ -211,16 +244,16 @@ def test_the_bom_learns_which_revision_its_file_became(outbox: Outbox, silo: Fak
 
     spy = Spy()
     spy.items = silo.items
-    outbox.send_all(spy)
+    outbox.send(spy)
     assert [r.document.revision for r in seen if r.document] == [1, 2]
 
 
 def test_entries_go_only_to_their_own_server(outbox: Outbox, silo: FakeSilo) -> None:
     """Changed settings do not send a company's BOM to another one; a person may."""
-    (entry,) = outbox.add("http://old.example", TOP, bom=bom(3))
-    assert outbox.send_all(silo).delivered == ()
+    entry = outbox.put("http://old.example", TOP, bom=bom(3))
+    assert outbox.send(silo).sent == []
     outbox.retry(entry.id, server=silo.base_url)
-    assert len(outbox.send_all(silo).delivered) == 1
+    assert len(outbox.send(silo).sent) == 1
 
 
 @pytest.mark.parametrize("after", [False, True], ids=["before it acted", "after it acted"])
@@ -229,37 +262,39 @@ def test_a_lost_answer_is_neither_loss_nor_double(
     outbox: Outbox, silo: FakeSilo, model: Path, call: str, after: bool
 ) -> None:
     """The server may have acted or not; the next run finds out."""
-    outbox.add(silo.base_url, TOP, file=model, comment="c1", bom=bom(2))
+    outbox.put(silo.base_url, TOP, file=model, comment="c1", bom=bom(2))
     fail(silo, call, UnreachableError("gone"), after=after)
-    first = outbox.send_all(silo)
+    first = outbox.send(silo)
     assert [e.reason for e in first.failed] == ["gone"]
-    second = outbox.send_all(silo, force=True)
+    second = outbox.send(silo, force=True)
     assert log_of(silo, TOP) == ["c1", "2"]
-    assert (second.waiting, outbox.pending()) == (0, ())
+    assert (second.failed, outbox.entries()) == ([], ())
 
 
-def test_the_same_file_committed_twice_is_two_revisions(outbox: Outbox, silo: FakeSilo, model: Path) -> None:
-    """Also when the answer to the second is lost: an equal older revision is not ours."""
-    outbox.add(silo.base_url, TOP, file=model, comment="one")
-    outbox.send_all(silo)
-    outbox.add(silo.base_url, TOP, file=model, comment="two")
-    fail(silo, "upload_file", UnreachableError("gone"))
-    outbox.send_all(silo)
-    outbox.send_all(silo, force=True)
-    assert log_of(silo, TOP) == ["one", "two"]
+def test_going_back_is_a_revision_also_when_its_answer_was_lost(
+    outbox: Outbox, silo: FakeSilo, model: Path
+) -> None:
+    """An equal older revision is not ours."""
+    for number, content in enumerate((b"one", b"two", b"one")):
+        model.write_bytes(content)
+        outbox.put(silo.base_url, TOP, file=model, comment=f"c{number}")
+        fail(silo, "upload_file", UnreachableError("gone"))
+        outbox.send(silo)
+        outbox.send(silo, force=True)
+    assert log_of(silo, TOP) == ["c0", "c1", "c2"]
 
 
 def test_somebody_elses_newer_revision_does_not_hide_ours(
     outbox: Outbox, silo: FakeSilo, model: Path, tmp_path: Path
 ) -> None:
     """Ours arrived, the answer was lost, then a colleague committed: not sent again."""
-    outbox.add(silo.base_url, TOP, file=model, comment="ours")
+    outbox.put(silo.base_url, TOP, file=model, comment="ours")
     fail(silo, "upload_file", UnreachableError("gone"), after=True)
-    outbox.send_all(silo)
+    outbox.send(silo)
     colleague = tmp_path / "colleague.FCStd"
     colleague.write_bytes(b"theirs")
     silo.upload_file(TOP, colleague, "theirs")
-    outbox.send_all(silo, force=True)
+    outbox.send(silo, force=True)
     assert log_of(silo, TOP) == ["ours", "theirs"]
 
 
@@ -273,44 +308,45 @@ def test_what_is_rejected_stays_visible_and_holds_up_nobody(
 ) -> None:
     """With its reason, until a person retries or discards it."""
     unknown = bom(1, "no-such-part")
-    outbox.add(silo.base_url, TOP, bom=bom(1) if error else unknown)
-    outbox.add(silo.base_url, OTHER, bom=bom(2))
-    outbox.add(silo.base_url, TOP, bom=bom(3))
+    outbox.put(silo.base_url, TOP, bom=bom(1) if error else unknown)
+    outbox.put(silo.base_url, OTHER, bom=bom(2))
+    outbox.put(silo.base_url, TOP, bom=bom(3))
     if error:
         fail(silo, "merge_bom", error)
-    report = outbox.send_all(silo)
-    assert [e.part_number for e in report.rejected] == [TOP]
+    report = outbox.send(silo)
+    assert [e.part_number for e in report.held] == [TOP]
     assert (log_of(silo, OTHER), log_of(silo, TOP)) == (["2"], ["3"])
-    (left,) = outbox.pending()
-    assert left.state is State.REJECTED
+    (left,) = outbox.entries()
+    assert left.state is State.HELD
     assert (str(error) if error else "no-such-part") in left.reason
-    assert outbox.send_all(silo, force=True).delivered == ()
+    assert outbox.send(silo, force=True).sent == []
     outbox.discard(left.id)
-    assert outbox.pending() == ()
+    assert outbox.entries() == ()
     with pytest.raises(InputError, match="no entry"):
         outbox.discard(left.id)
 
 
 def test_an_old_state_is_not_brought_back_by_a_retry(outbox: Outbox, silo: FakeSilo) -> None:
     """The newer BOM arrived; retrying the rejected older one would undo it."""
-    (old,) = outbox.add(silo.base_url, TOP, bom=bom(1, "no-such-part"))
-    outbox.send_all(silo)
-    (early,) = outbox.add(silo.base_url, OTHER, bom=bom(1, "no-such-part"))
-    outbox.add(silo.base_url, TOP, bom=bom(5))
-    outbox.send_all(silo)
-    assert [e.superseded for e in outbox.pending()] == [True, False]
-    with pytest.raises(ConflictError, match="a newer BOM was sent"):
+    old = outbox.put(silo.base_url, TOP, bom=bom(1, "no-such-part"))
+    outbox.send(silo)
+    early = outbox.put(silo.base_url, OTHER, bom=bom(1, "no-such-part"))
+    outbox.put(silo.base_url, TOP, bom=bom(5))
+    outbox.send(silo)
+    assert [e.superseded for e in outbox.entries()] == [True, False]
+    with pytest.raises(ConflictError, match="a newer commit of it was sent"):
         outbox.retry(old.id)
-    assert outbox.retry(early.id).state is State.WAITING
+    outbox.retry(early.id)
+    assert [e.state for e in outbox.entries()] == [State.HELD, State.WAITING]
 
 
 def test_a_retry_after_mending_goes_through(outbox: Outbox, silo: FakeSilo) -> None:
     """The missing part was registered meanwhile."""
-    outbox.add(silo.base_url, TOP, bom=bom(1, "F01-0002"))
-    (rejected,) = outbox.send_all(silo).rejected
+    outbox.put(silo.base_url, TOP, bom=bom(1, "F01-0002"))
+    (refused,) = outbox.send(silo).held
     silo.create_item("kindred-rd", "F01", "Nut")
-    assert outbox.retry(rejected.id).reason == ""
-    assert len(outbox.send_all(silo).delivered) == 1
+    outbox.retry(refused.id)
+    assert len(outbox.send(silo).sent) == 1
 
 
 # -- passing failures ---------------------------------------------------------------------------------------
@@ -318,19 +354,19 @@ def test_a_retry_after_mending_goes_through(outbox: Outbox, silo: FakeSilo) -> N
 
 def test_pauses_grow_and_keep_the_order(outbox: Outbox, silo: FakeSilo, clock: Clock) -> None:
     """The second commit of an assembly waits for the first; others go on."""
-    outbox.add(silo.base_url, TOP, bom=bom(1))
-    outbox.add(silo.base_url, TOP, bom=bom(2))
-    outbox.add(silo.base_url, OTHER, bom=bom(9))
+    outbox.put(silo.base_url, TOP, bom=bom(1))
+    outbox.put(silo.base_url, TOP, bom=bom(2))
+    outbox.put(silo.base_url, OTHER, bom=bom(9))
     fail(silo, "merge_bom", ServerFaultError("500"), times=1)
-    report = outbox.send_all(silo)
+    report = outbox.send(silo)
     assert [e.next_attempt - clock.now for e in report.failed] == [10]
-    assert (log_of(silo, TOP), log_of(silo, OTHER), report.waiting) == ([], ["9"], 2)
+    assert (log_of(silo, TOP), log_of(silo, OTHER), outbox.waiting()) == ([], ["9"], 2)
     clock.now += 9
-    assert outbox.send_all(silo).delivered == ()
+    assert outbox.send(silo).sent == []
     fail(silo, "merge_bom", ServerFaultError("500"), times=1)
     clock.now += 1
-    assert [e.next_attempt - clock.now for e in outbox.send_all(silo).failed] == [20]
-    assert len(outbox.send_all(silo, force=True).delivered) == 2
+    assert [e.next_attempt - clock.now for e in outbox.send(silo).failed] == [20]
+    assert len(outbox.send(silo, force=True).sent) == 2
     assert log_of(silo, TOP) == ["1", "2"]
 
 
@@ -339,80 +375,80 @@ def test_pauses_grow_and_keep_the_order(outbox: Outbox, silo: FakeSilo, clock: C
 )
 def test_what_concerns_all_ends_the_run(outbox: Outbox, silo: FakeSilo, error: SiloError) -> None:
     """Nothing is rejected for it; the reason is on the entry and in the report."""
-    outbox.add(silo.base_url, TOP, bom=bom(1))
-    outbox.add(silo.base_url, OTHER, bom=bom(2))
+    outbox.put(silo.base_url, TOP, bom=bom(1))
+    outbox.put(silo.base_url, OTHER, bom=bom(2))
     fail(silo, "merge_bom", error, times=99)
-    report = outbox.send_all(silo)
+    report = outbox.send(silo)
     assert report.stopped_by is error
-    assert (report.waiting, len(report.failed), report.rejected) == (2, 1, ())
+    assert (outbox.waiting(), len(report.failed), report.held) == (2, 1, [])
     silo.before = lambda name: None
-    assert len(outbox.send_all(silo, force=True).delivered) == 2
+    assert len(outbox.send(silo, force=True).sent) == 2
 
 
 def test_an_absent_server_ends_the_run_but_a_stubborn_entry_does_not(
     outbox: Outbox, silo: FakeSilo, model: Path
 ) -> None:
     """A file that always times out must not hold up the other assemblies."""
-    outbox.add(silo.base_url, TOP, file=model)
-    outbox.add(silo.base_url, OTHER, bom=bom(2))
+    outbox.put(silo.base_url, TOP, file=model)
+    outbox.put(silo.base_url, OTHER, bom=bom(2))
     fail(silo, "upload_file", UnreachableError("too slow"), times=1)
-    assert outbox.send_all(silo).stopped_by is None
+    assert outbox.send(silo).stopped_by is None
     assert log_of(silo, OTHER) == ["2"]
 
     def gone(name: str) -> None:
         raise UnreachableError("nobody there")
 
     silo.before = gone
-    outbox.add(silo.base_url, OTHER, bom=bom(3))
-    report = outbox.send_all(silo, force=True)
+    outbox.put(silo.base_url, OTHER, bom=bom(3))
+    report = outbox.send(silo, force=True)
     assert isinstance(report.stopped_by, UnreachableError)
-    assert report.waiting == 2
+    assert outbox.waiting() == 2
 
 
 def test_a_stop_between_entries_keeps_the_rest(outbox: Outbox, silo: FakeSilo) -> None:
     """No pause is put on what was not tried."""
-    outbox.add(silo.base_url, TOP, bom=bom(1))
-    outbox.add(silo.base_url, OTHER, bom=bom(2))
+    outbox.put(silo.base_url, TOP, bom=bom(1))
+    outbox.put(silo.base_url, OTHER, bom=bom(2))
     stopped = threading.Event()
-    report = outbox.send_all(silo, cancelled=stopped, on_delivery=lambda d: stopped.set())
+    report = outbox.send(silo, cancelled=stopped, on_sent=lambda _sent: stopped.set())
     assert isinstance(report.stopped_by, CancelledError)
-    assert (len(report.delivered), report.waiting) == (1, 1)
-    assert len(outbox.send_all(silo).delivered) == 1
+    assert (len(report.sent), outbox.waiting()) == (1, 1)
+    assert len(outbox.send(silo).sent) == 1
 
 
 def test_what_is_added_while_sending_is_sent_too(outbox: Outbox, silo: FakeSilo) -> None:
     """A commit during a long run."""
-    outbox.add(silo.base_url, TOP, bom=bom(1))
+    outbox.put(silo.base_url, TOP, bom=bom(1))
     added: list[object] = []
 
     def add_one(delivery: object) -> None:
         if not added:
-            added.append(outbox.add(silo.base_url, TOP, bom=bom(2)))
+            added.append(outbox.put(silo.base_url, TOP, bom=bom(2)))
 
-    outbox.send_all(silo, on_delivery=add_one)
+    outbox.send(silo, on_sent=add_one)
     assert log_of(silo, TOP) == ["1", "2"]
 
 
 def test_only_one_sends_at_a_time(outbox: Outbox, silo: FakeSilo) -> None:
     """Another process or thread is told, and leaves it alone."""
-    outbox.add(silo.base_url, TOP, bom=bom(1))
+    outbox.put(silo.base_url, TOP, bom=bom(1))
     others = []
-    outbox.send_all(silo, on_delivery=lambda d: others.append(Outbox(outbox.path).send_all(silo)))
-    assert (others[0].busy, others[0].delivered) == (True, ())
-    assert outbox.send_all(silo).busy is False
+    outbox.send(silo, on_sent=lambda d: others.append(Outbox(outbox.path).send(silo)))
+    assert (others[0].busy, others[0].sent) == (True, [])
+    assert outbox.send(silo).busy is False
 
 
 def test_many_senders_at_once_send_each_entry_once(outbox: Outbox, silo: FakeSilo) -> None:
     """Threads with outboxes of their own over one file."""
     for number in range(1, 21):
-        outbox.add(silo.base_url, TOP, bom=bom(number))
+        outbox.put(silo.base_url, TOP, bom=bom(number))
     start = threading.Barrier(4)
 
     def send() -> None:
         mine = Outbox(outbox.path)
         start.wait()
-        while any(e.state is State.WAITING for e in mine.pending()):
-            mine.send_all(silo)
+        while mine.waiting():
+            mine.send(silo)
 
     threads = [threading.Thread(target=send) for _ in range(4)]
     for thread in threads:
@@ -422,17 +458,13 @@ def test_many_senders_at_once_send_each_entry_once(outbox: Outbox, silo: FakeSil
     assert log_of(silo, TOP) == [str(n) for n in range(1, 21)]
 
 
-def test_leftover_copies_are_swept_up_but_not_fresh_ones(outbox: Outbox, silo: FakeSilo, model: Path) -> None:
-    """What a crash between copy and entry left; another process may just be about to name a fresh one."""
-    outbox.add("http://elsewhere", TOP, file=model)
-    copies = outbox.path.parent / "outbox-files"
-    for name, age in (("old.FCStd", 7200), ("fresh.FCStd", 10)):
-        (copies / name).write_bytes(b"x")
-        stamp = (copies / name).stat().st_mtime - age
-        os.utime(copies / name, (stamp, stamp))
-    outbox.send_all(silo)
-    kept = {outbox.pending()[0].payload["copy"], "fresh.FCStd"}
-    assert {p.name for p in copies.iterdir()} == kept
+def test_files_without_a_row_are_swept_up(outbox: Outbox, silo: FakeSilo, model: Path) -> None:
+    """A row is there before its files, so what has none is what a crash left: no clock is asked."""
+    entry = outbox.put("http://elsewhere", TOP, file=model)
+    for name in ("gone.FCStd", ".gone.FCStd.x1.part", f"{entry.key}.FCStd"):
+        (outbox.copies / name).write_bytes(b"x")
+    outbox.send(silo)
+    assert {p.name for p in outbox.copies.iterdir()} == {entry.copy}
 
 
 # -- over HTTP ----------------------------------------------------------------------------------------------
@@ -453,63 +485,10 @@ def embedded(tmp_path: Path) -> Iterator[SiloClient]:
 def test_it_sends_to_the_embedded_server(outbox: Outbox, embedded: SiloClient, model: Path) -> None:
     """File and BOM over real HTTP, with the entry's progress."""
     seen: list[tuple[int, int]] = []
-    outbox.add(embedded.base_url, TOP, file=model, comment="c1", bom=bom(4))
-    report = outbox.send_all(embedded, on_progress=lambda entry, done, total: seen.append((done, total)))
-    assert len(report.delivered) == 2
+    outbox.put(embedded.base_url, TOP, file=model, comment="c1", bom=bom(4))
+    report = outbox.send(embedded, on_progress=lambda entry, done, total: seen.append((done, total)))
+    assert len(report.sent) == 1
     assert seen[-1] == (11, 11)
     revision = embedded.revisions(TOP)[0]
     assert (revision.comment, revision.file_checksum) == ("c1", hashlib.sha256(b"first state").hexdigest())
     assert [(line.child_part_number, line.quantity) for line in embedded.get_bom(TOP)] == [(BOLT, 4)]
-
-
-SENDER = """
-import sys
-from pathlib import Path
-from silo.api.client import SiloClient
-from silo.api.outbox import Outbox
-with SiloClient(sys.argv[2], "silo_secret") as client:
-    Outbox(Path(sys.argv[1])).send_all(client, force=True)
-"""
-
-
-@pytest.mark.skipif(os.name != "posix", reason="kill -9 is POSIX")
-@pytest.mark.parametrize("died_in", ["upload", "merge"])
-def test_a_killed_process_leaves_everything_to_the_next(
-    outbox: Outbox, server: Any, answer: Any, model: Path, died_in: str
-) -> None:
-    """kill -9 while the server has acted and its answer is on the way: the next process completes it once."""
-    files, merges = [], []
-    arrived, released = threading.Event(), threading.Event()
-
-    def hold(kind: str) -> None:
-        if kind == died_in and not released.is_set():
-            arrived.set()
-            released.wait(60)
-
-    def uploaded() -> None:
-        files.append({"revision_number": len(files) + 1, "file_checksum": sha256})
-        server.scripts["GET /api/items/A01-0001/revisions"].clear()
-        server.on("GET /api/items/A01-0001/revisions", list(files))
-        hold("upload")
-
-    def merged() -> None:
-        merges.append(server.seen[-1].json()["sync_id"])
-        hold("merge")
-
-    sha256 = hashlib.sha256(model.read_bytes()).hexdigest()
-    server.on("GET /api/items/A01-0001/revisions", [])
-    server.on("POST /api/items/A01-0001/file", answer(201, {"revision_number": 1}, before=uploaded))
-    server.on(
-        "POST /api/items/A01-0001/bom/merge",
-        answer(200, {"status": "merged", "diff": {"added": []}}, before=merged),
-    )
-    outbox.add(server.url, TOP, file=model, comment="c1", bom=bom(4))
-    command = [sys.executable, "-c", SENDER, str(outbox.path), server.url]
-    process = subprocess.Popen(command)
-    assert arrived.wait(60)
-    process.send_signal(signal.SIGKILL)
-    process.wait(60)
-    released.set()
-    # The lock went with the process, so this one may send at once.
-    subprocess.run(command, check=True, timeout=60)
-    assert (len(files), len(set(merges)), outbox.pending()) == (1, 1, ())

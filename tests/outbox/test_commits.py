@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""From the spool through the outbox to the server."""
+"""Commits from the outbox to the server: what arrives, what is held, and in which words."""
 
 from __future__ import annotations
 
+import threading
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -16,11 +17,10 @@ from silo.bom.errors import (
     UnreachableError,
 )
 from silo.bom_sync import Status
-from silo.workbench.session.jobs import Control
-from silo.workbench.session.spool import Commit, new_key
+from silo.outbox.entry import ASKED, Commit, State
 
 if TYPE_CHECKING:
-    from conftest import Vault
+    from vault import Vault
 
 
 def on(silo: Any, name: str, error: SiloError, *, after: bool = False) -> None:
@@ -41,102 +41,101 @@ def well(silo: Any) -> None:
 DOWN = UnreachableError("no answer")
 
 
-def test_a_commit_brings_file_and_bom(vault: Vault, control: Control) -> None:
+def test_a_commit_brings_file_and_bom(vault: Vault) -> None:
     """One box with both, and nothing waits any more."""
     vault.commit(vault.snapshot(vault.part("Bolt", 12)), comment="first")
-    report = vault.sending.run(vault.silo, control)
+    report = vault.send()
     assert vault.lines() == {"F01-0001": 12}
     assert vault.files() == [b"top file"]
     (sent,) = vault.told
     assert (sent.status, sent.part_number) == (Status.MERGED, vault.number)
-    assert sent.revision is not None
-    assert sent.revision.comment == "first"
+    assert (sent.revision, sent.entry.comment) == (1, "first")
     assert sent.result is not None
     assert [line.part_number for line in sent.result.diff.added] == ["F01-0001"]
-    assert (vault.sending.waiting(), report.stopped_by) == ((), None)
+    assert (vault.waiting(), report.stopped_by) == ((), None)
 
 
-def test_an_unchanged_bom_posts_nothing(vault: Vault, control: Control) -> None:
+def test_an_unchanged_bom_posts_nothing(vault: Vault) -> None:
     """The file goes, the BOM is compared and left alone."""
     vault.commit(vault.snapshot(vault.part("Bolt", 4)), content=b"one")
-    vault.sending.run(vault.silo, control)
+    vault.send()
     events = len(vault.silo.log)
     vault.commit(vault.snapshot(vault.part("Bolt", 4)), content=b"two")
-    vault.sending.run(vault.silo, control)
+    vault.send()
     assert vault.told[1].status is Status.UNCHANGED
     assert [event.type for event in vault.silo.log[events:]] == ["revision.created"]
     assert vault.files() == [b"one", b"two"]
 
 
-def test_an_unchanged_file_is_not_uploaded_again(vault: Vault, control: Control) -> None:
+def test_an_unchanged_file_is_not_uploaded_again(vault: Vault) -> None:
     """The server's newest revision is this very file."""
     for _ in range(2):
         vault.commit(vault.snapshot(vault.part("Bolt", 4)))
-        vault.sending.run(vault.silo, control)
+        vault.send()
     assert vault.files() == [b"top file"]
     assert vault.told[1].revision is None
     assert vault.told[1].status is Status.UNCHANGED
 
 
-def test_going_back_to_an_older_file_is_a_new_revision(vault: Vault, control: Control) -> None:
+def test_going_back_to_an_older_file_is_a_new_revision(vault: Vault) -> None:
     """Only the newest revision says "there already"."""
     for content in (b"one", b"two", b"one"):
         vault.commit(vault.snapshot(), content=content)
-        vault.sending.run(vault.silo, control)
+        vault.send()
     assert vault.files() == [b"one", b"two", b"one"]
 
 
-def test_a_part_brings_its_file_only(vault: Vault, control: Control) -> None:
+def test_a_part_brings_its_file_only(vault: Vault) -> None:
     """And has no BOM status."""
     from silo.workbench.commit.snapshot import Snapshot
 
     vault.commit(Snapshot(str(vault.top), "Top", vault.ids["Top"]))
-    vault.sending.run(vault.silo, control)
+    vault.send()
     assert vault.told[0].status is None
     assert vault.files() == [b"top file"]
 
 
-def test_with_the_sync_switched_off_only_the_file_goes(vault: Vault, control: Control) -> None:
+def test_with_the_sync_switched_off_only_the_file_goes(vault: Vault) -> None:
     """A preference of the user."""
     vault.commit(vault.snapshot(vault.part("Bolt", 4)), sync_bom=False)
-    vault.sending.run(vault.silo, control)
+    vault.send()
     assert (vault.lines(), vault.files()) == ({}, [b"top file"])
 
 
-def test_without_a_file_only_the_bom_goes(vault: Vault, control: Control) -> None:
+def test_without_a_file_only_the_bom_goes(vault: Vault) -> None:
     """Somebody else committed the file."""
     vault.commit(vault.snapshot(vault.part("Bolt", 4)), content=None)
-    vault.sending.run(vault.silo, control)
+    vault.send()
     assert (vault.lines(), vault.files()) == ({"F01-0001": 4}, [])
 
 
-def test_a_broken_link_holds_the_bom_back_and_the_file_goes(vault: Vault, control: Control) -> None:
+def test_a_broken_link_holds_the_bom_back_and_the_file_goes(vault: Vault) -> None:
     """A missing file must never read as "removed"."""
     vault.commit(vault.snapshot(vault.part("Bolt", 4), vault.part("Plate")))
-    vault.sending.run(vault.silo, control)
+    vault.send()
     vault.commit(vault.snapshot(vault.part("Bolt", 4), broken=True), content=b"two")
-    vault.sending.run(vault.silo, control)
+    vault.send()
     assert vault.told[1].status is Status.BLOCKED
     assert vault.files() == [b"top file", b"two"]
     assert all(line.unreferenced_since is None for line in vault.silo.get_bom(vault.number))
 
 
-def test_a_broken_link_with_consent_is_synced(vault: Vault, control: Control) -> None:
+def test_a_broken_link_with_consent_is_synced(vault: Vault) -> None:
     """Then what it stood for is unreferenced, never removed."""
     vault.commit(vault.snapshot(vault.part("Bolt", 4), vault.part("Plate")))
-    vault.sending.run(vault.silo, control)
+    vault.send()
     vault.commit(vault.snapshot(vault.part("Bolt", 4), broken=True), content=b"two", allow_missing=True)
-    vault.sending.run(vault.silo, control)
+    vault.send()
     assert vault.told[1].status is Status.MERGED
     flagged = {ln.child_part_number: bool(ln.unreferenced_since) for ln in vault.silo.get_bom(vault.number)}
     assert flagged == {"F01-0001": False, "M01-0001": True}
 
 
-def test_components_without_a_number_are_left_out_and_told(vault: Vault, control: Control) -> None:
+def test_components_without_a_number_are_left_out_and_told(vault: Vault) -> None:
     """The rest is synced."""
     stranger = vault.part("Stranger", identity="7f9fd73b-50c9-41d8-b7b2-575a030c1eeb")
     vault.commit(vault.snapshot(vault.part("Bolt", 4), stranger))
-    vault.sending.run(vault.silo, control)
+    vault.send()
     assert vault.lines() == {"F01-0001": 4}
     assert vault.told[0].resolved is not None
     assert [entry.label for entry in vault.told[0].resolved.unresolved] == ["Stranger"]
@@ -147,7 +146,7 @@ def test_components_without_a_number_are_left_out_and_told(vault: Vault, control
 
 @pytest.mark.parametrize("call", ["get_items_by_uuid", "upload_file", "merge_bom"])
 @pytest.mark.parametrize("after", [False, True], ids=["before it acted", "after it acted"])
-def test_the_server_goes_away_and_freecad_too(vault: Vault, control: Control, call: str, after: bool) -> None:
+def test_the_server_goes_away_and_freecad_too(vault: Vault, call: str, after: bool) -> None:
     """Whenever it happens: after a restart everything arrives, once."""
     if call == "get_items_by_uuid":
         # The look-up changes nothing, so the fake has no hook for it.
@@ -160,175 +159,206 @@ def test_the_server_goes_away_and_freecad_too(vault: Vault, control: Control, ca
     else:
         on(vault.silo, call, DOWN, after=after)
     vault.commit(vault.snapshot(vault.part("Bolt", 12)))
-    vault.sending.run(vault.silo, control)
-    assert vault.sending.waiting()
+    vault.send()
+    assert vault.waiting()
     if call == "get_items_by_uuid":
         vault.silo.get_items_by_uuid = original  # type: ignore[method-assign]
     well(vault.silo)
-    vault.again().run(vault.silo, control, force=True)
+    vault.again()
+    vault.send(force=True)
     assert (vault.lines(), vault.files()) == ({"F01-0001": 12}, [b"top file"])
-    assert vault.sending.waiting() == ()
+    assert vault.waiting() == ()
     assert len([event for event in vault.silo.log if event.type == "bom_merge"]) == 1
 
 
-def test_several_commits_arrive_in_order(vault: Vault, control: Control) -> None:
+def test_several_commits_arrive_in_order(vault: Vault) -> None:
     """None is lost, the last one's BOM is the one that stands."""
     on(vault.silo, "upload_file", DOWN)
     for count in (1, 2, 3):
         vault.commit(vault.snapshot(vault.part("Bolt", count)), content=f"file {count}".encode())
-        vault.sending.run(vault.silo, control)
+        vault.send()
     well(vault.silo)
-    vault.sending.run(vault.silo, control, force=True)
+    vault.send(force=True)
     assert vault.files() == [b"file 1", b"file 2", b"file 3"]
     assert vault.lines() == {"F01-0001": 3}
 
 
-def test_a_crash_between_outbox_and_spool_doubles_nothing(vault: Vault, control: Control) -> None:
-    """The commit lies in both; it is sent once."""
-    on(vault.silo, "upload_file", DOWN)
-    kept = vault.commit(vault.snapshot(vault.part("Bolt", 12)))
-    original = vault.sending.spool.remove
-    vault.sending.spool.remove = lambda _commit: None  # type: ignore[method-assign]
-    vault.sending.run(vault.silo, control)
-    vault.sending.spool.remove = original  # type: ignore[method-assign]
-    assert [w.id.split(":")[0] for w in vault.sending.waiting()] == ["commit", "outbox", "outbox"]
-    well(vault.silo)
-    vault.again().run(vault.silo, control, force=True)
-    assert vault.sending.waiting() == ()
-    assert vault.files() == [b"top file"]
-    assert len([event for event in vault.silo.log if event.type == "bom_merge"]) == 1
-    assert kept.key
-
-
 @pytest.mark.parametrize("error", [ReadOnlyError("read-only"), AuthError("token")])
-def test_what_a_later_try_may_mend_waits(vault: Vault, control: Control, error: SiloError) -> None:
+def test_what_a_later_try_may_mend_waits(vault: Vault, error: SiloError) -> None:
     """A read-only server, a wrong token: nothing is rejected, all is kept."""
     on(vault.silo, "upload_file", error)
     vault.commit(vault.snapshot(vault.part("Bolt", 12)))
-    report = vault.sending.run(vault.silo, control)
+    report = vault.send()
     assert report.stopped_by is error
-    assert not any(waiting.rejected for waiting in vault.sending.waiting())
+    assert not any(waiting.state is State.HELD for waiting in vault.waiting())
 
 
 def test_what_the_server_does_not_want_stays_visible_and_holds_up_nobody(
-    vault: Vault, control: Control
+    vault: Vault,
 ) -> None:
     """With its reason; a later commit goes its way."""
     on(vault.silo, "merge_bom", RejectedError("entries[0]: unknown part"))
     vault.commit(vault.snapshot(vault.part("Bolt", 1)), content=b"one")
-    vault.sending.run(vault.silo, control)
-    (waiting,) = vault.sending.waiting()
-    assert (waiting.rejected, waiting.reason, waiting.what) == (True, "entries[0]: unknown part", "BOM")
+    vault.send()
+    (waiting,) = vault.waiting()
+    assert (waiting.state, waiting.reason) == (State.HELD, "entries[0]: unknown part")
+    assert (waiting.file_left, waiting.bom_left) == (False, True)
     well(vault.silo)
     vault.commit(vault.snapshot(vault.part("Bolt", 2)), content=b"two")
-    vault.sending.run(vault.silo, control)
+    vault.send()
     assert vault.lines() == {"F01-0001": 2}
-    assert vault.sending.waiting() == (waiting,)
-    vault.sending.discard(waiting.id)
-    assert vault.sending.waiting() == ()
+    assert [(w.id, w.superseded) for w in vault.waiting()] == [(waiting.id, True)]
+    vault.outbox.discard(waiting.id)
+    assert vault.waiting() == ()
 
 
-def test_a_rejected_thing_can_be_tried_again(vault: Vault, control: Control) -> None:
+def test_a_rejected_thing_can_be_tried_again(vault: Vault) -> None:
     """After somebody mended what was wrong."""
     on(vault.silo, "merge_bom", ForbiddenError("viewers may not"))
     vault.commit(vault.snapshot(vault.part("Bolt", 1)))
-    vault.sending.run(vault.silo, control)
+    vault.send()
     well(vault.silo)
-    vault.sending.run(vault.silo, control, force=True)
+    vault.send(force=True)
     assert vault.lines() == {}
-    vault.sending.retry(vault.sending.waiting()[0].id)
-    vault.sending.run(vault.silo, control)
+    vault.outbox.retry(vault.waiting()[0].id)
+    vault.send()
     assert vault.lines() == {"F01-0001": 1}
 
 
-def test_an_item_that_this_server_does_not_know(vault: Vault, control: Control) -> None:
+def test_an_item_that_this_server_does_not_know(vault: Vault) -> None:
     """Kept with its reason, in nobody's way, tried again when asked, and discarded when told."""
     unknown = "7f9fd73b-50c9-41d8-b7b2-575a030c1eeb"
     vault.commit(vault.snapshot(identity=unknown))
     vault.commit(vault.snapshot(vault.part("Bolt", 1)))
-    vault.sending.run(vault.silo, control)
-    (waiting,) = vault.sending.waiting()
-    assert waiting.rejected
+    vault.send()
+    (waiting,) = vault.waiting()
+    assert waiting.state is State.HELD
     assert waiting.reason.startswith("Silo does not know Top; register it")
     assert vault.lines() == {"F01-0001": 1}
-    vault.sending.retry(waiting.id)
-    assert not vault.sending.waiting()[0].rejected
-    vault.sending.discard(waiting.id)
-    assert vault.sending.waiting() == ()
+    vault.outbox.retry(waiting.id)
+    assert vault.waiting()[0].state is State.WAITING
+    vault.outbox.discard(waiting.id)
+    assert vault.waiting() == ()
     assert vault.top.exists()
 
 
-def test_two_freecads_do_not_send_the_same(vault: Vault, control: Control) -> None:
+def test_two_freecads_do_not_send_the_same(vault: Vault) -> None:
     """The second one leaves it to the first."""
     vault.commit(vault.snapshot(vault.part("Bolt", 1)))
-    with vault.sending.spool.forwarding():
-        report = vault.again().run(vault.silo, control)
+    with vault.outbox.send_lock():
+        vault.again()
+        report = vault.send()
     assert report.busy
     assert vault.files() == []
 
 
-def test_stop_keeps_what_is_not_sent(vault: Vault, control: Control) -> None:
+def test_stop_keeps_what_is_not_sent(vault: Vault) -> None:
     """A person's stop is no failure."""
     vault.commit(vault.snapshot(vault.part("Bolt", 1)))
-    control.cancelled.set()
-    report = vault.sending.run(vault.silo, control)
+    stop = threading.Event()
+    stop.set()
+    report = vault.send(stop=stop)
     assert report.stopped_by is not None
     assert report.stopped_by.code == "cancelled"
-    (waiting,) = vault.sending.waiting()
-    assert not waiting.rejected
-
-
-def test_what_waits_is_told_in_words(vault: Vault) -> None:
-    """Which document, what of it, since when."""
-    vault.commit(vault.snapshot(vault.part("Bolt", 1)))
-    (waiting,) = vault.sending.waiting()
-    assert (waiting.title, waiting.what, waiting.since) == ("Top", "file and BOM", 1001.0)
+    (waiting,) = vault.waiting()
+    assert waiting.state is State.WAITING
 
 
 def renamed(vault: Vault, content: bytes) -> None:
     """Commit the assembly from a file of another name, as after FreeCAD's Save As."""
-    from silo.workbench.commit.snapshot import Snapshot
-
     path = vault.folder / "TopLong.FCStd"
     path.write_bytes(content)
     vault.clock += 1
-    taken = Snapshot(str(path), "TopLong", vault.ids["Top"])
-    vault.sending.spool.add(Commit(new_key(), taken, vault.clock, file=path))
+    vault.outbox.add(Commit(str(path), vault.clock, "TopLong", vault.ids["Top"], file=path))
 
 
-def test_a_file_of_another_name_is_not_sent_unasked(vault: Vault, control: Control) -> None:
+def test_a_file_of_another_name_is_not_sent_unasked(vault: Vault) -> None:
     """Save As copies the identity along: the copy must not become a revision of the part it was made from."""
     vault.commit(vault.snapshot())
-    vault.sending.run(vault.silo, control)
+    vault.send()
     renamed(vault, b"a longer one")
     vault.commit(vault.snapshot(), content=b"the original goes on")
-    vault.sending.run(vault.silo, control, force=True)
+    vault.send(force=True)
     assert vault.files() == [b"top file", b"the original goes on"]
-    (waiting,) = vault.sending.waiting()
-    assert waiting.rejected
+    (waiting,) = vault.waiting()
+    assert waiting.state is State.HELD
     for word in ("TopLong.FCStd", vault.number, "whose file in Silo is Top.FCStd", "Retry", "Discard"):
         assert word in waiting.reason
 
 
-def test_retry_says_that_it_is_the_same_part(vault: Vault, control: Control) -> None:
+def test_retry_says_that_it_is_the_same_part(vault: Vault) -> None:
     """Then it is sent, and the new name is the item's from now on."""
     vault.commit(vault.snapshot())
-    vault.sending.run(vault.silo, control)
+    vault.send()
     renamed(vault, b"a longer one")
-    vault.sending.run(vault.silo, control)
-    vault.sending.retry(vault.sending.waiting()[0].id)
-    vault.sending.run(vault.silo, control)
+    vault.send()
+    vault.outbox.retry(vault.waiting()[0].id)
+    vault.send()
     renamed(vault, b"longer still")
-    vault.sending.run(vault.silo, control)
+    vault.send()
     assert vault.files() == [b"top file", b"a longer one", b"longer still"]
-    assert vault.sending.waiting() == ()
+    assert vault.waiting() == ()
 
 
-def test_a_renamed_file_without_a_change_is_no_question(vault: Vault, control: Control) -> None:
+def test_a_renamed_file_without_a_change_is_no_question(vault: Vault) -> None:
     """The server has this very content."""
     vault.commit(vault.snapshot())
-    vault.sending.run(vault.silo, control)
+    vault.send()
     renamed(vault, b"top file")
-    vault.sending.run(vault.silo, control)
+    vault.send()
     assert vault.files() == [b"top file"]
-    assert vault.sending.waiting() == ()
+    assert vault.waiting() == ()
+
+
+def test_a_retry_for_another_reason_answers_no_question(vault: Vault) -> None:
+    """Only who was asked whether it is the same part has said so."""
+    vault.commit(vault.snapshot())
+    vault.send()
+    renamed(vault, b"a longer one")
+    entry = vault.waiting()[0]
+    vault.outbox.update(entry.id, state=State.HELD, reason="refused for something else")
+    vault.outbox.retry(entry.id)
+    vault.send()
+    assert vault.files() == [b"top file"]
+    assert vault.waiting()[0].renamed == ASKED
+
+
+def test_a_refused_file_does_not_keep_the_bom(vault: Vault) -> None:
+    """Too large for the server; the BOM is as it should be, and the file waits for a person."""
+    on(vault.silo, "upload_file", RejectedError("413: too large"))
+    vault.commit(vault.snapshot(vault.part("Bolt", 3)))
+    vault.send()
+    (waiting,) = vault.waiting()
+    assert (waiting.file_left, waiting.bom_left, waiting.reason) == (True, False, "413: too large")
+    assert vault.lines() == {"F01-0001": 3}
+    well(vault.silo)
+    vault.outbox.retry(waiting.id)
+    vault.send()
+    assert (vault.files(), vault.waiting()) == ([b"top file"], ())
+
+
+def test_a_part_that_is_registered_after_the_refusal_is_in_the_bom_of_the_retry(vault: Vault) -> None:
+    """What was refused is resolved anew, not sent again as it was."""
+    stranger = "7f9fd73b-50c9-41d8-b7b2-575a030c1eeb"
+    vault.commit(vault.snapshot(vault.part("Bolt", 1), vault.part("New", identity=stranger)))
+    on(vault.silo, "merge_bom", RejectedError("not now"))
+    vault.send()
+    well(vault.silo)
+    vault.silo.create_item("kindred-rd", "F01", "New", idempotency_key=stranger)
+    vault.outbox.retry(vault.waiting()[0].id)
+    vault.send()
+    assert vault.lines() == {"F01-0001": 1, "F01-0002": 1}
+
+
+def test_what_is_sent_again_is_what_was_sent(vault: Vault) -> None:
+    """The server knows a merge by its sync_id and content: a part registered meanwhile must not change it."""
+    stranger = "7f9fd73b-50c9-41d8-b7b2-575a030c1eeb"
+    vault.commit(vault.snapshot(vault.part("Bolt", 1), vault.part("New", identity=stranger)))
+    on(vault.silo, "merge_bom", DOWN, after=True)
+    vault.send()
+    well(vault.silo)
+    vault.silo.create_item("kindred-rd", "F01", "New", idempotency_key=stranger)
+    vault.again()
+    vault.send(force=True)
+    assert (vault.lines(), vault.waiting()) == ({"F01-0001": 1}, ())
+    assert len([event for event in vault.silo.log if event.type == "bom_merge"]) == 1

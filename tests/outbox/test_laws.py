@@ -13,10 +13,11 @@ from typing import Any
 from hypothesis import event, given, settings
 from hypothesis import strategies as st
 
-from silo.api.outbox import Outbox, State
-from silo.api.outbox_store import OutboxEntry, Store
 from silo.api.wire import MergeEntry, MergeRequest
 from silo.bom.errors import ReadOnlyError, ServerFaultError, UnreachableError
+from silo.outbox.entry import Commit, Entry, State, new_key
+from silo.outbox.send import send_all
+from silo.outbox.store import Store
 from silo.testing import FakeSilo
 
 
@@ -55,18 +56,29 @@ class DyingStore(Store):
         super().update(entry_id, **values)
         self.fate.meet(local=True)
 
-    def arrived(self, entry: OutboxEntry, now: float, revision: int | None = None) -> None:
+    def arrived(self, entry: Entry, kind: str, revision: int | None = None, *, note: bool = True) -> None:
         self.fate.meet(local=True)
-        super().arrived(entry, now, revision)
+        super().arrived(entry, kind, revision, note=note)
         self.fate.meet(local=True)
 
-    def drop_copy(self, entry: OutboxEntry) -> None:
+    def stage(self, commit: Commit, server: str = "") -> None:
         self.fate.meet(local=True)
-        super().drop_copy(entry)
+        super().stage(commit, server)
 
-    def insert(self, rows: list[dict[str, Any]]) -> list[int]:
+    def finish(self, key: str, source: Path | None = None) -> None:
         self.fate.meet(local=True)
-        return super().insert(rows)
+        super().finish(key, source)
+        self.fate.meet(local=True)
+
+    def _copied(self, source: Path, copy: Path) -> tuple[str, int]:
+        self.fate.meet(local=True)
+        found = super()._copied(source, copy)
+        self.fate.meet(local=True)
+        return found
+
+    def _drop_files(self, entry: Entry) -> None:
+        self.fate.meet(local=True)
+        super()._drop_files(entry)
 
 
 @contextmanager
@@ -78,13 +90,15 @@ def folder() -> Iterator[Path]:
         shutil.rmtree(made)
 
 
-def opened(path: Path, fate: Fate) -> Outbox:
+def opened(path: Path, fate: Fate) -> Store:
     """A new process's outbox."""
-    outbox = Outbox(path, chance=lambda: 0.0)
     store = DyingStore(path)
     store.fate = fate
-    outbox._store = store
-    return outbox
+    return store
+
+
+def sending(store: Store, silo: FakeSilo) -> None:
+    send_all(store, silo, force=True, chance=lambda: 0.0)
 
 
 def arrived(silo: FakeSilo, part_number: str) -> list[str]:
@@ -98,17 +112,15 @@ def arrived(silo: FakeSilo, part_number: str) -> list[str]:
 
 
 fates = st.lists(st.sampled_from([None, None, None, *FATES]), max_size=25)
-# (assembly, with a file, with a BOM, the BOM names an unknown part, the file's content)
-commits = st.tuples(
-    st.integers(1, 3), st.booleans(), st.booleans(), st.booleans(), st.sampled_from([b"a", b"b"])
-)
+# (assembly, with a file, with a BOM, the BOM names an unknown part)
+commits = st.tuples(st.integers(1, 3), st.booleans(), st.booleans(), st.booleans())
 actions = st.lists(st.one_of(commits, st.just("send")), min_size=1, max_size=12)
 
 
 @settings(deadline=None, max_examples=100)
 @given(actions, fates)
 def test_each_commit_arrives_once_and_in_order(actions: list[Any], drawn: list[str | None]) -> None:
-    """Kills at every step of sending, losses before and after the server acted, rejections in between."""
+    """Kills at every step of keeping and sending, losses before and after the server acted, refusals."""
     silo, fate = FakeSilo(), Fate(drawn)
     silo.before = lambda name: (
         fate.meet() if name in ("merge_bom", "upload_file", "revisions", "ready") else None
@@ -118,40 +130,57 @@ def test_each_commit_arrives_once_and_in_order(actions: list[Any], drawn: list[s
         silo.create_item("kindred-rd", "A01", f"Assembly {number}")
     silo.create_item("kindred-rd", "F01", "Bolt")
     expected: dict[str, list[str]] = {f"A01-000{n}": [] for n in (1, 2, 3)}
-    rejected: set[str] = set()
+    refused: set[str] = set()
     with folder() as place:
         for step, action in enumerate(actions):
-            outbox = opened(place / "outbox.sqlite3", fate)
+            store = opened(place / "outbox.sqlite3", fate)
+            is_staged = False
             try:
                 if action == "send":
-                    outbox.send_all(silo, force=True)
+                    sending(store, silo)
                     continue
-                assembly, with_file, with_bom, poisoned, content = action
+                assembly, with_file, with_bom, poisoned = action
+                with_file = with_file or not with_bom
                 item = f"A01-000{assembly}"
                 path = place / "model.FCStd"
-                path.write_bytes(content)
+                path.unlink(missing_ok=True)
+                path.write_bytes(b"content %d" % step)
                 child = "no-such-part" if poisoned else "F01-0001"
                 entry = MergeEntry(child_part_number=child, quantity=step + 1)
                 request = MergeRequest(entries=[entry], sync_id=f"bom {step}")
-                outbox.add(
-                    silo.base_url,
-                    item,
-                    file=path if with_file or not with_bom else None,
+                key = new_key()
+                commit = Commit(
+                    str(path),
+                    float(step),
+                    part_number=item,
+                    key=key,
+                    file=store.hold(str(path), key) if with_file else None,
                     comment=f"file {step}",
-                    bom=request if with_bom else None,
+                    request=request.model_dump_json(exclude_none=True) if with_bom else "",
                 )
+                store.stage(commit, silo.base_url)
+                is_staged = True
+                store.finish(key)
             except Killed:
                 event("killed")
-                continue
-            # add() returned, so from here on the commit may not be lost.
-            expected[item] += [f"file {step}"] if with_file or not with_bom else []
-            expected[item] += [f"bom {step}"] if with_bom and not poisoned else []
-            rejected |= {f"bom {step}"} if with_bom and poisoned else set()
-        outbox = opened(place / "outbox.sqlite3", fate)
-        while any(entry.state is State.WAITING for entry in outbox.pending()):
+            if is_staged:
+                # stage() returned, so from here on the commit may not be lost.
+                expected[item] += [f"file {step}"] if with_file else []
+                expected[item] += [f"bom {step}"] if with_bom and not poisoned else []
+                refused |= {f"bom {step}"} if with_bom and poisoned else set()
+        while True:
+            store = opened(place / "outbox.sqlite3", fate)
             try:
-                outbox.send_all(silo, force=True)
+                if all(entry.state is State.HELD for entry in store.entries()):
+                    break
+                sending(store, silo)
             except Killed:
-                outbox = opened(place / "outbox.sqlite3", fate)
+                continue
         assert {item: arrived(silo, item) for item in expected} == expected
-        assert {entry.payload["sync_id"] for entry in outbox.pending()} == rejected
+        left = {MergeRequest.model_validate_json(store.bom(e.id)[1]).sync_id for e in store.entries()}
+        assert left == refused
+        store.fate = Fate([])
+        store.sweep()
+        assert {path.name for path in store.copies.iterdir()} == {
+            e.copy for e in store.entries() if e.file_left
+        }

@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""A commit on its way to Silo: what it is, and the states that it passes.
+
+::
+
+             stage              finish                 file sent, then BOM merged
+    commit ────────▶ KEEPING ──────────▶ WAITING ──────────────────────────────────▶ gone
+                     │  ▲ a disk error    │  ▲ ▲ a passing failure: it stays,        ▲
+                     │  ╰─ stays, tried   │  │ ╰ with its reason and a pause         │
+                     │     again          │  │                                       │
+                     │ no copy was made   │  │ retry, or send to another address     │
+                     ▼                    ▼  │                                       │
+                    HELD ◀──────── refused, damaged, or a question ────── discard ───╯
+
+An entry is one row from its first moment to its last; file and BOM of one commit share it. It counts from the
+moment that ``stage`` returns. ``key`` names it for ever: it is the idempotency key of the file and the
+``sync_id`` of the BOM, so that sending twice does no harm. Standard library only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+from uuid import uuid4
+
+from silo.bom.model import Extraction
+
+
+class State(StrEnum):
+    """How an entry stands; the picture above has the ways between them."""
+
+    KEEPING = "keeping"  # its row is on disk, the copy of its file is not yet
+    WAITING = "waiting"  # will be sent
+    HELD = "held"  # a person decides: retry, send elsewhere, save a copy, discard
+
+
+def new_key() -> str:
+    """A name for a commit."""
+    return str(uuid4())
+
+
+ASKED, SAME_PART = "asked", "same part"
+
+
+@dataclass(frozen=True)
+class Commit:
+    """What is to be sent.
+
+    path, label
+        the document, and how people call it.
+    identity, part_number
+        the item by its Silo UUID, or by its number where that is known; one of them is needed.
+    taken_at
+        seconds since 1970, UTC.
+    file
+        what to copy: the document, or a second name of it (:meth:`Store.hold`); None where only the BOM goes.
+    extraction
+        the BOM as it was at the commit; compared with the server's and merged when it is sent.
+    request
+        instead of that, a merge request as JSON, sent as it is.
+    allow_missing
+        sync the BOM although links are broken.
+    remark
+        why there is no BOM though there might be one; shown when the file has arrived.
+    """
+
+    path: str
+    taken_at: float
+    label: str = ""
+    identity: str = ""
+    part_number: str = ""
+    key: str = field(default_factory=new_key)
+    comment: str = ""
+    file: Path | None = None
+    properties: Mapping[str, Any] = field(default_factory=dict)
+    extraction: Extraction | None = None
+    request: str = ""
+    allow_missing: bool = False
+    remark: str = ""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A row of the outbox.
+
+    server
+        the server that it is meant for, in :func:`silo.api.address.canonical` form; "" until it is first
+        tried.
+    file_left, bom_left
+        what is still to be sent.
+    file_name, copy, sha256, size
+        of its file; ``sha256`` is "" while the copy is being made.
+    base_revision
+        the server's latest revision before the first attempt; None before that.
+    revision
+        the revision that the file became.
+    renamed
+        its file has another name than the item's: :data:`ASKED` whether it is the same part, or a person's
+        word that it is :data:`SAME_PART`.
+    superseded
+        a newer file or BOM of the same item has arrived, so that this one would undo it.
+    """
+
+    id: int
+    key: str
+    server: str
+    state: State
+    path: str
+    label: str
+    identity: str
+    part_number: str
+    taken_at: float
+    comment: str
+    properties: Mapping[str, Any]
+    file_left: bool
+    file_name: str
+    copy: str
+    sha256: str
+    size: int
+    bom_left: bool
+    allow_missing: bool
+    remark: str
+    reason: str = ""
+    attempts: int = 0
+    next_attempt: float = 0.0
+    base_revision: int | None = None
+    revision: int | None = None
+    renamed: str = ""
+    superseded: bool = False
+
+    @property
+    def item(self) -> str:
+        """What orders entries: those of one item go one after another."""
+        return (self.identity or self.part_number).casefold()
+
+    @property
+    def has_file(self) -> bool:
+        """True where a file belongs to the commit, sent or not."""
+        return bool(self.copy)

@@ -1,0 +1,396 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Sending what the outbox holds: in order per item, each thing once, whatever dies on the way.
+
+For each entry: look the item up, send the file, compare the BOM, merge it. What has arrived is noted at
+once, so that a run which dies is continued by the next one. What an error means is :mod:`silo.api.policy`'s
+to say.
+"""
+
+from __future__ import annotations
+
+import json
+import random
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Protocol
+
+from pydantic import ValidationError
+
+from silo.api import arrived
+from silo.api.address import canonical
+from silo.api.multipart import Progress
+from silo.api.policy import Backoff, Scope, Then, judge
+from silo.api.revisions import is_newest, newest_number, other_name
+from silo.api.transport import Cancel, stop_if
+from silo.api.wire import MergeRequest, MergeResult, Revision, ServerState, SourceDocument
+from silo.bom.errors import (
+    CancelledError,
+    ConflictError,
+    DocumentError,
+    InputError,
+    NotFoundError,
+    RouteMissingError,
+    SiloError,
+)
+from silo.bom.merge import MergePlan
+from silo.bom.snapshot import from_plain
+from silo.bom_sync import Resolved, Status, decide, merge_request, resolve, server_lines
+from silo.outbox.entry import ASKED, SAME_PART, Entry, State
+from silo.outbox.store import OutboxError, Store
+
+PAUSES = Backoff(first=5.0, longest=900.0)
+
+
+class SendApi(arrived.Downloads, Protocol):
+    """What sending needs of a Silo; :class:`silo.api.client.SiloClient` has it."""
+
+    @property
+    def base_url(self) -> str: ...
+
+    def get_item_by_uuid(self, uuid: str, /) -> Mapping[str, Any] | None: ...
+
+    def get_bom(self, part_number: str, /) -> Sequence[Any]: ...
+
+    def revisions(self, part_number: str, /) -> list[Revision]: ...
+
+    def upload_file(
+        self,
+        part_number: str,
+        path: Path | str,
+        comment: str = "",
+        properties: Mapping[str, Any] | None = None,
+        on_progress: Progress | None = None,
+        *,
+        file_name: str | None = None,
+        idempotency_key: str | None = None,
+        cancelled: Cancel | None = None,
+    ) -> Revision: ...
+
+    def merge_bom(
+        self, part_number: str, request: MergeRequest, /, *, cancelled: Cancel | None = None
+    ) -> MergeResult: ...
+
+    def ready(self) -> ServerState: ...
+
+
+@dataclass(frozen=True)
+class Sent:
+    """What became of one commit.
+
+    status
+        of the BOM; None where there was none to sync.
+    plan
+        what was compared; None where the request was made by an earlier run.
+    revision
+        the file's new revision; None where it had none, or the server had this very file already.
+    sync_id
+        names the BOM's merge; "" where there was none to sync.
+    """
+
+    entry: Entry
+    part_number: str
+    status: Status | None = None
+    resolved: Resolved | None = None
+    plan: MergePlan | None = None
+    result: MergeResult | None = None
+    revision: int | None = None
+    sync_id: str = ""
+
+
+@dataclass
+class Report:
+    """What became of a run.
+
+    sent, held, failed
+        commits that arrived; entries that a person must look at; entries that failed in passing.
+    stopped_by
+        why the run ended early: nothing answers, read-only, a wrong token, or a person's stop.
+    busy
+        another process or thread is sending.
+    """
+
+    sent: list[Sent] = field(default_factory=list)
+    held: list[Entry] = field(default_factory=list)
+    failed: list[Entry] = field(default_factory=list)
+    stopped_by: SiloError | None = None
+    busy: bool = False
+
+
+def send_all(
+    store: Store,
+    client: SendApi,
+    *,
+    cancelled: Cancel | None = None,
+    on_progress: Callable[[Entry, int, int], object] | None = None,
+    on_sent: Callable[[Sent], object] | None = None,
+    force: bool = False,
+    backoff: Backoff = PAUSES,
+    chance: Callable[[], float] = random.random,
+) -> Report:
+    """Send what waits for this client's server and is due, oldest first, in order per item.
+
+    Never raises for what the server or the network does: the report says it, entry by entry.
+
+    force
+        also what is to be tried later only (a person pressed the button, the connection came back).
+    """
+    with store.send_lock() as mine:
+        if not mine:
+            return Report(busy=True)
+        store.sweep()
+        run = _Run(store, client, cancelled, on_progress, on_sent, backoff, chance)
+        run.all(force=force)
+        return run.report
+
+
+class _PassingError(SiloError):
+    """This computer's disk did not answer; nothing is wrong with the entry."""
+
+
+@dataclass
+class _Run:
+    store: Store
+    client: SendApi
+    cancelled: Cancel | None
+    on_progress: Callable[[Entry, int, int], object] | None
+    on_sent: Callable[[Sent], object] | None
+    backoff: Backoff
+    chance: Callable[[], float]
+    report: Report = field(default_factory=Report)
+    behind: set[str] = field(default_factory=set)  # items whose older entry has to go first
+
+    def all(self, *, force: bool) -> None:
+        last = 0
+        # Read anew each time: what is added or discarded meanwhile counts.
+        while self.report.stopped_by is None and (found := self.store.next_due(self.client.base_url, last)):
+            last = found.id
+            entry = self._kept(found) if found.state is State.KEEPING else found
+            if entry is None:
+                continue
+            if (
+                entry.state is not State.WAITING
+                or self._is_behind(entry)
+                or not (force or self._is_due(entry))
+            ):
+                self.behind |= {entry.item, entry.part_number.casefold()} - {""}
+                continue
+            self._try(entry)
+
+    def _kept(self, entry: Entry) -> Entry | None:
+        """Make the copy that an earlier run of the program could not make any more."""
+        self.store.finish(entry.key)
+        return self.store.entry(entry.id)
+
+    def _is_behind(self, entry: Entry) -> bool:
+        return bool({entry.item, entry.part_number.casefold()} & self.behind)
+
+    def _is_due(self, entry: Entry) -> bool:
+        # A pause that is longer than any that we make was noted before the clock was set back.
+        return not 0 < entry.next_attempt - self.store.clock() <= 4 * self.backoff.longest
+
+    def _try(self, entry: Entry) -> None:
+        refused: list[SiloError] = []
+        try:
+            stop_if(self.cancelled)
+            # On disk before a byte is sent: whoever comes after a crash knows that it may have arrived.
+            server = entry.server or canonical(self.client.base_url)
+            self.store.update(entry.id, attempts=entry.attempts + 1, server=server)
+            sent = self._send(replace(entry, attempts=entry.attempts + 1, server=server), refused)
+        except SiloError as error:
+            self._failed(entry, error)
+            return
+        if sent is None:
+            return
+        if refused:
+            self._hold(entry, refused)
+            return
+        self.report.sent.append(sent)
+        if self.on_sent is not None:
+            self.on_sent(sent)
+
+    def _failed(self, entry: Entry, error: SiloError) -> None:
+        if isinstance(error, OutboxError):
+            raise error
+        if isinstance(error, CancelledError):
+            self.report.stopped_by = error
+            return
+        passing = isinstance(error, _PassingError)
+        verdict = judge(error, self.client.ready)
+        if not passing and verdict.then is Then.PERSON and verdict.scope is not Scope.ALL:
+            self._hold(entry, [error])
+            return
+        pause = self.backoff.pause(entry.attempts + 1, self.chance(), verdict.wait)
+        self.store.update(entry.id, reason=str(error), next_attempt=self.store.clock() + pause)
+        now = self.store.entry(entry.id) or entry
+        self.report.failed.append(now)
+        self.behind |= {now.item, now.part_number.casefold()} - {""}
+        if not passing and verdict.scope is Scope.ALL:
+            self.report.stopped_by = error
+
+    def _hold(self, entry: Entry, errors: Sequence[SiloError]) -> None:
+        self.store.update(entry.id, state=State.HELD, reason="\n".join(map(str, errors)))
+        self.report.held.append(self.store.entry(entry.id) or entry)
+
+    # -- one entry --------------------------------------------------------------------------------------
+
+    def _send(self, entry: Entry, refused: list[SiloError]) -> Sent | None:
+        """Bring an entry to the server; None where it must wait for an older one of the same item.
+
+        A file that is refused does not keep the BOM, nor the other way round: both say why in ``refused``.
+        """
+        extraction, request = self.store.bom(entry.id)
+        resolved = self._resolved(entry, extraction) if extraction and entry.bom_left else None
+        number = (resolved and resolved.assembly.part_number) or self._number(entry)
+        if number.casefold() in self.behind:
+            self.behind.add(entry.item)
+            return None
+        entry = replace(entry, part_number=number)
+        self.store.update(entry.id, part_number=number)
+        sent = Sent(entry, number, resolved=resolved, revision=entry.revision)
+        if entry.file_left:
+            try:
+                sent = self._send_file(sent)
+                entry = replace(entry, file_left=False)
+            except SiloError as error:
+                _refuse(error, refused)
+                if isinstance(error, arrived.MayHaveArrivedError):
+                    # A person who presses Retry has looked at these revisions.
+                    self.store.update(entry.id, base_revision=error.newest)
+        if entry.bom_left:
+            try:
+                return self._send_bom(replace(sent, entry=entry), request)
+            except SiloError as error:
+                _refuse(error, refused)
+        return sent
+
+    def _resolved(self, entry: Entry, extraction: str) -> Resolved:
+        try:
+            return resolve(from_plain(json.loads(extraction)), self.client)
+        except ValueError as error:
+            raise InputError(f"{entry.label}: its BOM cannot be read any more; commit it again") from error
+
+    def _number(self, entry: Entry) -> str:
+        if entry.part_number and not entry.identity:
+            return entry.part_number
+        item: Any = self.client.get_item_by_uuid(entry.identity) if entry.identity else None
+        if item is None:
+            raise NotFoundError(
+                f"Silo does not know {entry.label or entry.path}; register it, or check that this is the "
+                f"right "
+                "server"
+            )
+        return str(item["part_number"])
+
+    def _send_file(self, sent: Sent) -> Sent:
+        entry = sent.entry
+        known = self._revisions(sent.part_number)
+        mine: Revision | None = None
+        if entry.base_revision is None:
+            if is_newest(entry.sha256, known):
+                self.store.arrived(entry, "file")
+                return sent
+            self._check_name(entry, known)
+            # What the server had before us. Without this note, a file that equals an older revision could
+            # not be told from our own that had already arrived.
+            self.store.update(entry.id, base_revision=newest_number(known))
+        else:
+            mine = arrived.find_arrived(
+                self.client,
+                sent.part_number,
+                arrived.Sent(entry.file_name, entry.sha256, entry.size, entry.base_revision),
+                known,
+                cancelled=self.cancelled,
+            )
+        revision = mine or self._upload(entry)
+        self.store.arrived(entry, "file", revision.revision_number)
+        return replace(sent, revision=revision.revision_number)
+
+    def _upload(self, entry: Entry) -> Revision:
+        try:
+            path = self.store.verified(entry)
+        except OSError as error:
+            raise _PassingError(
+                f"{entry.file_name}: the copy kept for sending cannot be read ({error.strerror or error})"
+            ) from error
+        progress = self.on_progress
+        try:
+            return self.client.upload_file(
+                entry.part_number,
+                path,
+                entry.comment,
+                entry.properties or None,
+                None if progress is None else lambda done, total: progress(entry, done, total),
+                file_name=entry.file_name,
+                idempotency_key=entry.key,
+                cancelled=self.cancelled,
+            )
+        except DocumentError as error:
+            # The copy was whole a moment ago, so this is the disk, and not damage.
+            raise _PassingError(str(error)) from error
+
+    def _revisions(self, part_number: str) -> Sequence[Revision]:
+        try:
+            return self.client.revisions(part_number)
+        except RouteMissingError:
+            return ()
+
+    def _check_name(self, entry: Entry, known: Sequence[Revision]) -> None:
+        """Refuse a file that has another name than the item's: "Save As" copies the identity along.
+
+        Sent unasked, the copy would become the newest revision of the part that it was made from.
+        """
+        before = other_name(entry.file_name, known) if entry.identity else ""
+        if before and entry.renamed != SAME_PART:
+            self.store.update(entry.id, renamed=ASKED)
+            raise ConflictError(
+                f"{entry.file_name} carries the identity of {entry.part_number}, whose file in Silo is "
+                f"{before}. "
+                "Is it the same part under a new name? Press Retry. Is it a copy that became a new part? "
+                "Press "
+                "Discard, then choose Register Parts and in it: new part"
+            )
+
+    def _send_bom(self, sent: Sent, request: str) -> Sent:
+        entry = sent.entry
+        if not request:
+            resolved = sent.resolved
+            assert resolved is not None  # an entry with a BOM has an extraction or a request
+            lines = server_lines(resolved, self.client)
+            decided = decide(resolved, lines, allow_missing=entry.allow_missing)
+            sent = replace(sent, plan=decided.plan, status=decided.status, sync_id=entry.key)
+            if decided.status is not Status.MERGED:
+                self.store.arrived(entry, "bom", note=decided.status is Status.UNCHANGED)
+                return sent
+            request = merge_request(resolved, entry.key).model_dump_json(by_alias=True, exclude_none=True)
+        wanted = self._named(entry, request, sent.revision)
+        # As it is sent now it is sent again: the server knows a merge by its sync_id and its content.
+        self.store.update(entry.id, request=wanted.model_dump_json(by_alias=True, exclude_none=True))
+        result = self.client.merge_bom(sent.part_number, wanted, cancelled=self.cancelled)
+        self.store.arrived(entry, "bom")
+        return replace(sent, status=Status.MERGED, result=result, sync_id=wanted.sync_id or "")
+
+    def _named(self, entry: Entry, request: str, revision: int | None) -> MergeRequest:
+        """The request with its name and its document, where it does not have them yet."""
+        try:
+            wanted = MergeRequest.model_validate_json(request)
+        except ValidationError as error:
+            raise InputError(f"{entry.label}: its BOM cannot be read any more; commit it again") from error
+        document = wanted.document
+        if document is None and entry.path:
+            document = SourceDocument(file=Path(entry.path).name, sha256=entry.sha256 or None)
+        if document is not None and document.revision is None:
+            document = document.model_copy(update={"revision": revision})
+        return wanted.model_copy(update={"sync_id": wanted.sync_id or entry.key, "document": document})
+
+
+def _refuse(error: SiloError, refused: list[SiloError]) -> None:
+    """Note an error that a person must look at; any other ends the entry's turn."""
+    verdict = judge(error, lambda: None)
+    if (
+        isinstance(error, (_PassingError, OutboxError))
+        or verdict.then is not Then.PERSON
+        or verdict.scope is Scope.ALL
+    ):
+        raise error
+    refused.append(error)

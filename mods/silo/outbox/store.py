@@ -1,0 +1,497 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The outbox on disk: one SQLite file, beside it the copies of files that are not sent yet.
+
+The rules of this module:
+
+* a row is there before any file of it, and gone before they are: a file whose row is gone may be removed at
+  once, and nothing else may;
+* a copy has its name only when it is whole and on disk, and its row the copy's hash;
+* every change of a row is one transaction, on disk when it returns;
+* several processes may share the file; who sends holds the send lock, which ends with its process;
+* a disk error leaves things as they are. Damage is a hash that differs or a BOM that cannot be parsed.
+
+Standard library only: the first commit of a session must not wait for imports.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import sqlite3
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from silo.api.address import canonical
+from silo.bom.errors import ConflictError, DocumentError, InputError
+from silo.bom.snapshot import to_plain
+from silo.durable import replacing, sync_folder
+from silo.folders import data_folder
+from silo.outbox.entry import ASKED, SAME_PART, Commit, Entry, State
+
+VERSION = 2
+_BLOCK = 1 << 20
+# A second name that no row has is one for which a commit may just be coming.
+_HELD_AGE = 3600.0
+
+_TABLES = """
+CREATE TABLE entry (
+    id INTEGER PRIMARY KEY AUTOINCREMENT,
+    key TEXT NOT NULL UNIQUE,
+    server TEXT NOT NULL DEFAULT '',
+    state TEXT NOT NULL CHECK (state IN ('keeping', 'waiting', 'held')),
+    path TEXT NOT NULL,
+    label TEXT NOT NULL DEFAULT '',
+    identity TEXT NOT NULL DEFAULT '',
+    part_number TEXT NOT NULL DEFAULT '',
+    taken_at REAL NOT NULL,
+    comment TEXT NOT NULL DEFAULT '',
+    properties TEXT NOT NULL DEFAULT '{}',
+    file_left INTEGER NOT NULL DEFAULT 0,
+    file_name TEXT NOT NULL DEFAULT '',
+    copy TEXT NOT NULL DEFAULT '',
+    sha256 TEXT NOT NULL DEFAULT '',
+    size INTEGER NOT NULL DEFAULT 0,
+    bom_left INTEGER NOT NULL DEFAULT 0,
+    allow_missing INTEGER NOT NULL DEFAULT 0,
+    remark TEXT NOT NULL DEFAULT '',
+    reason TEXT NOT NULL DEFAULT '',
+    attempts INTEGER NOT NULL DEFAULT 0,
+    next_attempt REAL NOT NULL DEFAULT 0,
+    base_revision INTEGER,
+    revision INTEGER,
+    renamed TEXT NOT NULL DEFAULT '',      -- '', 'asked', 'same part'
+    extraction TEXT NOT NULL DEFAULT '',   -- JSON; "" where there is none
+    request TEXT NOT NULL DEFAULT ''       -- JSON; written before it is sent, and then sent again unchanged
+);
+CREATE TABLE sent (
+    server TEXT NOT NULL,
+    item TEXT NOT NULL COLLATE NOCASE,     -- a part number or an identity
+    kind TEXT NOT NULL CHECK (kind IN ('file', 'bom')),
+    entry_id INTEGER NOT NULL,             -- the newest entry that arrived
+    PRIMARY KEY (server, item, kind)
+)
+"""
+
+# All but what may be large.
+_COLUMNS = (
+    "id, key, server, state, path, label, identity, part_number, taken_at, comment, properties, file_left,"
+    " file_name, copy, sha256, size, bom_left, allow_missing, remark, reason, attempts, next_attempt,"
+    " base_revision, revision, renamed"
+)
+_SELECT = f"""SELECT {_COLUMNS}, EXISTS (
+    SELECT 1 FROM sent s WHERE s.server = e.server AND s.item IN (e.identity, e.part_number) AND s.item <> ''
+    AND s.entry_id > e.id AND (s.kind = 'file' AND e.file_left OR s.kind = 'bom' AND e.bom_left)
+) AS superseded FROM entry e"""  # noqa: S608
+
+
+class OutboxError(InputError):
+    """The database cannot be used now: its disk is full, it is locked, or it is no database."""
+
+
+class Store:
+    """The file and its folders. Methods open the database for themselves, so any thread may call them.
+
+    path
+        the file; the user's data folder unless given. Made where it is missing, for its owner only.
+    """
+
+    def __init__(self, path: Path | None = None, *, clock: Callable[[], float] = time.time) -> None:
+        self.path = path or data_folder() / "outbox.sqlite3"
+        self.copies = self.path.parent / f"{self.path.stem}-files"
+        self._held = self.path.parent / f"{self.path.stem}-held"
+        self.clock = clock
+        self._finishing: set[str] = set()
+        self._lock = threading.Lock()
+        self._is_ready = False
+
+    # -- a commit comes in ------------------------------------------------------------------------------
+
+    def hold(self, path: str, key: str) -> Path | None:
+        """Keep a file's present content by a second name, which takes no time; None where it cannot.
+
+        FreeCAD writes a new file at each save and renames it, so the old content lives on under this name.
+        """
+        held = self._held / key / os.path.basename(path)
+        try:
+            held.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            os.link(path, held)
+        except OSError:
+            return None
+        return held
+
+    def stage(self, commit: Commit, server: str = "") -> None:
+        """Put a commit's row on disk, which takes no time; :meth:`finish` makes the copy of its file."""
+        if commit.file is None and commit.extraction is None and not commit.request:
+            raise InputError(f"{commit.path or commit.part_number}: neither a file nor a BOM to keep")
+        row = {
+            "key": commit.key,
+            "server": canonical(server) if server else "",
+            "state": State.KEEPING if commit.file is not None else State.WAITING,
+            "path": commit.path,
+            "label": commit.label,
+            "identity": commit.identity,
+            "part_number": commit.part_number,
+            "taken_at": commit.taken_at,
+            "comment": commit.comment,
+            "properties": _strict_json(commit.properties),
+            "file_left": commit.file is not None,
+            "file_name": os.path.basename(commit.path) or (commit.file.name if commit.file else ""),
+            "copy": f"{commit.key}{commit.file.suffix[:20]}" if commit.file is not None else "",
+            "bom_left": bool(commit.extraction is not None or commit.request),
+            "allow_missing": commit.allow_missing,
+            "remark": commit.remark,
+            "extraction": json.dumps(to_plain(commit.extraction)) if commit.extraction is not None else "",
+            "request": commit.request,
+        }
+        with self.transaction() as db:
+            insert(db, row)
+
+    def finish(self, key: str, source: Path | None = None) -> None:
+        """Make the copy of a staged commit's file; what is held under a second name is read rather than
+        ``source``.
+
+        Where the disk does not take it, a commit with a second name stays and is tried again later. One
+        without is forgotten and :class:`DocumentError` says so: nothing could be sent that is surely what was
+        committed.
+        """
+        if key in self._finishing:
+            return
+        self._finishing.add(key)
+        try:
+            self._finish(key, source)
+        finally:
+            self._finishing.discard(key)
+
+    def _finish(self, key: str, source: Path | None) -> None:
+        entry = self.by_key(key)
+        if entry is None or not entry.file_left or entry.sha256:
+            return
+        held, copy = next(iter((self._held / key).glob("*")), None), self.copies / entry.copy
+        # A copy that has its name is whole: only its row was not written any more.
+        origin = copy if copy.exists() else held or source
+        if origin is None:
+            text = "FreeCAD ended before its file was copied; commit it again, then discard this"
+            self.update(entry.id, state=State.HELD, reason=text)
+            return
+        try:
+            sha256, size = self._copied(origin, copy)
+        except OSError as error:
+            told = f"cannot be copied for sending ({error.strerror or error})"
+            if held is not None or origin is copy:
+                self.update(entry.id, reason=f"{origin.name}: {told}; it is tried again")
+                return
+            self.discard(entry.id)
+            raise DocumentError(str(origin), f"{told}; nothing was kept, commit it again") from error
+        self.update(entry.id, state=State.WAITING, sha256=sha256, size=size, reason="")
+        shutil.rmtree(self._held / key, ignore_errors=True)
+
+    def add(self, commit: Commit, server: str = "") -> Entry:
+        """Both at once: on disk with its copy when it returns."""
+        self.stage(commit, server)
+        self.finish(commit.key, commit.file)
+        entry = self.by_key(commit.key)
+        if entry is None:
+            raise InputError(f"{commit.path}: discarded while it was kept")
+        return entry
+
+    # -- what a person decides --------------------------------------------------------------------------
+
+    def retry(self, entry_id: int, server: str | None = None) -> None:
+        """Let an entry go again with the next sending; ``server`` sends it there instead (the server moved).
+
+        For a file of another name than the item's this is a person's word that it is the same part. Raises
+        :class:`ConflictError` where something newer of the same item has arrived since.
+        """
+        entry = self._known(entry_id)
+        if entry.superseded:
+            raise ConflictError(
+                f"{entry.part_number or entry.label}: a newer commit of it was sent since, and this one "
+                f"would "
+                "undo it. Discard it"
+            )
+        ready = State.WAITING if entry.sha256 or not entry.file_left else State.KEEPING
+        changed: dict[str, Any] = {"state": ready, "reason": "", "next_attempt": 0.0}
+        changed["renamed"] = SAME_PART if entry.renamed == ASKED else entry.renamed
+        if server is not None and canonical(server) != entry.server:
+            # What was seen of the old server says nothing of the new one.
+            changed |= {"server": canonical(server), "base_revision": None}
+        if self.bom(entry_id)[0]:
+            # What was refused is made anew: the missing part may have its number now.
+            changed["request"] = ""
+        if entry.identity:
+            changed["part_number"] = ""
+        self.update(entry_id, **changed)
+
+    def discard(self, entry_id: int) -> None:
+        """Forget an entry and its copy; the document itself is not touched."""
+        entry = self._known(entry_id)
+        with self.transaction() as db:
+            db.execute("DELETE FROM entry WHERE id = ?", (entry_id,))
+        self._drop_files(entry)
+
+    def save_copy(self, entry_id: int, target: Path) -> None:
+        """Write an entry's file somewhere else, as it is, also where it is damaged."""
+        entry = self._known(entry_id)
+        held = next(iter((self._held / entry.key).glob("*")), None)
+        try:
+            with (
+                (held or self.copies / entry.copy).open("rb") as read,
+                replacing(target, mode=0o644) as write,
+            ):
+                shutil.copyfileobj(read, write, _BLOCK)
+        except OSError as error:
+            raise DocumentError(str(target), f"cannot be written ({error.strerror or error})") from error
+
+    # -- reading and changing ---------------------------------------------------------------------------
+
+    def entries(self) -> tuple[Entry, ...]:
+        """All entries, oldest first."""
+        with self._open() as db:
+            return tuple(_entry(row) for row in db.execute(f"{_SELECT} ORDER BY e.id"))
+
+    def entry(self, entry_id: int) -> Entry | None:
+        """One entry, None where it is gone."""
+        return self._one("e.id = ?", entry_id)
+
+    def by_key(self, key: str) -> Entry | None:
+        """The entry of a commit, None where it is gone."""
+        return self._one("e.key = ?", key)
+
+    def next_due(self, server: str, after: int) -> Entry | None:
+        """The oldest entry for a server that is newer than ``after`` and no person has to look at."""
+        where = "e.state <> 'held' AND e.server IN ('', ?) AND e.id > ? ORDER BY e.id LIMIT 1"
+        return self._one(where, canonical(server), after)
+
+    def bom(self, entry_id: int) -> tuple[str, str]:
+        """Extraction and merge request of an entry, as JSON; "" where there is none."""
+        with self._open() as db:
+            row = db.execute("SELECT extraction, request FROM entry WHERE id = ?", (entry_id,)).fetchone()
+        return (str(row[0]), str(row[1])) if row else ("", "")
+
+    def update(self, entry_id: int, **values: Any) -> None:
+        """Set columns of an entry."""
+        columns = ", ".join(f"{name} = :{name}" for name in values)
+        with self.transaction() as db:
+            db.execute(f"UPDATE entry SET {columns} WHERE id = :id", {**values, "id": entry_id})  # noqa: S608
+
+    def arrived(self, entry: Entry, kind: str, revision: int | None = None, *, note: bool = True) -> None:
+        """The server has its file or its BOM. An entry of which nothing is left is gone, with its copy.
+
+        Without ``note`` it was not sent, and makes nothing older out of date.
+        """
+        left = entry.bom_left if kind == "file" else entry.file_left
+        with self.transaction() as db:
+            if left:
+                changes = "file_left = 0, revision = ?" if kind == "file" else "bom_left = 0, revision = ?"
+                number = revision if kind == "file" else entry.revision
+                db.execute(f"UPDATE entry SET {changes} WHERE id = ?", (number, entry.id))  # noqa: S608
+            else:
+                db.execute("DELETE FROM entry WHERE id = ?", (entry.id,))
+            for item in filter(None, {entry.identity, entry.part_number} if note else ()):
+                db.execute(
+                    "INSERT INTO sent VALUES (?, ?, ?, ?) ON CONFLICT (server, item, kind)"
+                    " DO UPDATE SET entry_id = max(entry_id, excluded.entry_id)",
+                    (entry.server, item, kind, entry.id),
+                )
+        if kind == "file" or not left:
+            self._drop_files(entry)
+
+    # -- copies -----------------------------------------------------------------------------------------
+
+    def verified(self, entry: Entry) -> Path:
+        """The copy, after its hash was looked at. InputError where it is damaged, OSError where it cannot
+        be read."""
+        path = self.copies / entry.copy
+        with path.open("rb") as file:
+            found = hashlib.file_digest(file, "sha256").hexdigest()
+        if found != entry.sha256:
+            raise InputError(
+                f"{entry.file_name}: the copy kept for sending is damaged ({path}), so it was not sent. "
+                f"Commit "
+                "the document again, then discard this"
+            )
+        return path
+
+    def sweep(self) -> None:
+        """Remove files whose row is gone, and second names for which no commit came."""
+        self._make_ready()
+        with suppress(OSError):
+            # Files first, then rows: a file's row was there before it.
+            files = [*self.copies.iterdir()]
+            held = [*self._held.iterdir()] if self._held.is_dir() else []
+            keys = {entry.key for entry in self.entries()}
+            for file in files:
+                if file.name.split(".")[0] not in keys:
+                    with suppress(OSError):
+                        file.unlink()
+            for folder in held:
+                if folder.name not in keys and self.clock() - folder.stat().st_mtime > _HELD_AGE:
+                    shutil.rmtree(folder, ignore_errors=True)
+
+    def _copied(self, source: Path, copy: Path) -> tuple[str, int]:
+        if source == copy:
+            with copy.open("rb") as file:
+                return hashlib.file_digest(file, "sha256").hexdigest(), os.fstat(file.fileno()).st_size
+        digest, size = hashlib.sha256(), 0
+        with source.open("rb") as read, replacing(copy) as write:
+            while block := read.read(_BLOCK):
+                digest.update(block)
+                size += len(block)
+                write.write(block)
+        return digest.hexdigest(), size
+
+    def _drop_files(self, entry: Entry) -> None:
+        """Remove what the row had; what cannot be removed now is swept up later."""
+        if entry.copy:
+            with suppress(OSError):
+                (self.copies / entry.copy).unlink(missing_ok=True)
+        shutil.rmtree(self._held / entry.key, ignore_errors=True)
+
+    # -- the database -----------------------------------------------------------------------------------
+
+    @contextmanager
+    def transaction(self) -> Iterator[sqlite3.Connection]:
+        """All or nothing, on disk when it returns."""
+        with self._open() as db, _transaction(db):
+            yield db
+
+    @contextmanager
+    def send_lock(self) -> Iterator[bool]:
+        """True for the one process and thread that may send now.
+
+        A transaction on a database of its own: the system ends it with the process, however that dies.
+        """
+        self._make_ready()
+        with self._translated(), closing(self._connect(self.path.with_suffix(".lock"), timeout=0)) as db:
+            try:
+                db.execute("BEGIN EXCLUSIVE")
+            except sqlite3.OperationalError as error:
+                if "locked" not in str(error):
+                    raise
+                yield False
+                return
+            yield True
+
+    def _one(self, where: str, *values: Any) -> Entry | None:
+        with self._open() as db:
+            row = db.execute(f"{_SELECT} WHERE {where}", values).fetchone()
+        return _entry(row) if row else None
+
+    def _known(self, entry_id: int) -> Entry:
+        entry = self.entry(entry_id)
+        if entry is None:
+            raise InputError(f"the outbox has no entry {entry_id}; it was sent or discarded meanwhile")
+        return entry
+
+    @contextmanager
+    def _open(self) -> Iterator[sqlite3.Connection]:
+        self._make_ready()
+        with self._translated(), closing(self._connect(self.path)) as db:
+            db.row_factory = sqlite3.Row
+            db.execute("PRAGMA synchronous = FULL")
+            yield db
+
+    def _connect(self, path: Path, timeout: float = 20.0) -> sqlite3.Connection:
+        return sqlite3.connect(path, timeout=timeout, isolation_level=None)
+
+    @contextmanager
+    def _translated(self) -> Iterator[None]:
+        try:
+            yield
+        except sqlite3.Error as error:
+            raise OutboxError(
+                f"{self.path}: the outbox cannot be used now ({error}). What waits in it is still there. "
+                f"Make "
+                "room on the disk or mend its permissions; a file that is no database must be moved away"
+            ) from error
+
+    def _make_ready(self) -> None:
+        """Make folders and file when they are first needed: not where FreeCAD has only just started."""
+        with self._lock:
+            if not self._is_ready:
+                self._prepare()
+                self._is_ready = True
+
+    def _prepare(self) -> None:
+        try:
+            self.copies.mkdir(mode=0o700, parents=True, exist_ok=True)
+            # Made for its owner only before SQLite opens it; the -wal and -shm files take over its mode.
+            for path in (self.path, self.path.with_suffix(".lock")):
+                os.close(os.open(path, os.O_RDWR | os.O_CREAT, 0o600))
+            sync_folder(self.path.parent)
+        except OSError as error:
+            raise InputError(
+                f"{self.path}: the outbox cannot be made ({error.strerror or error}). Nothing was kept for "
+                "sending; make room or mend the permissions, then commit again"
+            ) from error
+        self._migrate()
+
+    def _migrate(self) -> None:
+        with self._translated(), closing(self._connect(self.path)) as db:
+            db.row_factory = sqlite3.Row
+            if _version(db) == VERSION:
+                return
+            if db.execute("PRAGMA journal_mode").fetchone()[0] != "wal":
+                db.execute("PRAGMA journal_mode = WAL")
+            db.execute("PRAGMA synchronous = FULL")
+            with _transaction(db):
+                version = _version(db)
+                if version > VERSION:
+                    raise InputError(
+                        f"{self.path}: this outbox was written by a newer silo-mod; update this one"
+                    )
+                if version == 1:
+                    db.execute("ALTER TABLE entry RENAME TO entry1")
+                    db.execute("ALTER TABLE sent RENAME TO sent1")
+                if version < VERSION:
+                    for statement in _TABLES.split(";\n"):
+                        db.execute(statement)
+                if version == 1:
+                    from silo.outbox.takeover import of_first_outbox
+
+                    of_first_outbox(db)
+                db.execute(f"PRAGMA user_version = {VERSION}")
+
+
+@contextmanager
+def _transaction(db: sqlite3.Connection) -> Iterator[None]:
+    db.execute("BEGIN IMMEDIATE")
+    try:
+        yield
+    except BaseException:
+        db.execute("ROLLBACK")
+        raise
+    db.execute("COMMIT")
+
+
+def insert(db: sqlite3.Connection, row: dict[str, Any]) -> None:
+    """Add a row; columns that it does not name have their defaults."""
+    names, places = ", ".join(row), ", ".join(f":{name}" for name in row)
+    db.execute(f"INSERT INTO entry ({names}) VALUES ({places})", row)  # noqa: S608
+
+
+_FLAGS = ("file_left", "bom_left", "allow_missing", "superseded")
+
+
+def _entry(row: sqlite3.Row) -> Entry:
+    values = dict(row)
+    values["state"] = State(values["state"])
+    values["properties"] = json.loads(values["properties"])
+    return Entry(**values | {name: bool(values[name]) for name in _FLAGS})
+
+
+def _strict_json(data: Any) -> str:
+    try:
+        return json.dumps(dict(data), allow_nan=False)
+    except (TypeError, ValueError, RecursionError) as error:
+        raise InputError(f"these properties cannot be sent as JSON: {error}") from error
+
+
+def _version(db: sqlite3.Connection) -> int:
+    return int(db.execute("PRAGMA user_version").fetchone()[0])

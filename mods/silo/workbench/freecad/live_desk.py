@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""FreeCAD and the person in front of it, as the flows want them
+(:class:`silo.workbench.commit.desk.Desk`)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from silo.workbench.commit import snapshot
+from silo.workbench.commit.plan import Plan, Row
+from silo.workbench.commit.snapshot import Snapshot
+from silo.workbench.freecad import host, live, saving
+from silo.workbench.gui import qt
+
+
+class LiveDocuments:
+    """FreeCAD's documents, as :class:`silo.workbench.commit.plan.Documents` wants them."""
+
+    linked = staticmethod(host.linked_documents)
+    is_partial = staticmethod(host.is_partial)
+    is_modified = staticmethod(saving.is_modified)
+    is_writable = staticmethod(saving.is_writable)
+    lost_assemblies = staticmethod(live.lost_assemblies)
+    save = staticmethod(saving.save)
+
+
+class LiveDesk:
+    """One per FreeCAD. Widgets are imported when a person is to see one."""
+
+    def __init__(self) -> None:
+        self.documents = LiveDocuments()
+
+    def snapshot(self, doc: Any) -> Snapshot:
+        """The assembly that is active in the 3D view decides between several."""
+        cached = live.cached_document(doc)
+        active = host.active_assembly() if host.has_gui() else None
+        hint = cached.getObject(active.Name) if active is not None and active.Document == doc else None
+        return snapshot.take(cached, assembly=hint, walk=live.extract_object)
+
+    find = staticmethod(host.find_document)
+
+    def save_as(self, _doc: Any) -> None:
+        """FreeCAD's own dialog, for the active document."""
+        host.run_command("Std_Save")
+
+    def ask(self, planned: Plan, note: str) -> tuple[tuple[Row, ...], str] | None:
+        """The commit dialog."""
+        from silo.workbench.commit.dialog import CommitDialog
+
+        dialog = CommitDialog(planned, host.main_window(), note=note)
+        return (dialog.chosen(), dialog.text()) if qt.run_dialog(dialog) else None
+
+    def warn(self, title: str, text: str) -> None:
+        """A message box."""
+        from silo.workbench.gui import widgets
+
+        widgets.warn(host.main_window(), title, text)
+
+    def later(self, call: Callable[[], None]) -> None:
+        """In Qt's event loop."""
+        qt.later(0, call)

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What is in the outbox, as rows of the pane: each with its reason, and what a person can do about it.
+Pure."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+from urllib.parse import urlsplit
+
+from silo.api.address import canonical
+from silo.outbox.entry import Entry, State
+from silo.workbench.pane.activity import Action, Do
+from silo.workbench.words import plain, translate
+
+
+@dataclass(frozen=True)
+class Row:
+    """One entry.
+
+    urgent
+        a person has to look at it.
+    since
+        seconds since 1970.
+    """
+
+    title: str
+    what: str
+    since: float
+    reason: str = ""
+    urgent: bool = False
+    actions: tuple[Action, ...] = ()
+
+
+def rows(entries: Iterable[Entry], server_url: str) -> tuple[Row, ...]:
+    """The entries, those first that a person has to look at."""
+    here = canonical(server_url) if server_url else ""
+    made = [_row(entry, here) for entry in entries]
+    return tuple(sorted(made, key=lambda row: not row.urgent))
+
+
+def meant_for_another(entries: Iterable[Entry], server_url: str) -> tuple[int, ...]:
+    """Entries that wait for another address than the one in use."""
+    here = canonical(server_url) if server_url else ""
+    return tuple(entry.id for entry in entries if here and entry.server not in ("", here))
+
+
+def _row(entry: Entry, here: str) -> Row:
+    away = bool(here and entry.server not in ("", here))
+    text = entry.reason
+    if away:
+        meant = translate("Silo", "It is meant for {there}, which is not the server in use.")
+        text = "\n".join(filter(None, (meant.replace("{there}", _host(entry.server)), text)))
+    elif entry.superseded:
+        text = translate("Silo", "A newer commit of it has arrived since; this one would undo it.")
+    elif entry.state is State.KEEPING and not text:
+        text = translate("Silo", "Its file is being copied.")
+    urgent = away or entry.state is State.HELD
+    return Row(
+        title=plain(" ".join(filter(None, (entry.part_number, entry.label or entry.file_name))), 80),
+        what=_what(entry),
+        since=entry.taken_at,
+        reason=plain(text, 400),
+        urgent=urgent,
+        actions=tuple(_actions(entry, here, away=away)) if urgent or entry.reason else (),
+    )
+
+
+def _actions(entry: Entry, here: str, *, away: bool) -> Iterable[Action]:
+    target = str(entry.id)
+    if away:
+        text = translate("Silo", "Send to {host}").replace("{host}", _host(here))
+        yield Action(Do.SEND_HERE, text, target=target)
+    elif entry.state is State.HELD and not entry.superseded:
+        yield Action(Do.RETRY, translate("Silo", "Retry"), target=target)
+    if entry.file_left:
+        name = os.path.basename(entry.path) or entry.file_name
+        yield Action(Do.SAVE_COPY, translate("Silo", "Save a copy…"), target=target, document=name)
+    yield Action(Do.DISCARD, translate("Silo", "Discard"), target=target)
+
+
+def _what(entry: Entry) -> str:
+    if entry.file_left and entry.bom_left:
+        return translate("Silo", "file and BOM")
+    return translate("Silo", "BOM") if entry.bom_left else translate("Silo", "file")
+
+
+def _host(address: str) -> str:
+    return plain(urlsplit(address).netloc or address, 80)

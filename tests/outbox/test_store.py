@@ -1,0 +1,257 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Commits on disk: kept whole from their first moment, never set aside, never invisible."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import os
+import stat
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from silo.bom.errors import DocumentError, InputError
+from silo.bom.model import BomEntry, Extraction
+from silo.outbox.entry import Commit, State, new_key
+from silo.outbox.send import send_all
+from silo.outbox.store import OutboxError, Store
+from silo.testing import FakeSilo
+
+
+@pytest.fixture(name="store")
+def _store(tmp_path: Path) -> Store:
+    return Store(tmp_path / "outbox.sqlite3")
+
+
+@pytest.fixture(name="document")
+def _document(tmp_path: Path) -> Path:
+    path = tmp_path / "vault" / "Top.FCStd"
+    path.parent.mkdir()
+    path.write_bytes(b"first")
+    return path
+
+
+def commit(document: Path, key: str = "", file: Path | None = None) -> Commit:
+    return Commit(
+        str(document),
+        1.0,
+        "Top",
+        "top-id",
+        key=key or new_key(),
+        comment="why",
+        file=file or document,
+        extraction=Extraction(BomEntry(str(document))),
+    )
+
+
+def test_what_is_added_waits_with_its_own_copy(store: Store, document: Path) -> None:
+    """The document may be edited further, also in place; what was committed is what will be sent."""
+    entry = store.add(commit(document))
+    with document.open("r+b") as file:
+        file.write(b"other")
+    (waiting,) = Store(store.path).entries()
+    assert waiting == entry
+    assert (store.copies / waiting.copy).read_bytes() == b"first"
+    assert waiting.sha256 == hashlib.sha256(b"first").hexdigest()
+    assert (waiting.comment, waiting.taken_at, waiting.label) == ("why", 1.0, "Top")
+
+
+def test_a_held_file_keeps_its_content_when_freecad_saves_again(store: Store, document: Path) -> None:
+    """FreeCAD writes a new file and renames it; the name that is held still leads to the old one."""
+    key = new_key()
+    held = store.hold(str(document), key)
+    new = document.with_suffix(".new")
+    new.write_bytes(b"second")
+    os.replace(new, document)
+    entry = store.add(commit(document, key, held))
+    assert (store.copies / entry.copy).read_bytes() == b"first"
+    # One copy, and no second name any more.
+    assert [p for p in store.path.parent.rglob("*.FCStd") if p != document] == [store.copies / entry.copy]
+
+
+def test_what_cannot_be_held_is_copied(store: Store, tmp_path: Path) -> None:
+    """Another disk, or no file at all."""
+    assert store.hold(str(tmp_path / "none.FCStd"), new_key()) is None
+
+
+def test_killed_before_the_copy_was_made(store: Store, document: Path) -> None:
+    """From its row on a commit is not lost: the next start makes the copy from the second name."""
+    key = new_key()
+    held = store.hold(str(document), key)
+    store.stage(commit(document, key, held))
+    document.unlink()
+    after = Store(store.path)
+    assert [entry.state for entry in after.entries()] == [State.KEEPING]
+    send_all(after, FakeSilo())
+    (entry,) = after.entries()
+    assert (after.copies / entry.copy).read_bytes() == b"first"
+    assert entry.sha256 == hashlib.sha256(b"first").hexdigest()
+
+
+def test_killed_without_a_second_name(store: Store, document: Path) -> None:
+    """What the document says by then may be another thing: a person is told, and nothing is sent."""
+    store.stage(commit(document))
+    after = Store(store.path)
+    send_all(after, FakeSilo())
+    (entry,) = after.entries()
+    assert (entry.state, entry.sha256) == (State.HELD, "")
+    assert "commit it again" in entry.reason
+
+
+def test_a_copy_whose_row_was_not_written_any_more_is_used(store: Store, document: Path) -> None:
+    """It has its name only when it is whole."""
+    made = commit(document)
+    store.stage(made)
+    entry = store.by_key(made.key)
+    assert entry is not None
+    (store.copies / entry.copy).write_bytes(b"whole")
+    store.finish(made.key)
+    (after,) = store.entries()
+    assert (after.state, after.sha256) == (State.WAITING, hashlib.sha256(b"whole").hexdigest())
+
+
+class Moody(Store):
+    """A disk that does not answer for a while."""
+
+    error: OSError | None = None
+
+    def _copied(self, source: Path, copy: Path) -> tuple[str, int]:
+        if self.error is not None:
+            raise self.error
+        return super()._copied(source, copy)
+
+    def verified(self, entry: Any) -> Path:
+        if self.error is not None:
+            raise self.error
+        return super().verified(entry)
+
+
+@pytest.mark.parametrize("number", [errno.EIO, errno.ENOSPC, errno.EACCES, errno.ESTALE])
+def test_a_disk_that_does_not_answer_is_no_damage(tmp_path: Path, document: Path, number: int) -> None:
+    """While the copy is made, and while it is sent: the entry stays, says why, and goes later by itself."""
+    silo = FakeSilo()
+    item = silo.create_item("kindred-rd", "A01", "Top")
+    store = Moody(tmp_path / "outbox.sqlite3")
+    store.error = OSError(number, os.strerror(number))
+    key = new_key()
+    held = store.hold(str(document), key)
+    store.add(Commit(str(document), 1.0, identity=item.id, key=key, file=held))
+    send_all(store, silo, force=True)
+    (entry,) = store.entries()
+    assert (entry.state, os.strerror(number) in entry.reason) == (State.KEEPING, True)
+    store.error = None
+    store.finish(key)
+    store.error = OSError(number, os.strerror(number))
+    report = send_all(store, silo, force=True)
+    (entry,) = report.failed
+    assert (entry.state, os.strerror(number) in entry.reason) == (State.WAITING, True)
+    store.error = None
+    send_all(store, silo, force=True)
+    assert (store.entries(), silo.revisions("A01-0001")[0].file_name) == ((), "Top.FCStd")
+
+
+def test_without_a_second_name_the_disk_is_told_at_once(tmp_path: Path, document: Path) -> None:
+    """Nothing is kept half, and the person still has the document open."""
+    store = Moody(tmp_path / "outbox.sqlite3")
+    store.error = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    with pytest.raises(DocumentError, match=r"No space left.*nothing was kept, commit it again"):
+        store.add(commit(document))
+    assert store.entries() == ()
+
+
+@pytest.mark.parametrize("content", [b"", b"fir", b"first and more"])
+def test_a_damaged_copy_is_not_sent(store: Store, document: Path, content: bytes) -> None:
+    """Cut short by a power cut or a full disk; a person sees it and can save what there is."""
+    silo = FakeSilo()
+    item = silo.create_item("kindred-rd", "A01", "Top")
+    entry = store.add(Commit(str(document), 1.0, identity=item.id, file=document))
+    (store.copies / entry.copy).write_bytes(content)
+    send_all(store, silo)
+    (after,) = store.entries()
+    assert (after.state, "damaged" in after.reason) == (State.HELD, True)
+    assert silo.revisions("A01-0001") == []
+    target = document.with_name("rescued.FCStd")
+    store.save_copy(after.id, target)
+    assert target.read_bytes() == content
+
+
+def test_a_bom_that_cannot_be_parsed_is_held(store: Store, document: Path) -> None:
+    """The file goes all the same."""
+    silo = FakeSilo()
+    item = silo.create_item("kindred-rd", "A01", "Top")
+    entry = store.add(Commit(str(document), 1.0, identity=item.id, request='{"entries": 5}'))
+    store.update(entry.id, request="{half")
+    send_all(store, silo)
+    (after,) = store.entries()
+    assert (after.state, "cannot be read any more" in after.reason) == (State.HELD, True)
+
+
+def test_a_commit_without_anything_is_refused(store: Store, document: Path) -> None:
+    """Neither file nor BOM."""
+    with pytest.raises(InputError, match="neither a file nor a BOM"):
+        store.add(Commit(str(document), 1.0))
+
+
+def test_discarded_is_gone(store: Store, document: Path) -> None:
+    """Its copy too; the document itself stays."""
+    store.discard(store.add(commit(document)).id)
+    assert store.entries() == ()
+    assert list(store.copies.iterdir()) == []
+    assert document.exists()
+
+
+def test_a_second_name_for_which_no_commit_came_is_swept_up_later(store: Store, document: Path) -> None:
+    """Never one for which it may just be coming."""
+    key = new_key()
+    held = store.hold(str(document), key)
+    assert held is not None
+    store.sweep()
+    assert held.exists()
+    later = Store(store.path, clock=lambda: held.parent.stat().st_mtime + 7200)
+    later.sweep()
+    assert not held.exists()
+    assert document.exists()
+
+
+def test_a_path_in_a_commit_leads_nowhere_else(store: Store, document: Path, tmp_path: Path) -> None:
+    """A document's name is not where its copy goes."""
+    outside = tmp_path / "outside"
+    outside.write_bytes(b"mine")
+    entry = store.add(Commit("../../outside", 1.0, "Top", "top-id", file=document))
+    assert (store.copies / entry.copy).parent == store.copies
+    assert outside.read_bytes() == b"mine"
+
+
+def test_a_folder_that_does_not_take_it_is_told(tmp_path: Path, document: Path) -> None:
+    """With what to do, and nothing half done."""
+    blocked = tmp_path / "file"
+    blocked.write_text("in the way")
+    with pytest.raises(InputError, match="the outbox cannot be made"):
+        Store(blocked / "outbox.sqlite3").add(commit(document))
+
+
+def test_a_full_disk_under_the_database_loses_nothing(store: Store, document: Path) -> None:
+    """The error is not the entry's: it is neither held nor forgotten."""
+    silo = FakeSilo()
+    item = silo.create_item("kindred-rd", "A01", "Top")
+    store.add(Commit(str(document), 1.0, identity=item.id, file=document))
+
+    class Full(Store):
+        def update(self, entry_id: int, **values: Any) -> None:
+            raise OutboxError("the outbox cannot be used now (database or disk is full)")
+
+    with pytest.raises(OutboxError, match="disk is full"):
+        send_all(Full(store.path), silo)
+    assert [entry.state for entry in store.entries()] == [State.WAITING]
+    send_all(store, silo)
+    assert (store.entries(), len(silo.revisions("A01-0001"))) == ((), 1)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="file modes are POSIX")
+def test_commits_are_private(store: Store, document: Path) -> None:
+    """They hold other people's documents."""
+    entry = store.add(commit(document))
+    for path in (store.path, store.copies, store.copies / entry.copy):
+        assert stat.S_IMODE(path.stat().st_mode) & 0o077 == 0

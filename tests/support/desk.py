@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""A FreeCAD of values: documents, a person, a GUI thread and a session, for the flows without FreeCAD and
+Qt."""
+
+from __future__ import annotations
+
+import queue
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from silo.outbox.send import Sent
+from silo.testing import FakeSilo
+from silo.workbench.commit.plan import Plan, Row
+from silo.workbench.commit.snapshot import Snapshot
+from silo.workbench.session.session import Listener, Session
+from silo.workbench.settings.preferences import DEFAULTS, Preferences
+from silo.workbench.settings.server import Known
+
+WAIT_S = 30
+
+
+class Gui:
+    """Stands for the GUI thread: runs what was delivered when the test asks for it."""
+
+    def __init__(self) -> None:
+        self.calls: queue.Queue[Callable[[], None]] = queue.Queue()
+
+    def run_until(self, reached: Callable[[], object]) -> None:
+        while not reached():
+            self.calls.get(timeout=WAIT_S)()
+
+    def run_all(self) -> None:
+        while not self.calls.empty():
+            self.calls.get()()
+
+
+class Silo(FakeSilo):
+    """A server that can be closed like a client."""
+
+    def close(self) -> None:
+        return
+
+
+class NoTokens:
+    """A keyring with nothing in it."""
+
+    def get(self, _url: str) -> str:
+        return ""
+
+
+class Group(dict[str, Any]):
+    """FreeCAD's parameters."""
+
+    def GetString(self, name: str, default: str = "", /) -> str:
+        return str(self.get(name, default))
+
+    def GetBool(self, name: str, default: bool = False, /) -> bool:
+        return bool(self.get(name, default))
+
+    def SetString(self, name: str, value: str, /) -> None:
+        self[name] = value
+
+    def SetBool(self, name: str, value: bool, /) -> None:
+        self[name] = value
+
+
+@dataclass(eq=False)
+class Document:
+    """A document with FreeCAD's names, and what its file says."""
+
+    Name: str
+    FileName: str
+    content: bytes = b""
+    identity: str = ""
+    changed: bool = True
+    closed: bool = False
+    OutList: list[Document] = field(default_factory=list)
+
+    @property
+    def Label(self) -> str:
+        return self.Name
+
+
+@dataclass
+class Documents:
+    """Saving writes a new file and renames it, as FreeCAD does."""
+
+    saved: list[str] = field(default_factory=list)
+
+    def linked(self, doc: Any, /) -> list[Any]:
+        return [doc, *(found for below in doc.OutList for found in self.linked(below))]
+
+    def is_partial(self, _doc: Any, /) -> bool:
+        return False
+
+    def is_modified(self, doc: Any, /) -> bool:
+        return bool(doc.changed)
+
+    def is_writable(self, _path: str, /) -> bool:
+        return True
+
+    def lost_assemblies(self, _doc: Any, /) -> list[str]:
+        return []
+
+    def save(self, doc: Any, /) -> None:
+        if doc.closed:
+            raise ReferenceError("Cannot access attribute of deleted object")
+        new = Path(doc.FileName + ".new")
+        new.write_bytes(doc.content)
+        new.replace(doc.FileName)
+        doc.changed = False
+        self.saved.append(doc.Name)
+
+
+@dataclass
+class Desk:
+    """A person who says yes, and turns that the test lets pass."""
+
+    documents: Documents = field(default_factory=Documents)
+    turns: list[Callable[[], None]] = field(default_factory=list)
+    warned: list[str] = field(default_factory=list)
+    asked: list[str] = field(default_factory=list)
+    willing: bool = True
+
+    def snapshot(self, doc: Any) -> Snapshot:
+        return Snapshot(doc.FileName, doc.Label, doc.identity or None)
+
+    def find(self, _path: str) -> None:
+        return None
+
+    def save_as(self, _doc: Any) -> None:
+        return
+
+    def ask(self, planned: Plan, note: str) -> tuple[tuple[Row, ...], str] | None:
+        self.asked.append(note)
+        return (planned.rows, "a comment") if self.willing else None
+
+    def warn(self, _title: str, text: str) -> None:
+        self.warned.append(text)
+
+    def later(self, call: Callable[[], None]) -> None:
+        self.turns.append(call)
+
+    def pass_turns(self) -> None:
+        while self.turns:
+            self.turns.pop(0)()
+
+
+@dataclass
+class Office:
+    """A session with a server in memory, and all that goes with it."""
+
+    folder: Path
+    silo: Silo = field(default_factory=Silo)
+    gui: Gui = field(default_factory=Gui)
+    desk: Desk = field(default_factory=Desk)
+    sent: list[Sent] = field(default_factory=list)
+    console: list[str] = field(default_factory=list)
+    bugs: list[BaseException] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.preferences = Preferences(Group({**DEFAULTS, "AskComment": False}))
+        self.session = self.start()
+
+    def start(self) -> Session:
+        """Another FreeCAD of the same user."""
+        listener = Listener(console=self.console.append, sent=self.sent.append, bug=self.bugs.append)
+        self.session = Session(
+            self.gui.calls.put,
+            Known(url=self.silo.base_url),
+            NoTokens(),
+            listener=listener,
+            folder=self.folder / "data",
+            make_client=lambda _server: self.silo,
+        )
+        return self.session
+
+    def document(self, name: str, content: bytes = b"content", *, registered: bool = True) -> Document:
+        path = self.folder / "vault" / f"{name}.FCStd"
+        path.parent.mkdir(exist_ok=True)
+        identity = self.silo.create_item("kindred-rd", "M01", name).id if registered else ""
+        return Document(name, str(path), content, identity)
+
+    def files(self, name: str) -> list[bytes]:
+        """Contents of the item's revisions, oldest first."""
+        stored = next(s for s in self.silo.items.values() if s.item.name == name)
+        return [stored.files[number] for number in sorted(stored.files)]
+
+    def settle(self) -> None:
+        """Let the GUI thread and the workers work until nothing is left."""
+        while True:
+            self.desk.pass_turns()
+            self.gui.run_all()
+            if self.session.idle and self.gui.calls.empty() and not self.desk.turns:
+                return
+            self.session._rows.left(0.01)
+            self.session._disk.left(0.01)
+            self.session._net.left(0.01)

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""A commit from the button to the server, without FreeCAD and Qt."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from desk import Office
+
+from silo.workbench.commit.flow import CommitFlow
+from silo.workbench.pane.activity import Do
+
+
+@pytest.fixture(name="office")
+def _office(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Office]:
+    for name in ("SILO_API_URL", "SILO_API_TOKEN"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    made = Office(tmp_path)
+    yield made
+    made.session.close()
+
+
+@pytest.fixture(name="flow")
+def _flow(office: Office) -> CommitFlow:
+    return CommitFlow(office.session, office.preferences, office.desk, path=office.folder / "same.json")
+
+
+def titles(office: Office) -> list[str]:
+    return [entry.title for entry in office.session.shown.activity.entries]
+
+
+def test_a_document_and_what_it_links_to(office: Office, flow: CommitFlow) -> None:
+    """Saved leaves first, asked about once, and in Silo."""
+    leaf, top = office.document("Leaf"), office.document("Top")
+    top.OutList = [leaf]
+    flow.start(top)
+    office.settle()
+    assert office.desk.documents.saved == ["Leaf", "Top"]
+    assert len(office.desk.asked) == 1
+    assert [sent.entry.label for sent in office.sent] == ["Leaf", "Top"]
+    assert {sent.entry.comment for sent in office.sent} == {"a comment"}
+
+
+def test_who_says_no_commits_nothing(office: Office, flow: CommitFlow) -> None:
+    """Not even saved."""
+    office.desk.willing = False
+    leaf, top = office.document("Leaf"), office.document("Top")
+    top.OutList = [leaf]
+    flow.start(top)
+    office.settle()
+    assert (office.desk.documents.saved, office.sent, flow.running) == ([], [], False)
+
+
+def test_a_document_that_was_closed_meanwhile_stops_no_other(office: Office, flow: CommitFlow) -> None:
+    """Its ReferenceError is its own; the next document and the next commit have their turn."""
+    gone, fine, later = office.document("Gone"), office.document("Fine"), office.document("Later")
+    fine.OutList = [gone]
+    flow.start(fine)
+    gone.closed = True
+    flow.start(later)
+    office.settle()
+    assert [sent.entry.label for sent in office.sent] == ["Fine", "Later"]
+    (lost,) = [e for e in office.session.shown.activity.entries if e.title == "Not committed: Gone"]
+    assert "ReferenceError" in lost.lines[0].text
+    assert not flow.running
+
+
+def test_a_fault_of_ours_stops_no_other_either(office: Office, flow: CommitFlow) -> None:
+    """Whatever goes wrong when a document is handed over."""
+    bad, good = office.document("Bad"), office.document("Good")
+    keep = office.session.keep
+
+    def fail(commit: object, failed: object) -> None:
+        office.session.keep = keep  # type: ignore[method-assign]
+        raise ZeroDivisionError
+
+    office.session.keep = fail  # type: ignore[method-assign, assignment]
+    flow.start(bad)
+    flow.start(good)
+    with pytest.raises(ZeroDivisionError):
+        office.desk.pass_turns()
+    office.settle()
+    assert [sent.entry.label for sent in office.sent] == ["Good"]
+
+
+def test_closing_saves_what_was_committed(office: Office, flow: CommitFlow) -> None:
+    """FreeCAD's window is asked to close before the turns had their time."""
+    docs = [office.document(f"P{number}") for number in range(3)]
+    for doc in docs:
+        flow.start(doc)
+    flow.finish()
+    for doc in docs:
+        doc.closed = True
+    assert office.desk.documents.saved == ["P0", "P1", "P2"]
+    office.session.close(lambda left: left(30.0))
+    office.session = office.start()
+    office.session.begin(live=False)
+    office.settle()
+    assert [office.files(doc.Name) for doc in docs] == [[b"content"]] * 3
+
+
+def test_without_a_number_it_is_saved_and_said(office: Office, flow: CommitFlow) -> None:
+    """With the way to register it."""
+    flow.start(office.document("New", registered=False))
+    office.settle()
+    assert titles(office) == ["Saved, but not in Silo: New"]
+    assert [action.do for action in office.session.shown.activity.entries[0].actions] == [Do.REGISTER]
+
+
+def test_a_disk_that_does_not_take_it_is_a_box(office: Office, flow: CommitFlow) -> None:
+    """The person hears of it at once."""
+    (office.folder / "data").write_text("a file in the way")
+    flow.start(office.document("Bolt"))
+    office.settle()
+    assert titles(office) == ["Not committed: Bolt"]

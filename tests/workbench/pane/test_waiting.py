@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What waits, as a person reads it: always with its reason, and with what can be done."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from silo.outbox.entry import Commit, Entry, State
+from silo.outbox.store import Store
+from silo.workbench.pane.activity import Do
+from silo.workbench.pane.waiting import meant_for_another, rows
+
+HERE = "https://silo.example.com"
+
+
+@pytest.fixture(name="entry")
+def _entry(tmp_path: Path) -> Entry:
+    path = tmp_path / "Top.FCStd"
+    path.write_bytes(b"x")
+    commit = Commit(str(path), 1001.0, "Top", "id", file=path, request="{}")
+    return Store(tmp_path / "outbox.sqlite3").add(commit, "HTTPS://Silo.example.com:443/")
+
+
+def test_what_simply_waits(entry: Entry) -> None:
+    """Which document, what of it, since when."""
+    (row,) = rows([entry], HERE)
+    assert (row.title, row.what, row.since, row.reason) == ("Top", "file and BOM", 1001.0, "")
+    assert (row.urgent, row.actions) == (False, ())
+
+
+def test_what_a_person_must_look_at_comes_first(entry: Entry) -> None:
+    """With all four ways out of it, as far as they make sense."""
+    held = replace(entry, state=State.HELD, reason="413: too large", bom_left=False)
+    first, _ = rows([entry, held], HERE)
+    assert (first.urgent, first.reason, first.what) == (True, "413: too large", "file")
+    assert [a.do for a in first.actions] == [Do.RETRY, Do.SAVE_COPY, Do.DISCARD]
+    assert {a.target for a in first.actions} == {str(entry.id)}
+
+
+def test_a_bom_has_no_copy_to_save(entry: Entry) -> None:
+    """Its file has arrived."""
+    (row,) = rows([replace(entry, state=State.HELD, file_left=False, reason="no")], HERE)
+    assert [a.do for a in row.actions] == [Do.RETRY, Do.DISCARD]
+
+
+def test_what_is_meant_for_another_address_says_so(entry: Entry) -> None:
+    """And can be sent here, by a person's word only."""
+    away = replace(entry, server="http://old.example:80/api")
+    (row,) = rows([away], HERE)
+    assert row.urgent
+    assert row.reason == "It is meant for old.example:80, which is not the server in use."
+    assert [a.do for a in row.actions] == [Do.SEND_HERE, Do.SAVE_COPY, Do.DISCARD]
+    assert meant_for_another([entry, away], HERE) == (away.id,)
+
+
+def test_without_a_server_nothing_is_meant_for_another(entry: Entry) -> None:
+    """All of it waits for settings."""
+    assert meant_for_another([entry], "") == ()
+    assert not rows([entry], "")[0].urgent
+
+
+def test_what_is_out_of_date_is_not_offered_again(entry: Entry) -> None:
+    """A retry would undo something newer."""
+    (row,) = rows([replace(entry, state=State.HELD, superseded=True, reason="x")], HERE)
+    assert [a.do for a in row.actions] == [Do.SAVE_COPY, Do.DISCARD]
+    assert "would undo it" in row.reason

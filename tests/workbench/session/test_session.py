@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""A session without FreeCAD and Qt: what waits is kept, shown and sent; closing loses nothing."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from desk import Office
+
+from silo.bom.errors import SiloError, UnreachableError
+from silo.outbox.entry import Commit, State
+from silo.outbox.store import Store
+
+
+@pytest.fixture(name="office")
+def _office(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Office]:
+    for name in ("SILO_API_URL", "SILO_API_TOKEN"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    made = Office(tmp_path)
+    yield made
+    made.session.close()
+
+
+def commit(office: Office, name: str, content: bytes = b"content", *, hold: bool = True) -> Commit:
+    """A commit of a document that is saved."""
+    doc = office.document(name, content)
+    office.desk.documents.save(doc)
+    made = Commit(doc.FileName, 1.0, name, doc.identity, file=Path(doc.FileName))
+    held = office.session.outbox.hold(doc.FileName, made.key) if hold else None
+    return made if held is None else Commit(doc.FileName, 1.0, name, doc.identity, key=made.key, file=held)
+
+
+def failing(_error: SiloError) -> None:
+    raise AssertionError(_error)
+
+
+def test_a_commit_is_kept_and_sent(office: Office) -> None:
+    """And nothing is left of it."""
+    office.session.keep(commit(office, "Bolt"), failing)
+    office.settle()
+    assert office.files("Bolt") == [b"content"]
+    assert (office.session.shown.waiting, [sent.part_number for sent in office.sent]) == ((), ["M01-0001"])
+
+
+class SlowStore(Store):
+    """A disk on which copies take until the test lets them go."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self.gate = threading.Event()
+        self.copies_made = 0
+
+    def _copied(self, source: Path, copy: Path) -> tuple[str, int]:
+        self.gate.wait(30)
+        self.copies_made += 1
+        return super()._copied(source, copy)
+
+
+@pytest.fixture(name="slow")
+def _slow(office: Office) -> SlowStore:
+    store = SlowStore(office.session.outbox.path)
+    office.session.outbox = store
+    return store
+
+
+def test_closing_waits_for_the_disk(office: Office, slow: SlowStore) -> None:
+    """Twelve commits, closed at once: all of them are copied, none is sent, none is lost."""
+    for number in range(12):
+        office.session.keep(commit(office, f"P{number}", b"%d" % number), failing)
+    counts: list[int] = []
+
+    def wait(left: Any) -> None:
+        counts.append(left(0.0))
+        slow.gate.set()
+        while left(1.0):
+            continue
+
+    office.session.close(wait)
+    assert counts[0] >= 1
+    entries = Store(slow.path).entries()
+    assert [(entry.label, entry.state) for entry in entries] == [
+        (f"P{number}", State.WAITING) for number in range(12)
+    ]
+    assert slow.copies_made == 12
+
+
+def test_who_does_not_want_to_wait_loses_nothing_either(office: Office, slow: SlowStore) -> None:
+    """No row waits for a copy; the next start makes these from the second names."""
+    for number in range(12):
+        office.session.keep(commit(office, f"P{number}", b"%d" % number), failing)
+    office.session._rows.left(30.0)
+    # The first copy hangs, and nobody wants to wait for it.
+    office.session.close(lambda left: None)
+    assert [entry.state for entry in Store(slow.path).entries()] == [State.KEEPING] * 12
+    slow.gate.set()
+    office.session = office.start()
+    office.session.begin(live=False)
+    office.settle()
+    assert [office.files(f"P{number}") for number in range(12)] == [[b"%d" % number] for number in range(12)]
+    assert Store(slow.path).entries() == ()
+
+
+def test_closing_does_not_wait_for_the_network(office: Office) -> None:
+    """A server that hangs; the commit waits for the next time."""
+    reached, released = threading.Event(), threading.Event()
+
+    def hang(name: str) -> None:
+        if name == "upload_file":
+            reached.set()
+            released.wait(30)
+
+    office.silo.before = hang
+    office.session.keep(commit(office, "Bolt"), failing)
+    office.gui.run_until(reached.is_set)
+    office.session.close(lambda left: left(30.0))
+    assert [entry.label for entry in Store(office.session.outbox.path).entries()] == ["Bolt"]
+    released.set()
+
+
+def test_what_an_earlier_freecad_left_is_sent_at_the_start(office: Office) -> None:
+    """Nothing is opened and nothing is pressed."""
+    store = Store(office.session.outbox.path)
+    doc = office.document("Bolt")
+    office.desk.documents.save(doc)
+    store.add(Commit(doc.FileName, 1.0, "Bolt", doc.identity, file=Path(doc.FileName)))
+    office.session.begin(live=False)
+    office.settle()
+    assert office.files("Bolt") == [b"content"]
+
+
+def test_what_waits_for_another_address_is_shown_and_can_be_sent_here(office: Office) -> None:
+    """The server moved; an old spelling of the same address needs no person at all."""
+    store = Store(office.session.outbox.path)
+    for name, server in (("Old", "http://old.example/api"), ("Same", "HTTP://Silo.Invalid:80/api/")):
+        doc = office.document(name)
+        office.desk.documents.save(doc)
+        store.add(Commit(doc.FileName, 1.0, name, doc.identity, file=Path(doc.FileName)), server)
+    office.session.begin(live=False)
+    office.settle()
+    (waiting,) = office.session.shown.waiting
+    assert (waiting.label, office.files("Same")) == ("Old", [b"content"])
+    office.session.send_here([waiting.id])
+    office.settle()
+    assert (office.session.shown.waiting, office.files("Old")) == ((), [b"content"])
+
+
+def test_a_person_saves_a_copy_and_discards(office: Office) -> None:
+    """Of what cannot be sent."""
+    store = Store(office.session.outbox.path)
+    doc = office.document("Bolt")
+    office.desk.documents.save(doc)
+    entry = store.add(Commit(doc.FileName, 1.0, "Bolt", "no-item", file=Path(doc.FileName)))
+    office.session.begin(live=False)
+    office.settle()
+    assert [w.state for w in office.session.shown.waiting] == [State.HELD]
+    target = office.folder / "saved.FCStd"
+    office.session.save_copy(entry.id, target)
+    office.session.discard(entry.id)
+    office.settle()
+    assert (target.read_bytes(), office.session.shown.waiting) == (b"content", ())
+
+
+def test_one_item_in_trouble_holds_up_no_other(office: Office) -> None:
+    """The server fails on one file each time; the others pass, and it says why it waits."""
+
+    def fail(name: str) -> None:
+        if name == "upload_file" and office.files("Bad") == [] and calls.pop(0) == 0:
+            raise UnreachableError("500 for this one")
+
+    calls = [0, 1, 1, 1]
+    commits = [commit(office, name) for name in ("Bad", "One", "Two")]
+    office.silo.before = fail
+    for made in commits:
+        office.session.outbox.add(made)
+    office.session.send(force=False)
+    office.settle()
+    assert (office.files("One"), office.files("Two"), office.files("Bad")) == ([b"content"], [b"content"], [])
+    (waiting,) = office.session.shown.waiting
+    assert (waiting.label, waiting.reason) == ("Bad", "500 for this one")
