@@ -167,11 +167,16 @@ def _check_targets(args: argparse.Namespace) -> None:
     bad = [name for name in args.report if Path(name).suffix.lower() not in REPORTS]
     if bad:
         raise InputError(f"--report writes {', '.join(REPORTS)}; got {', '.join(bad)}")
-    bad = [name for name in args.preview if Path(name).suffix.lower() not in (".glb", ".png")]
+    urdf = getattr(args, "urdf_out", None)
+    check_outputs([*args.report, *args.preview, *([urdf] if urdf else [])], args.preview)
+
+
+def check_outputs(names: Sequence[str], previews: Sequence[str]) -> None:
+    """InputError where a file to be written has no folder, or a preview a suffix that is no picture."""
+    bad = [name for name in previews if Path(name).suffix.lower() not in (".glb", ".png")]
     if bad:
         raise InputError(f"--preview writes .glb and .png; got {', '.join(bad)}")
-    urdf = getattr(args, "urdf_out", None)
-    for name in (*args.report, *args.preview, *([urdf] if urdf else [])):
+    for name in names:
         if not Path(name).absolute().parent.is_dir():
             raise InputError(f"{name}: there is no folder {Path(name).parent}")
 

@@ -29,6 +29,7 @@ _COMMANDS = (
     "backup",
     "watch",
     "inertia",
+    "links",
     "mass",
     "demo",
     "install_addon",

@@ -11,8 +11,8 @@ A map is a small YAML file::
         origin: {xyz: [0, 0, 0.1], rpy: [0, 0, 0]}   # given in the assembly's frame, m and rad
 
 ``*`` stands for anything within one level, ``?`` for one character, ``**`` for any number of levels. A
-pattern is about instance names; after ``product:`` about product names. The first link that matches an
-instance has it.
+pattern is about instance names; after ``product:`` about product names; after ``path:`` it has no
+wildcards. The first link that matches an instance has it.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from silo.inertia.core import Floats
 from silo.inertia.frames import ASSEMBLY_FRAME, LinkFrame, origin_frame
 from silo.inertia.model import Assembly, Instance
 
-PRODUCT = "product:"
+PRODUCT, PATH = "product:", "path:"
 ROOT_LINK = "base_link"
 """The usual name of a robot's first link (ROS REP 105)."""
 
@@ -272,6 +272,9 @@ def _frame_of(assembly: Assembly, name: str) -> Floats | None:
 
 def matches(pattern: str, instance: Instance) -> bool:
     """True where a pattern means this instance or a sub-assembly above it."""
+    if pattern.startswith(PATH):
+        exact = pattern.removeprefix(PATH)
+        return any("/".join(instance.path[:end]) == exact for end in range(1, len(instance.path) + 1))
     by_product = pattern.startswith(PRODUCT)
     names: Sequence[str] = instance.product_path if by_product else instance.path
     regex = _regex(pattern.removeprefix(PRODUCT) if by_product else pattern)

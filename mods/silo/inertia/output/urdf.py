@@ -39,6 +39,7 @@ class _Span:
     inertial: tuple[int, int] | None = None
     inertials: int = 0
     first_child: int | None = None
+    meshes: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -89,6 +90,11 @@ def write_urdf(path: Path | str, links: Mapping[str, MassProps], target: Path | 
 def link_names(data: bytes, source: str = "URDF") -> tuple[str, ...]:
     """The links of a URDF, in its order. InputError as :func:`fill_urdf`."""
     return tuple(span.name for span in _links_of(data, source))
+
+
+def link_meshes(data: bytes, source: str = "URDF") -> dict[str, tuple[str, ...]]:
+    """Link → file names of its visual and collision meshes. InputError as :func:`fill_urdf`."""
+    return {span.name: tuple(span.meshes) for span in _links_of(data, source)}
 
 
 def read_urdf(path: Path | str) -> bytes:
@@ -186,6 +192,8 @@ class _Reader:
             self._open = _Span(attributes["name"], here, end, closed)
         elif tag == "joint" and "gazebo" not in self._stack:
             self._joint = _Joint()
+        elif self._open is not None and tag == "mesh" and "filename" in attributes:
+            self._open.meshes.append(attributes["filename"])
         elif self._joint is not None and above == "joint":
             self._in_joint(self._joint, tag, attributes)
         self._stack.append(tag)

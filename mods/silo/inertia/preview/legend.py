@@ -88,7 +88,8 @@ def draw_legend(
     total = sum(view.props.mass for view in views if view.props is not None)
     y += 28
     links = counted(len([view for view in views if view.name]), "link")
-    _write(page, f"{links}, {mass_words(total)}", left, y, 9.5, _FAINT)
+    weighed = any(view.props is not None for view in views)
+    _write(page, f"{links}, {mass_words(total)}" if weighed else links, left, y, 9.5, _FAINT)
     y += 40
     for number, (view, colour) in enumerate(zip(views, colours, strict=True)):
         if y > height - 125 and number < len(views) - 1:
@@ -96,12 +97,14 @@ def draw_legend(
             break
         _swatch(page, left, y - 11, colour)
         _write(page, fitted(view.name or "in no link", 11, room - 30), left + 30, y, 11)
-        said = mass_words(view.props.mass) if view.props is not None else "no mass"
-        said = f"{said}, {len(view.instances)} {'part' if len(view.instances) == 1 else 'parts'}"
+        said = counted(len(view.instances), "part")
+        if weighed:
+            said = f"{mass_words(view.props.mass) if view.props is not None else 'no mass'}, {said}"
         _write(page, fitted(said, 9, room - 30), left + 30, y + 19, 9, _FAINT)
         y += 48
-    _write(page, "disc: centre of mass", left, height - 52, 8.5, _FAINT)
-    _write(page, "ellipsoid: equal mass and inertia", left, height - 33, 8.5, _FAINT)
+    if weighed:
+        _write(page, "disc: centre of mass", left, height - 52, 8.5, _FAINT)
+        _write(page, "ellipsoid: equal mass and inertia", left, height - 33, 8.5, _FAINT)
 
 
 def _swatch(page: Floats, left: float, top: float, colour: Colour) -> None:
