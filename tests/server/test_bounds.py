@@ -64,6 +64,10 @@ def used_everywhere(db: Database) -> str:
                 for n, (parent, child) in enumerate(pairs)
             ],
         )
+    if not db.settings.is_sqlite:
+        # What PostgreSQL does by itself after a while: until then it takes the tables for empty.
+        with db.engine.connect() as connection, connection.begin():
+            connection.exec_driver_sql("ANALYZE")
     return "BOLT"
 
 
