@@ -20,6 +20,7 @@ from silo_server.db.engine import WRITERS_WAITING, Database
 from silo_server.events.hub import Hub
 from silo_server.files import FileStore
 from silo_server.middleware import BodyLimit, SecurityHeaders
+from silo_server.operation.housekeeping import keep_tidy
 from silo_server.routes import auth, bom, items, review, revisions, system, transfer
 from silo_server.routes.context import Server
 from silo_server.settings import Settings, settings_from_environment
@@ -53,7 +54,11 @@ def create_app(settings: Settings, clock: Clock = utc_now) -> FastAPI:
         app.state.server = Server(settings, db, hub, files, probe)
         await hub.start()
         uses.start()
+        ending = asyncio.Event()
+        tidying = asyncio.create_task(keep_tidy(db, files, ending))
         yield
+        ending.set()
+        await tidying
         await hub.stop()
         probe.stop()
         await asyncio.to_thread(uses.stop)

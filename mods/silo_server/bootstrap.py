@@ -11,8 +11,9 @@ from silo.bom.errors import ConfigError
 from silo_server.db.engine import Database, Tx
 from silo_server.db.migrate import upgrade
 from silo_server.db.tables import users
+from silo_server.files import FileStore
+from silo_server.operation.housekeeping import START_TOKEN, tidy
 from silo_server.services import accounts, credentials, logins, search
-from silo_server.services.housekeeping import START_TOKEN, clear_away
 from silo_server.values import Role
 
 START_TOKEN_DAYS = 30.0
@@ -43,8 +44,8 @@ def prepare(db: Database, token: str | None = None) -> Welcome:
         admin = _first_admin(tx)
         secret = _give_token(tx, admin, token)
         link = logins.create_login_link(tx, admin.username)
-        clear_away(tx)
         search.ensure_index(tx)
+    tidy(db, FileStore(db.settings.storage))
     return Welcome(admin.username, secret, link, first)
 
 

@@ -67,6 +67,36 @@ class FileStore:
         with source:
             return self._write(iter(lambda: source.read(CHUNK), b""), wanted=checksum)[0] == checksum
 
+    def older_than(self, before: float) -> list[Path]:
+        """What came before this time (seconds since 1970), half-written uploads too."""
+        if not self.root.is_dir():
+            return []
+        found = [path for path in self.root.glob("??/??/*") if _came_before(path, before)]
+        for pattern in ("upload-*", "restore-*"):
+            found += [path for path in self.root.glob(pattern) if _came_before(path, before)]
+        return found
+
+    def remove_old(self, path: Path, before: float) -> bool:
+        """Delete what :meth:`older_than` named; False where the same content was uploaded again meanwhile."""
+        if path.is_dir():
+            shutil.rmtree(path, ignore_errors=True)
+            return True
+        # An upload puts a new file at this place before its revision is committed. What was moved away tells
+        # whether it was the old one; deleting it by name could hit the new one.
+        handle, name = tempfile.mkstemp(dir=self.root, prefix="upload-")
+        os.close(handle)
+        aside = Path(name)
+        try:
+            os.replace(path, aside)
+        except FileNotFoundError:
+            aside.unlink()
+            return False
+        if _came_before(aside, before):
+            aside.unlink()
+            return True
+        os.replace(aside, path)
+        return False
+
     def state(self, wanted: int) -> str:
         """``ok``; ``unwritable``; ``full`` where fewer than ``wanted`` bytes are free."""
         try:
@@ -104,6 +134,13 @@ class FileStore:
         finally:
             temporary.unlink(missing_ok=True)
         return digest.hexdigest(), size
+
+
+def _came_before(path: Path, before: float) -> bool:
+    try:
+        return path.stat().st_mtime < before
+    except FileNotFoundError:
+        return False
 
 
 def clean_name(name: str) -> str:

@@ -33,8 +33,12 @@ class Settings:
         notification, and how SQLite's changes by another process are seen.
     request_head_seconds, request_body_seconds
         how long a client may take to send a request; a body gets a second more for each 8 KiB of it.
-    event_log_size
+    event_log_size, event_log_bytes
         events kept for replay; a client that was away longer gets ``reset``.
+    sync_days, sync_bytes
+        for how long, and how much of, the answers to merges are kept for a repeated request.
+    history_days, audit_days
+        older changes of BOMs are folded into one, older lines of the audit list deleted; 0 keeps all.
     """
 
     database_url: str
@@ -43,6 +47,12 @@ class Settings:
     heartbeat_seconds: float = 30.0
     poll_seconds: float = 1.0
     event_log_size: int = 100_000
+    event_log_bytes: int = 256 * MIB
+    sync_days: float = 90.0
+    sync_bytes: int = 256 * MIB
+    history_days: float = 0.0
+    audit_days: float = 0.0
+    housekeeping_seconds: float = 600.0
     max_body_bytes: int = 16 * MIB
     max_file_bytes: int = 512 * MIB
     max_merge_entries: int = 20_000
@@ -103,6 +113,12 @@ _ENVIRONMENT = {
     "read_only": "SILO_READ_ONLY",
     "heartbeat_seconds": "SILO_HEARTBEAT_SECONDS",
     "event_log_size": "SILO_EVENT_LOG_SIZE",
+    "event_log_bytes": "SILO_EVENT_LOG_BYTES",
+    "sync_days": "SILO_SYNC_DAYS",
+    "sync_bytes": "SILO_SYNC_BYTES",
+    "history_days": "SILO_HISTORY_DAYS",
+    "audit_days": "SILO_AUDIT_DAYS",
+    "housekeeping_seconds": "SILO_HOUSEKEEPING_SECONDS",
     "max_body_bytes": "SILO_MAX_BODY_BYTES",
     "max_file_bytes": "SILO_MAX_FILE_BYTES",
     "max_merge_entries": "SILO_MAX_MERGE_ENTRIES",

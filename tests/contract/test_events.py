@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from server_testing import Api, Databases, bom, form_body, wait_until
 
+from silo_server.operation.housekeeping import tidy
 from silo_server.run import RunningServer, running_server
 from silo_server.settings import Settings
 
@@ -137,7 +138,7 @@ def test_who_was_away_for_too_long_is_told_to_read_again(quick: RunningServer) -
             api.item()
             old = events.next("item.created").id
         api.items(20)
-        quick.app.state.server.hub._clear_away()
+        tidy(quick.app.state.server.db, quick.app.state.server.files)
         with api.events("", old) as events:
             reset = events.next("reset", "item.created")
             assert (reset.name, reset.data) == ("reset", {})

@@ -7,7 +7,8 @@ Rules of this module:
 * times are ISO 8601 text in UTC with microseconds (``clock.stamp``), which sorts as it reads on both;
 * `*_key` columns hold the case-folded form that is unique and looked up by;
 * the search index (``item_search``) is none of them: each database has its own form (``services.search``);
-* history (``bom_changes``, ``bom_change_lines``) and ``audit`` are only ever inserted into.
+* history (``bom_changes``, ``bom_change_lines``) and ``audit`` are only ever inserted into, but for what
+  ``operation.housekeeping`` no longer keeps.
 """
 
 from __future__ import annotations

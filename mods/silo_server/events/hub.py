@@ -18,6 +18,7 @@ import logging
 import threading
 from collections import deque
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 from sqlalchemy.exc import SQLAlchemyError
@@ -25,15 +26,12 @@ from sqlalchemy.exc import SQLAlchemyError
 from silo_server.db.engine import Database
 from silo_server.services import events as log
 from silo_server.services.events import LoggedEvent
-from silo_server.services.housekeeping import clear_away
 
 logger = logging.getLogger("silo_server.events")
 
 RING_EVENTS = 2048
 RING_BYTES = 16 * 1024 * 1024
 PAGE = 500
-# Ten minutes, as the poll is usually set.
-CLEAR_AWAY_EVERY_POLLS = 600
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,18 +140,12 @@ class Hub:
         return last_event_id, False
 
     async def _dispatch(self) -> None:
-        polls = 0
         while True:
-            try:
+            with suppress(TimeoutError):
                 await asyncio.wait_for(self._poke.wait(), self._db.settings.poll_seconds)
-            except TimeoutError:
-                polls += 1
             self._poke.clear()
             try:
                 await self._read_news()
-                if polls >= CLEAR_AWAY_EVERY_POLLS:
-                    polls = 0
-                    await asyncio.to_thread(self._clear_away)
             except SQLAlchemyError as error:
                 # The database is away; the poll finds out when it is back, and nothing is lost meanwhile.
                 logger.warning("the event log cannot be read at the moment: %s", type(error).__name__)
@@ -208,10 +200,6 @@ class Hub:
                 return Batch((), head, reset=True)
             frames = [to_frame(event) for event in log.read_after(tx, cursor, PAGE)]
         return Batch(frames, frames[-1].id if frames else head)
-
-    def _clear_away(self) -> None:
-        with self._db.write(even_when_read_only=True) as tx:
-            clear_away(tx)
 
 
 class _PostgresListener:

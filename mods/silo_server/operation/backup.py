@@ -243,7 +243,7 @@ def _replace_rows(reader: Connection, tx: Tx, made: Manifest, report: Report) ->
 def _copy_rows(reader: Connection, query: Select[Any], writer: Connection, target: Table) -> int:
     count = 0
     names = [c.name for c in target.columns]
-    with reader.execution_options(yield_per=PAGE).execute(query) as found:
+    with reader.execute(query, execution_options={"yield_per": PAGE}) as found:
         for page in found.partitions(PAGE):
             writer.execute(insert(target), [dict(zip(names, row, strict=True)) for row in page])
             count += len(page)

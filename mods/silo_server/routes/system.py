@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query, Request
@@ -15,6 +16,7 @@ from silo_server.background import HEALTH_SECONDS, READY_SECONDS, State
 from silo_server.db.engine import mode_of
 from silo_server.db.state import put_state
 from silo_server.events.stream import EventStream
+from silo_server.operation.housekeeping import last_run
 from silo_server.routes.context import (
     READ_ERRORS,
     Admin,
@@ -108,6 +110,14 @@ def get_mode(server: ServerDep, caller: Admin) -> dict[str, Any]:
     """The mode: ``normal`` or ``read-only``."""
     with server.db.read(caller) as tx:
         return {"mode": mode_of(tx)}
+
+
+@router.get("/api/admin/housekeeping", responses=READ_ERRORS)
+def get_housekeeping(server: ServerDep, caller: Admin) -> dict[str, Any]:
+    """When old rows and files were last deleted, how many of what, and what went wrong; null before that."""
+    with server.db.read(caller) as tx:
+        run = last_run(tx)
+    return {"last_run": asdict(run) if run else None}
 
 
 @router.put("/api/admin/mode", responses=READ_ERRORS)

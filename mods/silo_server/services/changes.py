@@ -34,6 +34,7 @@ class ChangeKind(StrEnum):
     IMPORT = "import"  # a CSV was imported
     RESTORE = "restore"  # an earlier state was brought back
     UNDO = "undo"  # one change was taken back
+    FOLDED = "folded"  # the state that changes led to which are no longer kept (SILO_HISTORY_DAYS)
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import delete, func, select
+from sqlalchemy import ColumnElement, LargeBinary, Select, cast, delete, func, select
 
 from silo_server.clock import wire
 from silo_server.db.engine import Tx
@@ -121,15 +121,43 @@ def bounds(tx: Tx) -> tuple[int, int]:
     return horizon, max(head, horizon)
 
 
-def trim(tx: Tx, keep: int) -> int:
-    """Forget all but the newest ``keep`` events; returns how many went. The horizon says up to where."""
+def trim(tx: Tx, keep: int, keep_bytes: int | None = None, limit: int | None = None) -> int:
+    """Forget all but the newest ``keep`` events, and of those all beyond ``keep_bytes`` of data.
+
+    At most ``limit`` at once, the oldest first. Returns how many went. The horizon says up to where.
+    """
     horizon, head = bounds(tx)
     cut = head - keep
-    if cut <= horizon:
-        return 0
+    if keep_bytes is not None:
+        sizes = select(events.c.id, bytes_of(tx, events.c.data))
+        cut = max(cut, beyond(tx, sizes.order_by(events.c.id.desc()), keep_bytes) or 0)
+    if limit is not None:
+        oldest = select(events.c.id).where(events.c.id <= cut).order_by(events.c.id).limit(limit)
+        cut = max(tx.conn.scalars(oldest), default=0)
     gone = tx.conn.execute(delete(events).where(events.c.id <= cut)).rowcount
-    put_state(tx, HORIZON, str(cut))
+    if cut > horizon:
+        put_state(tx, HORIZON, str(cut))
     return gone
+
+
+def bytes_of(tx: Tx, written: ColumnElement[str]) -> ColumnElement[int]:
+    """How many bytes a text takes, uncompressed."""
+    return func.octet_length(written) if tx.postgres else func.length(cast(written, LargeBinary))
+
+
+def beyond(tx: Tx, newest: Select[Any], budget: int) -> Any:
+    """The key of the newest row with which the sizes pass ``budget``; None where they never do.
+
+    newest
+        selects (key, size in bytes), newest first. One row is always kept.
+    """
+    total = 0
+    with tx.conn.execute(newest, execution_options={"yield_per": 1000}) as rows:
+        for number, (key, size) in enumerate(rows):
+            total += size
+            if total > budget and number:
+                return key
+    return None
 
 
 def _named(item: Item) -> dict[str, Any]:

@@ -201,6 +201,8 @@ def undo(tx: Tx, part_number: str, change_id: int, expected: int | None) -> tupl
     parent = get_item(tx, part_number, lock=True)
     check_version(parent, expected)
     change, lines = get_change(tx, parent, change_id)
+    if change.kind == ChangeKind.FOLDED:
+        raise ConflictError(f"change {change_id} cannot be undone: what was before it is no longer kept")
     current = {line.id: line for line in lines_of(tx, parent)}
     untouched = {
         (line.child_id, line.state.rel_type): line.id

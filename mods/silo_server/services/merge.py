@@ -9,6 +9,7 @@ decision on a conflict is remembered until the assembly says something else.
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -32,11 +33,12 @@ from silo_server.services.changes import (
     check_version,
     new_line_id,
 )
+from silo_server.services.history import state_at
 from silo_server.services.items import get_item
 from silo_server.services.lines import lines_of
 from silo_server.services.merge_answer import answer_of, event_of
 from silo_server.services.merge_request import MergeOrder
-from silo_server.values import Item, Line, LineState
+from silo_server.values import Item, Line, LineState, number
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,12 +80,13 @@ def merge_bom(tx: Tx, part_number: str, order: MergeOrder, expected: int | None)
         return earlier
     check_version(parent, expected)
     prepared = _prepare(tx, parent, order)
-    _, version = apply_changes(tx, parent, _line_changes(tx, prepared), _note(prepared, order))
+    changes = _line_changes(tx, prepared)
+    change_id, version = apply_changes(tx, parent, changes, _note(prepared, order))
     _remember_conflicts(tx, prepared)
     answer = answer_of(parent, prepared.plan.diff, order.sync_id)
     text = dumps(answer)
     if order.sync_id:
-        _remember_sync(tx, parent, order, text, version)
+        _remember_sync(tx, parent, order, text, version, _reference(prepared, changes, answer, change_id))
     events.bom_merged(tx, parent, event_of(tx, parent, prepared.plan.diff, answer))
     return MergeOutcome(text, version)
 
@@ -218,9 +221,9 @@ def _replay(tx: Tx, parent: Item, order: MergeOrder) -> MergeOutcome | None:
     if not order.sync_id:
         return None
     row = tx.conn.execute(
-        select(bom_syncs.c.answer, bom_syncs.c.version, bom_syncs.c.request_hash).where(
-            bom_syncs.c.parent_id == parent.id, bom_syncs.c.sync_id == order.sync_id
-        )
+        select(
+            bom_syncs.c.answer, bom_syncs.c.version, bom_syncs.c.request_hash, bom_syncs.c.change_id
+        ).where(bom_syncs.c.parent_id == parent.id, bom_syncs.c.sync_id == order.sync_id)
     ).one_or_none()
     if row is None:
         return None
@@ -229,18 +232,66 @@ def _replay(tx: Tx, parent: Item, order: MergeOrder) -> MergeOutcome | None:
             f"sync_id {order.sync_id!r} was used before for another BOM of {parent.part_number}; "
             "send a new one with new content"
         )
-    return MergeOutcome(row.answer, row.version, replayed=True)
+    answer = row.answer if row.change_id is None else _rebuilt(tx, parent, row.answer, row.change_id)
+    return MergeOutcome(answer, row.version, replayed=True)
 
 
-def _remember_sync(tx: Tx, parent: Item, order: MergeOrder, answer: str, version: int) -> None:
+def _reference(
+    prepared: _Prepared, changes: Sequence[LineChange], answer: Mapping[str, Any], change_id: int
+) -> tuple[str, int] | None:
+    """The answer without its unchanged lines, which the history has: (JSON, change); None where it has not.
+
+    Most of an answer says what is as it was; stored in full, a vault's nightly syncs would be gigabytes.
+    """
+    unchanged = answer["diff"]["unchanged"]
+    places = {pair["part_number"]: place for place, pair in enumerate(unchanged)}
+    lines = [line for line in prepared.lines if line.state.rel_type == "component"]
+    same = [line for line in lines if line.child_part_number in places]
+    order = sorted(range(len(same)), key=lambda n: places[same[n].child_part_number])
+    if [_pair(same[n].child_part_number, same[n].state) for n in order] != unchanged:
+        return None
+    others = {line.id for line in lines} | {change.line_id for change in changes}
+    kept = {**answer, "diff": {**answer["diff"], "unchanged": []}}
+    stored: dict[str, Any] = {"answer": kept, "others": sorted(others - {line.id for line in same})}
+    if order != sorted(order):
+        stored["order"] = order
+    return dumps(stored), change_id
+
+
+def _rebuilt(tx: Tx, parent: Item, stored: str, change_id: int) -> str:
+    kept = json.loads(stored)
+    others = set(kept["others"])
+    same = [
+        _pair(line.child.part_number, line.state)
+        for line in state_at(tx, parent, change_id)
+        if line.state.rel_type == "component" and line.line_id not in others
+    ]
+    kept["answer"]["diff"]["unchanged"] = [same[n] for n in kept.get("order", range(len(same)))]
+    return dumps(kept["answer"])
+
+
+def _pair(part_number: str, state: LineState) -> dict[str, Any]:
+    return {"part_number": part_number, "quantity": number(state.quantity)}
+
+
+def _remember_sync(
+    tx: Tx,
+    parent: Item,
+    order: MergeOrder,
+    answer: str,
+    version: int,
+    reference: tuple[str, int] | None,
+) -> None:
+    shorter = reference is not None and len(reference[0]) < len(answer)
     tx.conn.execute(
         insert(bom_syncs).values(
             parent_id=parent.id,
             sync_id=order.sync_id,
             request_hash=_request_hash(order),
-            answer=answer,
+            answer=reference[0] if reference and shorter else answer,
             version=version,
             at=tx.stamp,
+            change_id=reference[1] if reference and shorter else None,
         )
     )
 

@@ -11,6 +11,7 @@ from starlette.responses import Response
 from silo.bom.errors import RejectedError, SiloError
 from silo_server.db.engine import mode_of
 from silo_server.db.state import put_state
+from silo_server.operation.housekeeping import last_run
 from silo_server.routes.context import Server, ServerDep
 from silo_server.services import accounts, audit, credentials, events, logins
 from silo_server.values import Actor, Role
@@ -117,6 +118,7 @@ def _show(
         users = accounts.list_users(tx)
         tokens = [token for token in credentials.list_tokens(tx) if token.revoked_at is None]
         now, mode = tx.stamp, mode_of(tx)
+        run = last_run(tx)
     return page(
         request,
         "users.html",
@@ -126,6 +128,7 @@ def _show(
         tokens=tokens,
         now=now,
         mode=mode,
+        run=run,
         fixed=server.settings.read_only,
         roles=list(Role),
         problem=problem[:1].upper() + problem[1:],

@@ -1,0 +1,271 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What is thrown away, and when: at each start and every ten minutes by the clock, however busy the server.
+
+Each step deletes a bounded number of rows in a transaction of its own, so that nobody waits long for it. Of
+the processes of a server one does it; what the last run did is kept in the database and shown (``/metrics``,
+the page of the users, ``GET /api/admin/housekeeping``).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import time
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+from datetime import datetime, timedelta
+from pathlib import Path
+
+from sqlalchemy import Table, delete, func, insert, select, update
+from sqlalchemy.exc import SQLAlchemyError
+
+from silo_server.clock import stamp
+from silo_server.db.engine import Database, Tx
+from silo_server.db.state import get_state, put_state
+from silo_server.db.tables import (
+    api_tokens,
+    audit,
+    bom_change_lines,
+    bom_changes,
+    bom_syncs,
+    items,
+    login_failures,
+    login_links,
+    revisions,
+    sessions,
+)
+from silo_server.files import FileStore
+from silo_server.json_values import dumps
+from silo_server.services import events
+from silo_server.services import items as item_service
+from silo_server.services.changes import ChangeKind
+from silo_server.services.history import state_at
+from silo_server.services.lines import state_to_json
+
+logger = logging.getLogger("silo_server.housekeeping")
+
+START_TOKEN = "given out at start"
+STATE = "housekeeping"
+FILES_STATE = "housekeeping_of_files"
+BATCH = 1000
+# An upload is in the store before the row that refers to it is committed; a day is far more than that takes.
+ORPHAN_SECONDS = 24 * 3600.0
+
+Step = Callable[[Tx], int]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """What a run did: rows (and files) deleted by what they were, how long it took, what went wrong."""
+
+    at: str
+    seconds: float = 0.0
+    removed: dict[str, int] = field(default_factory=dict)
+    problem: str | None = None
+
+
+def last_run(tx: Tx) -> Run | None:
+    """The newest run of any process, None where there was none yet."""
+    kept = get_state(tx, STATE)
+    return None if kept is None else Run(**json.loads(kept))
+
+
+def tidy(db: Database, store: FileStore) -> Run:
+    """One run of everything; what cannot be done is noted in the run, and the rest is done."""
+    started, at = time.monotonic(), stamp(db.clock())
+    removed: dict[str, int] = {}
+    problems: list[str] = []
+    for name, step in _STEPS.items():
+        try:
+            removed[name] = _repeat(db, step)
+        except SQLAlchemyError as error:
+            problems.append(f"{name}: {type(error).__name__}")
+    try:
+        removed["files"] = _remove_orphans(db, store)
+    except (OSError, SQLAlchemyError) as error:
+        problems.append(f"files: {type(error).__name__}")
+    run = Run(
+        at=at,
+        seconds=round(time.monotonic() - started, 3),
+        removed={name: count for name, count in removed.items() if count},
+        problem="; ".join(problems) or None,
+    )
+    if run.problem:
+        logger.warning("housekeeping could not do all: %s", run.problem)
+    with db.write(even_when_read_only=True) as tx:
+        put_state(tx, STATE, dumps(asdict(run)))
+    return run
+
+
+async def keep_tidy(db: Database, store: FileStore, ending: asyncio.Event) -> None:
+    """Run every ``housekeeping_seconds`` until ``ending``; a run that has begun is finished first."""
+    while not ending.is_set():
+        with suppress(TimeoutError):
+            await asyncio.wait_for(ending.wait(), db.settings.housekeeping_seconds)
+            return
+        try:
+            if await asyncio.to_thread(_due, db):
+                await asyncio.to_thread(tidy, db, store)
+        except Exception:
+            logger.exception("housekeeping failed")
+
+
+def _due(db: Database) -> bool:
+    # Another process of this server may have done it a moment ago.
+    with db.read() as tx:
+        run = last_run(tx)
+    before = db.clock() - timedelta(seconds=db.settings.housekeeping_seconds / 2)
+    return run is None or run.at <= stamp(before)
+
+
+def _repeat(db: Database, step: Step) -> int:
+    count = 0
+    while True:
+        with db.write(even_when_read_only=True) as tx:
+            gone = step(tx)
+        if not gone:
+            return count
+        count += gone
+
+
+def _old(table: Table, key: str, when: str, age: Callable[[Tx], datetime | None]) -> Step:
+    """Delete the rows whose time ``when`` is at or before ``age``; nothing where that is None."""
+
+    def step(tx: Tx) -> int:
+        before = age(tx)
+        if before is None:
+            return 0
+        over = select(table.c[key]).where(table.c[when] <= stamp(before)).limit(BATCH)
+        return tx.conn.execute(delete(table).where(table.c[key].in_(over))).rowcount
+
+    return step
+
+
+def _now(tx: Tx) -> datetime:
+    return tx.at
+
+
+def _days(setting: str) -> Callable[[Tx], datetime | None]:
+    def age(tx: Tx) -> datetime | None:
+        days = getattr(tx.settings, setting)
+        return tx.at - timedelta(days=days) if days else None
+
+    return age
+
+
+def _start_tokens(tx: Tx) -> int:
+    over = select(api_tokens.c.id).where(
+        api_tokens.c.name == START_TOKEN, api_tokens.c.expires_at <= tx.stamp
+    )
+    return tx.conn.execute(delete(api_tokens).where(api_tokens.c.id.in_(over.limit(BATCH)))).rowcount
+
+
+def _failures(tx: Tx) -> datetime:
+    return tx.at - timedelta(seconds=10 * tx.settings.login_window_seconds)
+
+
+def _syncs(tx: Tx) -> int:
+    """Sync answers beyond their age, or beyond their bytes; the oldest first."""
+    by_age = _days("sync_days")(tx)
+    newest = select(bom_syncs.c.at, events.bytes_of(tx, bom_syncs.c.answer)).order_by(bom_syncs.c.at.desc())
+    by_size = events.beyond(tx, newest, tx.settings.sync_bytes)
+    before = max(stamp(by_age) if by_age else "", by_size or "")
+    oldest = select(bom_syncs.c.at).where(bom_syncs.c.at <= before).order_by(bom_syncs.c.at).limit(BATCH)
+    last = max(tx.conn.scalars(oldest), default=None)
+    if last is None:
+        return 0
+    return tx.conn.execute(delete(bom_syncs).where(bom_syncs.c.at <= last)).rowcount
+
+
+def _events(tx: Tx) -> int:
+    return events.trim(tx, tx.settings.event_log_size, tx.settings.event_log_bytes, BATCH)
+
+
+def _history(tx: Tx) -> int:
+    """Of one BOM: fold the changes older than ``history_days`` into one, which has the state they led to."""
+    before = _days("history_days")(tx)
+    if before is None:
+        return 0
+    old = (
+        select(bom_changes.c.parent_id, func.max(bom_changes.c.id))
+        .where(bom_changes.c.at <= stamp(before))
+        .group_by(bom_changes.c.parent_id)
+        .having(func.count() > 1)
+        .limit(1)
+    )
+    found = tx.conn.execute(old).one_or_none()
+    if found is None:
+        return 0
+    parent = item_service.by_ids(tx, [found[0]])[found[0]]
+    parent = item_service.get_item(tx, parent.part_number, include_archived=True, lock=True)
+    newest: int = found[1]
+    lines = state_at(tx, parent, newest)
+    ours = bom_changes.c.parent_id == parent.id
+    gone = select(bom_changes.c.id).where(ours, bom_changes.c.id <= newest)
+    tx.conn.execute(delete(bom_change_lines).where(bom_change_lines.c.change_id.in_(gone)))
+    tx.conn.execute(
+        delete(bom_syncs).where(bom_syncs.c.parent_id == parent.id, bom_syncs.c.change_id <= newest)
+    )
+    count = tx.conn.execute(delete(bom_changes).where(ours, bom_changes.c.id < newest)).rowcount
+    tx.conn.execute(
+        update(bom_changes)
+        .where(bom_changes.c.id == newest)
+        .values(
+            kind=ChangeKind.FOLDED.value,
+            summary=f"the state after {count + 1} older changes, which are no longer kept",
+            decisions=None,
+            refers_to=None,
+        )
+    )
+    rows = [
+        {
+            "change_id": newest,
+            "line_id": line.line_id,
+            "child_id": line.child.id,
+            "position": line.position,
+            "action": "added",
+            "before": None,
+            "after": dumps(state_to_json(line.state)),
+        }
+        for line in lines
+    ]
+    if rows:
+        tx.conn.execute(insert(bom_change_lines), rows)
+    return count
+
+
+_STEPS: dict[str, Step] = {
+    "sessions": _old(sessions, "id_hash", "expires_at", _now),
+    "login links": _old(login_links, "token_hash", "expires_at", _now),
+    "login failures": _old(login_failures, "id", "at", _failures),
+    "start tokens": _start_tokens,
+    "sync answers": _syncs,
+    "events": _events,
+    "audit": _old(audit, "id", "at", _days("audit_days")),
+    "history": _history,
+}
+
+
+def _remove_orphans(db: Database, store: FileStore) -> int:
+    """Delete the files that no revision and no thumbnail refers to, a day after they came."""
+    now = db.clock().timestamp()
+    with db.write(even_when_read_only=True) as tx:
+        # Looking at every file of a large store takes seconds; once a day is enough.
+        if now - float(get_state(tx, FILES_STATE) or 0) < ORPHAN_SECONDS:
+            return 0
+        put_state(tx, FILES_STATE, str(now))
+    before = now - ORPHAN_SECONDS
+    old = store.older_than(before)
+    if not old:
+        return 0
+    with db.read() as tx:
+        used: set[str] = set()
+        for referring in (revisions.c.file_checksum, revisions.c.thumbnail_key, items.c.thumbnail_key):
+            used.update(tx.conn.scalars(select(referring).distinct().where(referring.is_not(None))))
+    return _remove(store, (path for path in old if path.name not in used), before)
+
+
+def _remove(store: FileStore, paths: Iterable[Path], before: float) -> int:
+    return sum(store.remove_old(path, before) for path in paths)
