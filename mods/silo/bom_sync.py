@@ -14,19 +14,30 @@ server's rule too, so a faulty client cannot break it.
 
 from __future__ import annotations
 
+import os.path
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, Protocol
 
-from silo.api.wire import MergeEntry, MergeRequest, MergeResult, SourceDocument
+from silo.api.wire import (
+    Component,
+    LastSync,
+    LeftOutPart,
+    MergeEntry,
+    MergeRequest,
+    MergeResult,
+    SourceDocument,
+)
 from silo.bom.diff import diff_bom
 from silo.bom.errors import SiloError
 from silo.bom.findings import Finding, FindingCode, Severity
 from silo.bom.identity import walk_entries
+from silo.bom.left_out import LeftOut, components_of, left_out_of
 from silo.bom.links import extract, extract_bom_links
 from silo.bom.merge import MergePlan, plan_merge
 from silo.bom.model import BomDiff, BomEntry, Extraction
+from silo.bom.report import relative
 from silo.bom.resolve import (
     ItemLookup,
     consolidation_findings,
@@ -83,6 +94,48 @@ class Resolved:
     entries: tuple[BomEntry, ...]
     unresolved: tuple[BomEntry, ...]
     findings: tuple[Finding, ...]
+    # UUID of an assembly → what the server remembers of its last sync; a server that does not is not in it.
+    last_syncs: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
+
+    @property
+    def folder(self) -> str:
+        """Where the assembly's file lies; a merge names components relative to it."""
+        return os.path.dirname(self.assembly.doc_path)
+
+    @property
+    def left_out(self) -> tuple[LeftOut, ...]:
+        """What a sync of this assembly cannot bring to the server."""
+        errors = (finding for finding in blocking(self))
+        return left_out_of(self.entries, self.assembly.unregistered, errors, self.folder)
+
+    def diff(self, lines: Iterable[Mapping[str, Any]]) -> BomDiff:
+        """CAD against these lines of the server."""
+        return diff_bom(self.entries, lines, self._missing())
+
+    def plan(self, lines: Iterable[Mapping[str, Any]]) -> MergePlan:
+        """What a merge into these lines of the server would do."""
+        return plan_merge(self.entries, lines, self._missing())
+
+    def is_news(self, plan: MergePlan) -> bool:
+        """True where the server learns anything from this merge, if only that the BOM is (in)complete now."""
+        if plan.news:
+            return True
+        last = self.last_syncs.get(self.assembly.silo_uuid or "")
+        if last is None:
+            return False
+        known = LastSync.model_validate(last) if isinstance(last, Mapping) else last
+        return known.at is None or _texts(known.left_out) != _texts(_left_out(self))
+
+    def _missing(self) -> list[tuple[str, str]]:
+        return [(relative(e.doc_path, self.folder), e.object_name) for e in self.entries if e.missing]
+
+
+def _left_out(resolved: Resolved) -> list[LeftOutPart]:
+    return [LeftOutPart.model_validate(one.as_dict()) for one in resolved.left_out]
+
+
+def _texts(parts: Iterable[LeftOutPart]) -> list[str]:
+    return sorted(part.model_dump_json(exclude_defaults=True) for part in parts)
 
 
 @dataclass(frozen=True)
@@ -111,6 +164,8 @@ def resolve(extraction: Extraction, api: ItemLookup) -> Resolved:
     if item is not None:
         number = str(item["part_number"])
         head = replace(head, part_number=number, name=item.get("name") or item.get("description") or number)
+    left = {entry.key for entry in unresolved}
+    head = replace(head, unregistered=tuple(e for e in extraction.entries if e.key in left))
     return Resolved(
         assembly=head,
         entries=tuple(entries),
@@ -120,6 +175,9 @@ def resolve(extraction: Extraction, api: ItemLookup) -> Resolved:
             *consolidation_findings(entries),
             *unregistered_findings(unresolved),
         ),
+        last_syncs={
+            uuid: last for uuid, item in known.items() if item and (last := item.get("last_sync")) is not None
+        },
     )
 
 
@@ -133,7 +191,7 @@ def server_lines(resolved: Resolved, api: SyncApi) -> tuple[Mapping[str, Any], .
 
 def compare(resolved: Resolved, api: SyncApi) -> MergePlan:
     """What a merge would do, against the server's lines as they are now."""
-    return plan_merge(resolved.entries, server_lines(resolved, api))
+    return resolved.plan(server_lines(resolved, api))
 
 
 def names_of(resolved: Resolved, lines: Iterable[Mapping[str, Any]] = ()) -> dict[str, str]:
@@ -152,14 +210,15 @@ def decide(resolved: Resolved, lines: Sequence[Mapping[str, Any]], *, allow_miss
     lines
         the server's lines of the assembly.
     allow_missing
-        sync although links are broken: what they stood for will read as unreferenced.
+        sync although links are broken: lines that stood for a missing component in the last sync stay as they
+        are; what the server has not heard of stays out, and the server keeps that the BOM is incomplete.
     """
     if resolved.assembly.part_number is None:
         return Outcome(Status.UNREGISTERED, resolved)
-    plan, names = plan_merge(resolved.entries, lines), names_of(resolved, lines)
+    plan, names = resolved.plan(lines), names_of(resolved, lines)
     if blocking(resolved) and not allow_missing:
         return Outcome(Status.BLOCKED, resolved, plan, names=names)
-    return Outcome(Status.MERGED if plan.news else Status.UNCHANGED, resolved, plan, names=names)
+    return Outcome(Status.MERGED if resolved.is_news(plan) else Status.UNCHANGED, resolved, plan, names=names)
 
 
 def sync(
@@ -191,13 +250,25 @@ def sync(
 
 
 def merge_request(resolved: Resolved, sync_id: str, document: SourceDocument | None = None) -> MergeRequest:
-    """The request of spec §5: the direct children only."""
+    """The request of spec §5: the direct children only.
+
+    A server that remembers its syncs also gets what each line is in the CAD model, and what is left out; for
+    any other the request is exactly the spec's.
+    """
+    remembers = resolved.assembly.silo_uuid in resolved.last_syncs
     entries = [
-        MergeEntry(child_part_number=entry.part_number, quantity=entry.quantity)
+        MergeEntry(
+            child_part_number=entry.part_number,
+            quantity=entry.quantity,
+            components=[Component(**one) for one in components_of(entry, resolved.folder)]
+            if remembers
+            else None,
+        )
         for entry in resolved.entries
         if entry.part_number is not None
     ]
-    return MergeRequest(entries=entries, sync_id=sync_id, document=document)
+    left = _left_out(resolved) if remembers else None
+    return MergeRequest(entries=entries, sync_id=sync_id, document=document, left_out=left)
 
 
 def blocking(resolved: Resolved) -> tuple[Finding, ...]:

@@ -112,5 +112,5 @@ def test_a_tree_that_nobody_could_read_is_refused() -> None:
 def test_a_diff_as_json() -> None:
     """All six lists, as plain dicts."""
     told: dict[str, Any] = diff_json(diff_bom([{"child_part_number": "P", "quantity": 2}], []))
-    assert set(told) == {"added", "quantity_changed", "removed", "unchanged", "manual", "conflicts"}
+    assert set(told) == {"added", "quantity_changed", "removed", "unchanged", "manual", "conflicts", "kept"}
     assert json.loads(json.dumps(told))["added"] == [{"part_number": "P", "quantity": 2}]

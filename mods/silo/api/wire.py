@@ -130,6 +130,7 @@ class Item(Record):
     thumbnail_key: str | None = None
     category: str | None = None
     bom_version: int | None = None
+    last_sync: LastSync | None = None
     properties: dict[str, Any] = Field(default_factory=dict)
 
     @model_validator(mode="after")
@@ -145,6 +146,7 @@ class BomLine(Record):
 
     ``assembly_told``: the server has heard what the assembly says of this line that people own, namely
     ``assembly_quantity``; None where the server does not keep that.
+    ``components``: what the line was in the CAD model of the last sync.
     """
 
     id: str | None = None
@@ -168,16 +170,43 @@ class BomLine(Record):
     override: bool = False
     assembly_told: bool | None = None
     assembly_quantity: Number | None = None
+    components: list[dict[str, Any]] = Field(default_factory=list)
     depth: int | None = None
     metadata: dict[str, Any] = Field(default_factory=dict)
 
 
+class Component(Wire):
+    """A component as the CAD model names it: ``file`` relative to the assembly's file, ``object`` in it."""
+
+    file: str
+    object: str = ""
+
+
 class MergeEntry(Wire):
-    """One direct child in a merge request."""
+    """One direct child in a merge request. ``components``: what it is in the CAD model, for the next sync."""
 
     child_part_number: str = Field(min_length=1)
     quantity: Quantity
     source: str = "assembly"
+    components: list[Component] | None = None
+
+
+class LeftOutPart(Wire):
+    """Something that the assembly holds and the request does not (:class:`silo.bom.left_out.LeftOut`)."""
+
+    reason: str
+    name: str = ""
+    file: str = ""
+    object: str = ""
+    quantity: Number = 0
+    message: str = ""
+
+
+class LastSync(Answer):
+    """The last merge of an item's BOM: when (None: never), and what it left out."""
+
+    at: Time = None
+    left_out: list[LeftOutPart] = Field(default_factory=list)
 
 
 class SourceDocument(Wire):
@@ -189,13 +218,17 @@ class SourceDocument(Wire):
 
 
 class MergeRequest(Wire):
-    """``POST /api/items/{partNumber}/bom/merge``. ``sync_id`` makes a repeat harmless."""
+    """``POST /api/items/{partNumber}/bom/merge``. ``sync_id`` makes a repeat harmless.
+
+    ``left_out``: what the assembly holds and ``entries`` does not; None says nothing about it.
+    """
 
     source: str = "assembly"
     entries: list[MergeEntry]
     sync_id: str | None = None
     dry_run: bool = False
     document: SourceDocument | None = None
+    left_out: list[LeftOutPart] | None = None
 
     @model_serializer(mode="wrap")
     def _as_the_spec(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -248,6 +281,7 @@ class MergeResult(Answer):
     resolve_url: str = ""
     sync_id: str | None = None
     version: int | None = None
+    left_out: list[LeftOutPart] | None = None
 
 
 class MergeEvent(Answer):
@@ -262,6 +296,7 @@ class MergeEvent(Answer):
     resolve_url: str = ""
     sync_id: str | None = None
     warnings: list[MergeWarning] = Field(default_factory=list)
+    left_out: list[LeftOutPart] | None = None
 
 
 class ErrorBody(Answer):

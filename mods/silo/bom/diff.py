@@ -9,14 +9,15 @@ The rules of this module:
 * a ``manual`` line (or one of a source that we do not know), and one that is no component (``alternate``,
   ``reference``), belongs to people: it is listed apart, never as removed or changed;
 * a component that exists as a manual line of the same quantity is there already (``unchanged``); with another
-  quantity it is a conflict, for a person to decide.
+  quantity it is a conflict, for a person to decide;
+* a line of a component whose file is missing is not compared at all (``kept``): nobody knows how many there are.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from silo.bom.findings import Finding, Place
@@ -25,6 +26,9 @@ from silo.bom.numbers import exact_sum
 
 # Two quantities closer than this, relatively, are one: lengths pass through databases as floats.
 RELATIVE_TOLERANCE = 1e-9
+
+# (file, object) of a component; the file relative to the assembly's, as a merge names it.
+Component = tuple[str, str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +99,7 @@ def is_manual(line: Mapping[str, Any]) -> bool:
 def diff_bom(
     local_entries: Iterable[BomEntry | Mapping[str, Any]],
     remote_entries: Iterable[Mapping[str, Any]],
+    missing: Iterable[Component] = (),
 ) -> BomDiff:
     """Compare the assembly's direct children with the server's lines of the same parent.
 
@@ -102,9 +107,16 @@ def diff_bom(
         resolved entries (or mappings with ``child_part_number`` and ``quantity``); entries without a part
         number are not compared. Several with one number are summed.
     remote_entries
-        mappings with ``child_part_number``, ``quantity``, ``source`` and optionally ``rel_type``.
+        mappings with ``child_part_number``, ``quantity``, ``source`` and optionally ``rel_type``, and
+        ``components``: what the line stood for in the last sync.
+    missing
+        components whose file or object is missing now, as the last sync named them.
     """
-    local = local_quantities(local_entries)
+    remote_entries = list(remote_entries)
+    gone = lines_of_missing(remote_entries, missing)
+    kept = [line for line in remote_entries if line["child_part_number"] in gone]
+    remote_entries = [line for line in remote_entries if line["child_part_number"] not in gone]
+    local = {pn: q for pn, q in local_quantities(local_entries).items() if pn not in gone}
     assembly_lines: list[_Line] = []
     manual_lines: list[_Line] = []
     manual_components: list[_Line] = []
@@ -116,7 +128,21 @@ def diff_bom(
                 manual_components.append(line)
         else:
             assembly_lines.append(line)
-    return _compare(local, _summed(assembly_lines), _summed(manual_lines), _summed(manual_components))
+    diff = _compare(local, _summed(assembly_lines), _summed(manual_lines), _summed(manual_components))
+    lines = _summed(_Line(one["child_part_number"], as_number(one.get("quantity"))) for one in kept)
+    return replace(diff, kept=tuple(BomChange(number, quantity) for number, quantity in lines.items()))
+
+
+def lines_of_missing(lines: Iterable[Mapping[str, Any]], missing: Iterable[Component]) -> frozenset[str]:
+    """The part numbers of the lines that stood for one of the missing components in the last sync."""
+    gone = {(file, name) for file, name in missing}
+    if not gone:
+        return frozenset()
+    return frozenset(
+        line["child_part_number"]
+        for line in lines
+        if any((one.get("file"), one.get("object")) in gone for one in line.get("components") or ())
+    )
 
 
 def _compare(

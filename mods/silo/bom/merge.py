@@ -6,6 +6,7 @@ added                                  a new line, ``source`` assembly
 quantity changed (assembly line)       takes the assembly's quantity
 removed (assembly line, no component)  stays; flagged unreferenced, unflagged when it is referenced again
 unchanged                              nothing
+kept (its component is missing now)    nothing
 manual                                 never touched; another quantity than the assembly's is a conflict
 =====================================  ===============================================================
 
@@ -18,7 +19,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from silo.bom.diff import diff_bom, is_manual, local_quantities, same_quantity
+from silo.bom.diff import Component, diff_bom, is_manual, local_quantities, same_quantity
 from silo.bom.model import BomDiff, BomEntry
 
 
@@ -48,7 +49,9 @@ class MergePlan:
 
 
 def plan_merge(
-    entries: Iterable[BomEntry | Mapping[str, Any]], lines: Iterable[Mapping[str, Any]]
+    entries: Iterable[BomEntry | Mapping[str, Any]],
+    lines: Iterable[Mapping[str, Any]],
+    missing: Iterable[Component] = (),
 ) -> MergePlan:
     """Plan a merge of the assembly's direct children into the parent's lines; changes nothing itself.
 
@@ -58,9 +61,13 @@ def plan_merge(
         the server's lines; ``unreferenced_since`` (any true value) marks those flagged before.
         ``assembly_told`` says whether the server heard of the assembly's quantity for a line that people own,
         ``assembly_quantity`` which; a server that says neither is not told of conflicts alone.
+    missing
+        as in :func:`silo.bom.diff.diff_bom`: the lines of these components stay as they are.
     """
     local, known = list(entries), list(lines)
-    diff = diff_bom(local, known)
+    diff = diff_bom(local, known, missing)
+    kept = {change.part_number for change in diff.kept}
+    known = [line for line in known if line["child_part_number"] not in kept]
     flagged = {
         line["child_part_number"] for line in known if line.get("unreferenced_since") and not is_manual(line)
     }

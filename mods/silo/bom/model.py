@@ -76,6 +76,8 @@ class BomEntry:
         names of the objects in the parent's document that were counted, to select them on screen.
     also
         keys of the other components that have the same part number and were added to this line.
+    unregistered
+        direct children without a part number, which ``children`` no longer has once they are resolved.
     """
 
     doc_path: str
@@ -94,11 +96,12 @@ class BomEntry:
     link_objects: int = field(default=0, compare=False)
     instances: tuple[str, ...] = field(default=(), compare=False, repr=False)
     document_label: str = field(default="", compare=False, repr=False)
-    also: tuple[tuple[str, str], ...] = field(default=(), compare=False, repr=False)
     standard: str | None = None
+    also: tuple[tuple[str, str], ...] = field(default=(), compare=False, repr=False)
+    unregistered: tuple[BomEntry, ...] = field(default=(), compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        _freeze(self, "children", "instances", "also")
+        _freeze(self, "children", "instances", "also", "unregistered")
 
     @property
     def key(self) -> tuple[str, str]:
@@ -188,6 +191,7 @@ class BomDiff:
     unchanged          both, same quantity                         → nothing
     manual             lines that people own                       → never touched, listed apart
     conflicts          in the assembly, and manual with another quantity → a person decides
+    kept               lines of components that are missing now        → stay as they are
     """
 
     added: tuple[BomChange, ...] = ()
@@ -196,6 +200,7 @@ class BomDiff:
     unchanged: tuple[BomChange, ...] = ()
     manual: tuple[BomChange, ...] = ()
     conflicts: tuple[QuantityChange, ...] = ()
+    kept: tuple[BomChange, ...] = ()
 
     def __post_init__(self) -> None:
         _freeze(self, *(f.name for f in fields(self)))

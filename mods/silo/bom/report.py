@@ -157,4 +157,5 @@ def diff_json(diff: BomDiff) -> dict[str, Any]:
         "unchanged": rows_as_dicts(diff.unchanged),
         "manual": rows_as_dicts(diff.manual),
         "conflicts": rows_as_dicts(diff.conflicts),
+        "kept": rows_as_dicts(diff.kept),
     }

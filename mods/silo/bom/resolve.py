@@ -76,8 +76,13 @@ def resolve_with(entries: Sequence[BomEntry], known: Known) -> tuple[list[BomEnt
         name = (item.get("name") or item.get("description") or number) if item is not None else None
         if not number:
             missing.setdefault(entry.key, entry)
-        children = several(entry.children)
-        told = replace(entry, part_number=number or None, name=name, children=tuple(children))
+        told = replace(
+            entry,
+            part_number=number or None,
+            name=name,
+            children=tuple(several(entry.children)),
+            unregistered=tuple(child for child, found in map(one, entry.children) if not found),
+        )
         done[id(entry)] = (told, bool(number))
         return done[id(entry)]
 
@@ -85,7 +90,7 @@ def resolve_with(entries: Sequence[BomEntry], known: Known) -> tuple[list[BomEnt
         return merge_lines(entry for entry, found in map(one, group) if found)
 
     resolved = several(entries)
-    unresolved = [replace(entry, children=one(entry)[0].children) for entry in missing.values()]
+    unresolved = [one(entry)[0] for entry in missing.values()]
     return resolved, unresolved
 
 

@@ -3,8 +3,8 @@
 
 ``silo.bom.report`` tells a BOM to people and machines with short paths; this keeps everything. Entries are
 kept in a table, each distinct one once, because nested assemblies share their children and a tree written
-out in full could be exponentially larger. Lines that were joined by their part number are a later step's, so
-``also`` is not kept.
+out in full could be exponentially larger. What a look-up adds (``also``,
+``unregistered``) is a later step's and not kept.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ from silo.bom.model import BomEntry, Extraction
 
 FORMAT = 1
 
-_PLAIN_FIELDS = tuple(f.name for f in fields(BomEntry) if f.name not in ("children", "instances", "also"))
+_ELSEWHERE = ("children", "instances", "also", "unregistered")
+_PLAIN_FIELDS = tuple(f.name for f in fields(BomEntry) if f.name not in _ELSEWHERE)
 
 
 def to_plain(extraction: Extraction) -> dict[str, Any]:

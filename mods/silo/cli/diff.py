@@ -7,7 +7,7 @@ import argparse
 from itertools import chain
 from typing import Any
 
-from silo.bom.diff import diff_bom, diff_findings
+from silo.bom.diff import diff_findings
 from silo.bom.model import BomDiff
 from silo.bom.naming import display_name
 from silo.bom.report import base_of, diff_json, finding_json, relative
@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
         whole = resolve(extraction, client)
         chosen = list(assemblies(whole)) if args.recursive else [whole]
         lines = [server_lines(one, client) for one in chosen]
-    compared = [(one, diff_bom(one.entries, known)) for one, known in zip(chosen, lines, strict=True)]
+    compared = [(one, one.diff(known)) for one, known in zip(chosen, lines, strict=True)]
     base = base_of(extraction)
     drifted = bool(whole.unresolved or whole.assembly.part_number is None) or any(
         diff.drifted or blocking(one) for one, diff in compared

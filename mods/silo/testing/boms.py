@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 from urllib.parse import quote
 
@@ -18,6 +18,7 @@ from silo.api.wire import (
     QuantityUpdate,
 )
 from silo.bom.errors import CycleError, RejectedError
+from silo.bom.left_out import Reason, remembered
 from silo.bom.model import BomDiff
 
 Bom = Callable[[str], Sequence[BomLine]]
@@ -38,9 +39,27 @@ def entries_of(request: MergeRequest, known: Mapping[str, str]) -> list[dict[str
             f"{len(problems)} of the entries cannot be merged: {'; '.join(problems)}", problems
         )
     return [
-        {"child_part_number": known[entry.child_part_number.casefold()], "quantity": entry.quantity}
+        {
+            "child_part_number": known[entry.child_part_number.casefold()],
+            "quantity": entry.quantity,
+            "components": [component.model_dump() for component in entry.components or ()],
+        }
         for entry in request.entries
     ]
+
+
+def missing_of(request: MergeRequest) -> list[tuple[str, str]]:
+    """The components that the assembly has lost."""
+    return [(one.file, one.object) for one in request.left_out or () if one.reason == Reason.MISSING]
+
+
+def with_components(
+    lines: Sequence[Mapping[str, Any]], entries: Iterable[Mapping[str, Any]], kept: Iterable[str]
+) -> list[dict[str, Any]]:
+    """The lines, each with what it is in the CAD model."""
+    before = {line["child_part_number"]: line.get("components", []) for line in lines}
+    after = remembered(before, entries, kept)
+    return [{**line, "components": after.get(line["child_part_number"], [])} for line in lines]
 
 
 def check_cycle(bom: Bom, parent: str, children: Sequence[str]) -> None:
@@ -62,7 +81,7 @@ def _way(bom: Bom, here: str, goal: str, path: tuple[str, ...]) -> tuple[str, ..
     return None
 
 
-def result_of(diff: BomDiff, part_number: str, sync_id: str | None) -> MergeResult:
+def result_of(diff: BomDiff, part_number: str, request: MergeRequest) -> MergeResult:
     """The answer of spec §5 for a planned merge."""
     warnings = [
         MergeWarning(
@@ -97,7 +116,8 @@ def result_of(diff: BomDiff, part_number: str, sync_id: str | None) -> MergeResu
         ),
         warnings=warnings,
         resolve_url=f"/items/{quote(part_number, safe='')}/bom",
-        sync_id=sync_id,
+        sync_id=request.sync_id,
+        left_out=request.left_out or None,
     )
 
 

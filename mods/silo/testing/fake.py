@@ -23,6 +23,7 @@ from silo.api.wire import (
     BomLine,
     FlatLine,
     Item,
+    LastSync,
     MergeEvent,
     MergeRequest,
     MergeResult,
@@ -38,7 +39,15 @@ from silo.bom.errors import (
     VersionConflictError,
 )
 from silo.bom.merge import apply_merge, plan_merge, summary
-from silo.testing.boms import check_cycle, entries_of, expanded, flat, result_of
+from silo.testing.boms import (
+    check_cycle,
+    entries_of,
+    expanded,
+    flat,
+    missing_of,
+    result_of,
+    with_components,
+)
 from silo.testing.store import CATEGORIES, FakeStore, FakeStream, Stored
 
 
@@ -135,6 +144,7 @@ class FakeSilo(FakeStore):
             if known is not None:
                 return known
             item = Item(
+                last_sync=LastSync(),
                 id=idempotency_key or str(uuid4()),
                 part_number=self._next_number(category),
                 name=name or description,
@@ -269,9 +279,10 @@ class FakeSilo(FakeStore):
     def _merge(self, stored: Stored, request: MergeRequest, content: list[tuple[str, float]]) -> MergeResult:
         number = stored.item.part_number
         known = {key: other.item.part_number for key, other in self.items.items()}
-        plan = plan_merge(entries_of(request, known), stored.lines)
+        entries = entries_of(request, known)
+        plan = plan_merge(entries, stored.lines, missing_of(request))
         check_cycle(self.get_bom, number, [change.part_number for change in plan.diff.added])
-        result = result_of(plan.diff, number, request.sync_id)
+        result = result_of(plan.diff, number, request)
         if not request.dry_run:
             event = MergeEvent(
                 item=number,
@@ -281,9 +292,14 @@ class FakeSilo(FakeStore):
                 diff=result.diff,
                 resolve_url=result.resolve_url,
                 sync_id=request.sync_id,
+                left_out=result.left_out,
             )
             lines = apply_merge(stored.lines, plan, self._clock().isoformat()) if plan.writes else None
             self._write(stored, lines, MERGE, event.model_dump(mode="json", exclude_none=True))
+            kept = [change.part_number for change in plan.diff.kept]
+            stored.lines = with_components(stored.lines, entries, kept)
+            last = LastSync(at=self._clock(), left_out=request.left_out or [])
+            stored.item = stored.item.model_copy(update={"last_sync": last})
             if request.sync_id:
                 stored.answers[request.sync_id] = (content, result)
         return result

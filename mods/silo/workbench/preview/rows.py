@@ -12,7 +12,6 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
-from silo.bom.diff import diff_bom
 from silo.bom.findings import Finding, FindingCode, Severity
 from silo.bom.model import BomDiff, BomEntry, Extraction
 from silo.bom.naming import display_name
@@ -124,7 +123,7 @@ def ask(snapshot: Snapshot, api: Any, control: Control) -> Preview:
         control.check()
         control.progress(one.assembly.part_number or one.assembly.label)
         lines = server_lines(one, api)
-        compared.append(Compared(one, lines, diff_bom(one.entries, lines)))
+        compared.append(Compared(one, lines, one.diff(lines)))
     all_lines = [line for one in compared for line in one.lines]
     number = whole.assembly.part_number
     page = api.web_url(f"/items/{number}/bom") if number else ""
