@@ -158,7 +158,29 @@ def test_a_missing_file_never_reads_as_removed(run: Any, silo: Any, gearbox: Pat
     assert cause["where"] == ["TopAssembly.FCStd#Cover"]
     allowed = run("sync", gearbox, "--allow-missing", "--json").json()["results"][0]["assemblies"][0]
     assert allowed["status"] == "merged"
-    assert len(allowed["diff"]["removed"]) == 1
+    assert allowed["diff"]["removed"] == []
+    [kept] = allowed["diff"]["kept"]
+    number = outcome["part_number"]
+    line = next(one for one in silo.client.get_bom(number) if one.child_part_number == kept["part_number"])
+    assert (line.quantity, line.unreferenced_since) == (1, None)
+    last = silo.client.get_item(number).last_sync
+    assert [(one.reason, one.file) for one in last.left_out] == [("missing", "parts/Cover.FCStd")]
+    again = run("sync", gearbox, "--allow-missing", "--json").json()["results"][0]["assemblies"][0]
+    assert again["status"] == "unchanged"
+
+
+def test_a_component_that_is_back_makes_the_bom_complete_again(run: Any, silo: Any, gearbox: Path) -> None:
+    """The lines agree, so nothing is to be merged; the server must hear all the same."""
+    run("register", gearbox, "--yes")
+    run("sync", gearbox, "--recursive")
+    cover = gearbox.parent / "parts" / "Cover.FCStd"
+    away = cover.rename(gearbox.parent / "away.FCStd")
+    run("sync", gearbox, "--allow-missing")
+    away.rename(cover)
+    back = run("sync", gearbox, "--json").json()["results"][0]["assemblies"][0]
+    assert back["status"] == "merged"
+    assert silo.client.get_item(back["part_number"]).last_sync.left_out == []
+    assert run("sync", gearbox, "--json").json()["results"][0]["assemblies"][0]["status"] == "unchanged"
 
 
 def test_dry_run_sends_nothing(run: Any, silo: Any, gearbox: Path) -> None:

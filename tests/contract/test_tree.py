@@ -49,7 +49,7 @@ def test_an_expanded_line_is_the_single_level_s_line(api: Api, gearbox: dict[str
         assert (depth, total) == (1, row["quantity"])
         line = single[row["child_part_number"]]
         # What a merge told the server is asked of one level only.
-        told = {key: line[key] for key in ("assembly_told", "assembly_quantity")}
+        told = {key: line[key] for key in ("assembly_told", "assembly_quantity", "components")}
         assert {**row, **told} == line
 
 

@@ -10,7 +10,7 @@ The rules of this module:
   ``reference``), belongs to people: it is listed apart, never as removed or changed;
 * a component that exists as a manual line of the same quantity is there already (``unchanged``); with another
   quantity it is a conflict, for a person to decide;
-* a line of a component whose file is missing is not compared at all (``kept``): nobody knows how many there are.
+* a line of a component whose file is missing is not compared (``kept``): nobody knows how many there are.
 """
 
 from __future__ import annotations

@@ -190,6 +190,19 @@ bom_conflicts = Table(
     Column("accepted", Boolean, nullable=False),
 )
 
+bom_last_syncs = Table(
+    "bom_last_syncs",
+    metadata,
+    Column("parent_id", Id, ForeignKey("items.id"), primary_key=True),
+    Column("at", Stamp),
+    Column("username", String(64), nullable=False),
+    Column("document_file", Text),
+    Column("left_out", Text, nullable=False),
+    Column("components", Text, nullable=False),
+    Column("refused_at", Stamp),
+    Column("refusal", Text),
+)
+
 events = Table(
     "events",
     metadata,

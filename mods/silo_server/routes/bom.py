@@ -10,7 +10,7 @@ from fastapi import APIRouter, Query, Request
 from starlette.responses import Response
 
 from silo.api.wire import MergeResult
-from silo.bom.errors import RejectedError
+from silo.bom.errors import CycleError, RejectedError
 from silo_server.routes.context import (
     READ_ERRORS,
     WRITE_ERRORS,
@@ -27,6 +27,7 @@ from silo_server.routes.models import BomLineOut, ExpandedLineOut, LineChangeBod
 from silo_server.routes.render import render_expanded
 from silo_server.services import edits, rollup, tree
 from silo_server.services.items import get_item
+from silo_server.services.last_sync import last_sync, remember_refusal
 from silo_server.services.lines import line_to_wire, lines_of
 from silo_server.services.merge import MergeOutcome, merge_bom, preview_merge
 from silo_server.services.merge_request import MergeOrder, read_merge_order
@@ -51,11 +52,13 @@ def get_bom(server: ServerDep, caller: Viewer, part_number: str) -> Response:
         item = get_item(tx, part_number)
         lines = lines_of(tx, item)
         told = told_quantities(tx, item)
+        components = last_sync(tx, item).components
     rows = [
         {
             **line_to_wire(line, item.part_number),
             "assembly_told": line.child_id in told,
             "assembly_quantity": number(told.get(line.child_id)),
+            "components": components.get(line.child_id, []),
         }
         for line in lines
     ]
@@ -254,8 +257,14 @@ def _merge(
     if order.dry_run:
         with server.db.read(caller) as tx:
             return preview_merge(tx, part_number, order, expected)
-    with server.db.write(caller) as tx:
-        return merge_bom(tx, part_number, order, expected)
+    try:
+        with server.db.write(caller) as tx:
+            return merge_bom(tx, part_number, order, expected)
+    except (RejectedError, CycleError) as error:
+        # In a transaction of its own: that of the merge is undone.
+        with server.db.write(caller) as tx:
+            remember_refusal(tx, get_item(tx, part_number, lock=True), str(error)[:4096])
+        raise
 
 
 def _edited(edited: edits.Edited, status: int) -> Response:

@@ -33,6 +33,7 @@ from silo_server.routes.models import (
 from silo_server.routes.render import item_to_wire
 from silo_server.schema.catalog import describe, describe_form, find_schema, schemas
 from silo_server.services import items as service
+from silo_server.services.last_sync import NEVER, last_sync, last_syncs
 from silo_server.services.numbering import preview_number
 
 router = APIRouter(prefix="/api", tags=["items"])
@@ -120,7 +121,8 @@ def get_item_by_uuid(server: ServerDep, caller: Viewer, uuid: str) -> Response:
     """The item with this UUID; 404 when there is none or it is archived, 400 for no UUID."""
     with server.db.read(caller) as tx:
         item = service.get_by_uuid(tx, uuid)
-    return json_answer(item_to_wire(item))
+        last = last_sync(tx, item)
+    return json_answer(item_to_wire(item, last))
 
 
 @router.post("/items/by-uuid", response_model=ItemsOut, responses=READ_ERRORS)
@@ -128,7 +130,8 @@ def get_items_by_uuid(server: ServerDep, caller: Viewer, body: UuidsBody) -> Res
     """Many UUIDs in one request; those that are not known are absent. Reads only, so a viewer may."""
     with server.db.read(caller) as tx:
         found = service.get_by_uuids(tx, body.uuids)
-    return json_answer({"items": [item_to_wire(item) for item in found]})
+        last = last_syncs(tx, [item.id for item in found])
+    return json_answer({"items": [item_to_wire(item, last.get(item.id, NEVER)) for item in found]})
 
 
 @router.get("/items/{part_number}", response_model=ItemOut, responses=READ_ERRORS)
@@ -136,7 +139,8 @@ def get_item(server: ServerDep, caller: Viewer, part_number: str) -> Response:
     """One item."""
     with server.db.read(caller) as tx:
         item = service.get_item(tx, part_number)
-    return json_answer(item_to_wire(item))
+        last = last_sync(tx, item)
+    return json_answer(item_to_wire(item, last))
 
 
 @router.put("/items/{part_number}", response_model=ItemOut, responses=WRITE_ERRORS)

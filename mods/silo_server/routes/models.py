@@ -146,6 +146,7 @@ class ItemOut(BaseModel):
     updated_at: str
     updated_by: str
     archived_at: str | None
+    last_sync: dict[str, Any] | None = None
 
 
 class ItemsOut(BaseModel):
@@ -210,6 +211,7 @@ class BomLineOut(LineOut):
 
     assembly_told: bool
     assembly_quantity: float | None
+    components: list[dict[str, str]]
 
 
 class ExpandedLineOut(LineOut):

@@ -9,14 +9,16 @@ from typing import Any
 import pydantic_core
 
 from silo_server.clock import wire
+from silo_server.services.last_sync import LastSync
 from silo_server.services.lines import child_to_wire, line_state_to_wire, revisions_to_wire
 from silo_server.services.tree import Occurrence
 from silo_server.values import Item, LineState, Revision, number
 
 
-def item_to_wire(item: Item) -> dict[str, Any]:
-    """An item, under the contract's names."""
-    return {
+def item_to_wire(item: Item, last_sync: LastSync | None = None) -> dict[str, Any]:
+    """An item, under the contract's names; ``last_sync`` where it was looked up."""
+    told = {} if last_sync is None else {"last_sync": last_sync.to_wire()}
+    return told | {
         "id": item.uuid,
         "part_number": item.part_number,
         "name": item.name,

@@ -35,6 +35,7 @@ from silo_server.services.changes import (
 )
 from silo_server.services.history import state_at
 from silo_server.services.items import get_item
+from silo_server.services.last_sync import LastSync, last_sync, remember
 from silo_server.services.lines import lines_of
 from silo_server.services.merge_answer import answer_of, event_of
 from silo_server.services.merge_request import MergeOrder
@@ -58,6 +59,7 @@ class _Prepared:
     plan: MergePlan
     accepted: Mapping[int, float]
     conflicts: Sequence[QuantityChange]  # all of them, accepted ones too
+    before: LastSync
 
 
 def preview_merge(tx: Tx, part_number: str, order: MergeOrder, expected: int | None) -> MergeOutcome:
@@ -65,7 +67,8 @@ def preview_merge(tx: Tx, part_number: str, order: MergeOrder, expected: int | N
     parent = get_item(tx, part_number)
     check_version(parent, expected)
     prepared = _prepare(tx, parent, order)
-    return MergeOutcome(dumps(answer_of(parent, prepared.plan.diff, order.sync_id)), parent.bom_version)
+    answer = answer_of(parent, prepared.plan.diff, order.sync_id, order.left_out)
+    return MergeOutcome(dumps(answer), parent.bom_version)
 
 
 def merge_bom(tx: Tx, part_number: str, order: MergeOrder, expected: int | None) -> MergeOutcome:
@@ -83,7 +86,9 @@ def merge_bom(tx: Tx, part_number: str, order: MergeOrder, expected: int | None)
     changes = _line_changes(tx, prepared)
     change_id, version = apply_changes(tx, parent, changes, _note(prepared, order))
     _remember_conflicts(tx, prepared)
-    answer = answer_of(parent, prepared.plan.diff, order.sync_id)
+    kept = [change.part_number for change in prepared.plan.diff.kept]
+    remember(tx, parent, order, prepared.child_ids, prepared.before, kept)
+    answer = answer_of(parent, prepared.plan.diff, order.sync_id, order.left_out)
     text = dumps(answer)
     if order.sync_id:
         _remember_sync(tx, parent, order, text, version, _reference(prepared, changes, answer, change_id))
@@ -97,7 +102,10 @@ def _prepare(tx: Tx, parent: Item, order: MergeOrder) -> _Prepared:
     entries: list[dict[str, Any]] = [
         {"child_part_number": names[entry.key], "quantity": entry.quantity} for entry in order.entries
     ]
-    plan = plan_merge(entries, [_as_mapping(line) for line in lines])
+    before = last_sync(tx, parent)
+    known = [{**_as_mapping(line), "components": before.components.get(line.child_id, ())} for line in lines]
+    plan = plan_merge(entries, known, order.missing)
+    kept = {change.part_number for change in plan.diff.kept}
     check_no_cycle(tx, parent, [child_ids[change.part_number] for change in plan.diff.added])
     accepted = {
         row.child_id: row.cad_quantity
@@ -107,10 +115,13 @@ def _prepare(tx: Tx, parent: Item, order: MergeOrder) -> _Prepared:
             )
         )
     }
-    conflicts = [*plan.diff.conflicts, *_overrides_gone(lines, {e["child_part_number"] for e in entries})]
+    conflicts = [
+        *plan.diff.conflicts,
+        *_overrides_gone(lines, kept.union(e["child_part_number"] for e in entries)),
+    ]
     open_ones = tuple(c for c in conflicts if accepted.get(child_ids[c.part_number]) != c.local_quantity)
     plan = replace(plan, diff=replace(plan.diff, conflicts=open_ones))
-    return _Prepared(parent, lines, child_ids, plan, accepted, conflicts)
+    return _Prepared(parent, lines, child_ids, plan, accepted, conflicts, before)
 
 
 def _children(tx: Tx, order: MergeOrder, lines: Sequence[Line]) -> tuple[dict[str, int], dict[str, str]]:

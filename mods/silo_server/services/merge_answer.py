@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 from urllib.parse import quote
 
@@ -23,8 +23,10 @@ def resolve_url(part_number: str) -> str:
     return f"/items/{quote(part_number, safe='')}/bom"
 
 
-def answer_of(parent: Item, diff: BomDiff, sync_id: str | None) -> dict[str, Any]:
-    """The answer to a merge: the spec's keys; ``sync_id`` only where one was given."""
+def answer_of(
+    parent: Item, diff: BomDiff, sync_id: str | None, left_out: Sequence[Mapping[str, Any]] = ()
+) -> dict[str, Any]:
+    """The answer to a merge: the spec's keys; ``sync_id`` and ``left_out`` only where there are such."""
     answer: dict[str, Any] = {
         "status": "merged",
         "diff": {
@@ -49,6 +51,8 @@ def answer_of(parent: Item, diff: BomDiff, sync_id: str | None) -> dict[str, Any
     }
     if sync_id:
         answer["sync_id"] = sync_id
+    if left_out:
+        answer["left_out"] = [dict(one) for one in left_out]
     return answer
 
 
@@ -84,6 +88,8 @@ def event_of(tx: Tx, parent: Item, diff: BomDiff, answer: Mapping[str, Any]) -> 
     }
     if "sync_id" in answer:
         event["sync_id"] = answer["sync_id"]
+    if "left_out" in answer:
+        event["left_out"] = answer["left_out"][:EVENT_UNCHANGED_LINES]
     if diff.conflicts:
         event["warnings"] = answer["warnings"]
     return event

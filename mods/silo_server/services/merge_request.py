@@ -15,6 +15,7 @@ from decimal import Decimal
 from typing import Any, TypeGuard
 
 from silo.bom.errors import RejectedError
+from silo.bom.left_out import Reason
 from silo.bom.numbers import LARGEST_QUANTITY, as_decimal
 from silo_server.errors import TooLargeError
 
@@ -26,6 +27,7 @@ class OrderEntry:
     index: int
     part_number: str
     quantity: float
+    components: Sequence[Mapping[str, str]] = ()
 
     @property
     def key(self) -> str:
@@ -43,6 +45,16 @@ class MergeOrder:
     document_file: str | None = None
     document_sha256: str | None = None
     document_revision: int | None = None
+    left_out: Sequence[Mapping[str, Any]] = ()
+
+    @property
+    def missing(self) -> list[tuple[str, str]]:
+        """The components that the assembly has lost."""
+        return [
+            (one.get("file", ""), one.get("object", ""))
+            for one in self.left_out
+            if one["reason"] == Reason.MISSING
+        ]
 
 
 def read_merge_order(body: Any, max_entries: int) -> MergeOrder:
@@ -70,7 +82,8 @@ def read_merge_order(body: Any, max_entries: int) -> MergeOrder:
             problems.append((index, problem))
     if not problems:
         problems = _sums_too_large(entries)
-    return MergeOrder(entries, problems, sync_id, bool(dry_run), *document)
+    left_out = _left_out(body.get("left_out"), max_entries)
+    return MergeOrder(entries, problems, sync_id, bool(dry_run), *document, left_out)
 
 
 def is_text(value: Any, longest: int) -> TypeGuard[str]:
@@ -112,7 +125,51 @@ def _entry(index: int, raw: Any) -> tuple[OrderEntry | None, str | None]:
         wrong = f"entries[{index}].child_part_number: wanted a part number, got {_shown(name)}"
         return None, wrong if text is None else f"{wrong}; {text}"
     # An entry with a bad quantity is still looked up, so that an unknown number is told as well.
-    return OrderEntry(index, name.strip(), 1.0 if text else float(quantity or 0)), text
+    components, wrong = _components(index, raw.get("components"))
+    problems = "; ".join(filter(None, (text, wrong))) or None
+    return OrderEntry(index, name.strip(), 1.0 if text else float(quantity or 0), components), problems
+
+
+def _components(index: int, raw: Any) -> tuple[Sequence[Mapping[str, str]], str | None]:
+    if raw is None:
+        return (), None
+    if not isinstance(raw, list) or not all(
+        isinstance(one, Mapping) and is_text(one.get("file"), 4096) and is_text(one.get("object", ""), 1024)
+        for one in raw
+    ):
+        return (), f'entries[{index}].components: wanted [{{"file": …, "object": …}}, …], got {_shown(raw)}'
+    return [{"file": one["file"], "object": one.get("object", "")} for one in raw], None
+
+
+_LEFT_OUT_TEXTS = {"reason": 32, "name": 1024, "file": 4096, "object": 1024, "message": 4096}
+
+
+def _left_out(raw: Any, most: int) -> list[dict[str, Any]]:
+    if raw is None:
+        return []
+    if not isinstance(raw, list) or len(raw) > most:
+        raise RejectedError(f"left_out: wanted a list of at most {most} objects, got {_shown(raw)}")
+    return [_left_out_part(index, one) for index, one in enumerate(raw)]
+
+
+def _left_out_part(index: int, raw: Any) -> dict[str, Any]:
+    if not isinstance(raw, Mapping) or not raw.get("reason"):
+        raise RejectedError(f'left_out[{index}]: wanted {{"reason": …, "name": …, …}}, got {_shown(raw)}')
+    part: dict[str, Any] = {}
+    for name, longest in _LEFT_OUT_TEXTS.items():
+        value = raw.get(name, "")
+        if not is_text(value, longest):
+            raise RejectedError(
+                f"left_out[{index}].{name}: wanted at most {longest} characters, got {_shown(value)}"
+            )
+        if value:
+            part[name] = value
+    quantity = raw.get("quantity", 0)
+    if quantity:
+        if problem := quantity_problem(quantity):
+            raise RejectedError(f"left_out[{index}].quantity: {problem}")
+        part["quantity"] = quantity
+    return part
 
 
 def _document(raw: Any) -> tuple[str | None, str | None, int | None]:

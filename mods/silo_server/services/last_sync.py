@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The last sync of each assembly: when, from which file, what it left out, and what each line is in CAD.
+
+One row per assembly, written by the merge in its own transaction. An incomplete BOM must never look like a
+complete one, and an assembly that was never synced must not look like a part.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from sqlalchemy import delete, select, update
+
+from silo.bom.left_out import Reason, in_words, remembered
+from silo_server.clock import wire
+from silo_server.db.bulk import insert_rows, one_of
+from silo_server.db.engine import Tx
+from silo_server.db.tables import bom_last_syncs, items
+from silo_server.services.merge_request import MergeOrder
+from silo_server.values import Item, dumps
+
+
+@dataclass(frozen=True, slots=True)
+class LastSync:
+    """What is known of an assembly's last sync. ``at`` None: it was never synced.
+
+    left_out
+        what the assembly holds and the BOM does not: the fields of :class:`silo.bom.left_out.LeftOut`.
+    refused_at
+        when the server refused a later merge, None where it did not; ``refusal`` says why.
+    """
+
+    at: str | None = None
+    username: str = ""
+    document_file: str | None = None
+    left_out: Sequence[Mapping[str, Any]] = ()
+    refused_at: str | None = None
+    refusal: str = ""
+    components: Mapping[int, Sequence[Mapping[str, str]]] = field(default_factory=dict)
+
+    @property
+    def gaps(self) -> list[dict[str, Any]]:
+        """Everything that is not in the BOM, a refused merge too."""
+        gaps = [dict(one) for one in self.left_out]
+        if self.refused_at:
+            gaps.append({"reason": Reason.REFUSED.value, "message": self.refusal})
+        return gaps
+
+    @property
+    def words(self) -> str:
+        """``2 missing, 1 unregistered``; "" where nothing was left out."""
+        return in_words(self.gaps)
+
+    def to_wire(self) -> dict[str, Any]:
+        """As the API tells it."""
+        return {"at": wire(self.at), "left_out": self.gaps}
+
+
+NEVER = LastSync()
+
+
+def last_sync(tx: Tx, parent: Item) -> LastSync:
+    """The last sync of one assembly."""
+    return last_syncs(tx, [parent.id]).get(parent.id, NEVER)
+
+
+def last_syncs(tx: Tx, parent_ids: Collection[int]) -> dict[int, LastSync]:
+    """The last syncs of all these assemblies; those that were never synced (nor refused) are absent."""
+    rows = tx.conn.execute(select(bom_last_syncs).where(one_of(tx, bom_last_syncs.c.parent_id, parent_ids)))
+    return {row.parent_id: _read(row) for row in rows}
+
+
+def _read(row: Any) -> LastSync:
+    return LastSync(
+        row.at,
+        row.username,
+        row.document_file,
+        json.loads(row.left_out),
+        row.refused_at,
+        row.refusal or "",
+        {int(child): known for child, known in json.loads(row.components).items()},
+    )
+
+
+def remember(
+    tx: Tx,
+    parent: Item,
+    order: MergeOrder,
+    children: Mapping[str, int],
+    before: LastSync,
+    kept: Sequence[str],
+) -> None:
+    """Write down a merge. ``children``: part number → item id; ``kept``: the lines of missing components."""
+    ids = {number.casefold(): str(child) for number, child in children.items()}
+    entries = [
+        {"child_part_number": ids[entry.key], "components": entry.components} for entry in order.entries
+    ]
+    known = {str(child): list(components) for child, components in before.components.items()}
+    components = remembered(known, entries, [str(children[number]) for number in kept])
+    tx.conn.execute(delete(bom_last_syncs).where(bom_last_syncs.c.parent_id == parent.id))
+    row = {
+        "parent_id": parent.id,
+        "at": tx.stamp,
+        "username": tx.actor.username,
+        "document_file": order.document_file,
+        "left_out": dumps([dict(one) for one in order.left_out]),
+        "components": dumps(components),
+        "refused_at": None,
+        "refusal": None,
+    }
+    insert_rows(tx, bom_last_syncs, [row])
+
+
+def remember_refusal(tx: Tx, parent: Item, message: str) -> None:
+    """Write down that a merge was refused; what the last good one said stays."""
+    written = {"refused_at": tx.stamp, "refusal": message}
+    known = tx.conn.execute(
+        update(bom_last_syncs).where(bom_last_syncs.c.parent_id == parent.id).values(**written)
+    )
+    if not known.rowcount:
+        row = {"at": None, "username": tx.actor.username, "document_file": None}
+        row |= {"parent_id": parent.id, "left_out": "[]", "components": "{}", **written}
+        insert_rows(tx, bom_last_syncs, [row])
+
+
+def never_synced(tx: Tx, item_ids: Collection[int]) -> set[int]:
+    """Those of these items that are assemblies by type, and whose BOM never came from one."""
+    assemblies = tx.conn.scalars(
+        select(items.c.id).where(one_of(tx, items.c.id, item_ids), items.c.item_type == "assembly")
+    ).all()
+    known = last_syncs(tx, assemblies)
+    return {one for one in assemblies if known.get(one, NEVER).at is None}

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What a sync leaves out: remembered with the BOM, and no reason to call a line unreferenced."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from server_testing import Api, bom
+
+COVER = {"file": "parts/Cover.FCStd", "object": "Body"}
+MISSING = {"reason": "missing", "name": "Cover", **COVER, "quantity": 2}
+
+
+def entries(*rows: tuple[str, float, list[dict[str, str]]]) -> list[dict[str, Any]]:
+    return [{"child_part_number": n, "quantity": q, "components": c} for n, q, c in rows]
+
+
+def merge(api: Api, parent: str, rows: list[dict[str, Any]], **more: Any) -> Any:
+    return api.good("POST", bom(parent, "merge"), {"source": "assembly", "entries": rows, **more})
+
+
+def last_sync(api: Api, parent: str) -> Any:
+    return api.get(f"/api/items/{parent}")["last_sync"]
+
+
+def test_an_item_that_was_never_synced_says_so(api: Api) -> None:
+    """``at`` is null, and there is a place for what was left out."""
+    (item,) = api.items(1)
+    assert last_sync(api, item) == {"at": None, "left_out": []}
+
+
+def test_a_line_of_a_missing_component_stays_as_it_is(api: Api) -> None:
+    """Known by file and object from the sync before; a second sync without the file knows it again."""
+    parent, cover, bolt = api.items(3)
+    merge(api, parent, entries((cover, 2, [COVER]), (bolt, 4, [])))
+    for _ in range(2):
+        answer = merge(api, parent, entries((bolt, 6, [])), left_out=[MISSING])
+        assert answer["diff"]["removed"] == []
+        assert answer["left_out"] == [MISSING]
+        line = api.lines(parent)[cover]
+        assert (line["quantity"], line["unreferenced_since"]) == (2, None)
+        assert line["components"] == [COVER]
+        assert api.quantities(parent) == {cover: 2, bolt: 6}
+        assert last_sync(api, parent)["left_out"] == [MISSING]
+
+
+def test_a_line_with_a_missing_and_a_present_component_is_not_counted_down(api: Api) -> None:
+    """Two files, one part number: nobody knows the sum while one of them is missing."""
+    parent, cover = api.items(2)
+    other = {"file": "parts/Lid.FCStd", "object": "Body"}
+    merge(api, parent, entries((cover, 5, [COVER, other])))
+    answer = merge(api, parent, entries((cover, 3, [other])), left_out=[MISSING])
+    assert answer["diff"] == {"added": [], "removed": [], "quantity_changed": [], "unchanged": []}
+    assert api.quantities(parent) == {cover: 5}
+    merge(api, parent, entries((cover, 4, [COVER, other])))
+    assert api.quantities(parent) == {cover: 4}
+    assert last_sync(api, parent)["left_out"] == []
+
+
+def test_a_missing_component_that_no_sync_knew_keeps_nothing(api: Api) -> None:
+    """Another path is another component: the line is unreferenced as always."""
+    parent, cover = api.items(2)
+    merge(api, parent, entries((cover, 2, [{**COVER, "file": "old/Cover.FCStd"}])))
+    answer = merge(api, parent, [], left_out=[MISSING])
+    assert [change["part_number"] for change in answer["diff"]["removed"]] == [cover]
+
+
+def test_a_manual_override_of_a_missing_component_is_no_conflict(api: Api) -> None:
+    """A person's quantity is compared again when the component is back."""
+    parent, cover = api.items(2)
+    merge(api, parent, entries((cover, 2, [COVER])))
+    api.good("PUT", bom(parent, cover), {"quantity": 9})
+    answer = merge(api, parent, [], left_out=[MISSING])
+    assert answer["warnings"] == []
+    answer = merge(api, parent, entries((cover, 2, [COVER])))
+    assert [warning["type"] for warning in answer["warnings"]] == ["conflict"]
+
+
+def test_a_refused_merge_is_remembered_until_the_next_good_one(api: Api) -> None:
+    """What the last good one said stays beside it."""
+    parent, bolt = api.items(2)
+    merge(api, parent, entries((bolt, 1, [])), left_out=[MISSING])
+    wrong = {"entries": [{"child_part_number": "no such item", "quantity": 1}]}
+    api.bad(400, "POST", bom(parent, "merge"), wrong)
+    first, second = last_sync(api, parent)["left_out"]
+    assert first == MISSING
+    assert second["reason"] == "refused"
+    assert "no such item" in second["message"]
+    merge(api, parent, entries((bolt, 1, [])))
+    assert last_sync(api, parent)["left_out"] == []
+
+
+def test_a_dry_run_is_not_remembered(api: Api) -> None:
+    """It tells what it would leave out and changes nothing."""
+    (parent,) = api.items(1)
+    assert merge(api, parent, [], left_out=[MISSING], dry_run=True)["left_out"] == [MISSING]
+    assert last_sync(api, parent)["at"] is None
+
+
+@pytest.mark.parametrize(
+    ("given", "where"),
+    [
+        ({"left_out": "x"}, "left_out"),
+        ({"left_out": [{}]}, "left_out[0]"),
+        ({"left_out": [{"reason": "missing", "file": 5}]}, "left_out[0].file"),
+        ({"left_out": [{"reason": "missing", "name": "x" * 2000}]}, "left_out[0].name"),
+        ({"left_out": [{"reason": "missing", "quantity": "2"}]}, "left_out[0].quantity"),
+        (
+            {"entries": [{"child_part_number": "x", "quantity": 1, "components": [{}]}]},
+            "entries[0].components",
+        ),
+    ],
+)
+def test_a_malformed_list_is_refused_and_named(api: Api, given: dict[str, Any], where: str) -> None:
+    """Nothing of a request that cannot be understood is kept."""
+    (parent,) = api.items(1)
+    answer = api.bad(400, "POST", bom(parent, "merge"), {"entries": [], **given})
+    assert where in str(answer)
