@@ -105,7 +105,7 @@ def test_a_server_that_went_away_is_exit_code_3(run: Any, silo: Any, gearbox: Pa
     run("register", gearbox, "--yes")
     ran = run("sync", gearbox, "--recursive", "--json", "--server", NOWHERE)
     assert ran.code == 3
-    assert ran.json()["results"][0]["error"]["code"] == "not_sent"
+    assert ran.json()["results"][0]["error"]["code"] == "unreachable"
     assert run("diff", gearbox, "--server", NOWHERE).code == 3
 
 

@@ -121,8 +121,15 @@ def remember_refusal(tx: Tx, parent: Item, message: str) -> None:
         update(bom_last_syncs).where(bom_last_syncs.c.parent_id == parent.id).values(**written)
     )
     if not known.rowcount:
-        row = {"at": None, "username": tx.actor.username, "document_file": None}
-        row |= {"parent_id": parent.id, "left_out": "[]", "components": "{}", **written}
+        row = {
+            "parent_id": parent.id,
+            "at": None,
+            "username": tx.actor.username,
+            "document_file": None,
+            "left_out": "[]",
+            "components": "{}",
+            **written,
+        }
         insert_rows(tx, bom_last_syncs, [row])
 
 

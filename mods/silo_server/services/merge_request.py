@@ -122,12 +122,12 @@ def _entry(index: int, raw: Any) -> tuple[OrderEntry | None, str | None]:
     problem = quantity_problem(quantity)
     text = None if problem is None else f"entries[{index}].quantity: {problem}"
     if not is_text(name, 200) or not name.strip():
-        wrong = f"entries[{index}].child_part_number: wanted a part number, got {_shown(name)}"
-        return None, wrong if text is None else f"{wrong}; {text}"
+        missing = f"entries[{index}].child_part_number: wanted a part number, got {_shown(name)}"
+        return None, missing if text is None else f"{missing}; {text}"
     # An entry with a bad quantity is still looked up, so that an unknown number is told as well.
     components, wrong = _components(index, raw.get("components"))
-    problems = "; ".join(filter(None, (text, wrong))) or None
-    return OrderEntry(index, name.strip(), 1.0 if text else float(quantity or 0), components), problems
+    entry = OrderEntry(index, name.strip(), 1.0 if text else float(quantity or 0), components)
+    return entry, "; ".join(filter(None, (text, wrong))) or None
 
 
 def _components(index: int, raw: Any) -> tuple[Sequence[Mapping[str, str]], str | None]:
