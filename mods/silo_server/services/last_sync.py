@@ -19,8 +19,9 @@ from silo_server.clock import wire
 from silo_server.db.bulk import insert_rows, one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import bom_last_syncs, items
+from silo_server.json_values import dumps
 from silo_server.services.merge_request import MergeOrder
-from silo_server.values import Item, dumps
+from silo_server.values import Item
 
 
 @dataclass(frozen=True, slots=True)
