@@ -196,13 +196,12 @@ def _levels_above(tx: Tx, item: Item, levels: int) -> Iterator[list[int]]:
 
 
 def _uses(tx: Tx, of_level: ColumnElement[bool], depth: int, limit: int, offset: int) -> list[Usage]:
-    # By code point on both databases, as the list of items.
-    order = items.c.part_number_key.collate("C") if tx.postgres else items.c.part_number_key
+    # Found first, then sorted: else PostgreSQL walks all items in their order and looks for uses of each.
+    lines = select(bom_lines).where(of_level).cte("lines").prefix_with("MATERIALIZED", dialect="postgresql")
     rows = tx.conn.execute(
-        select(bom_lines)
-        .join(items, items.c.id == bom_lines.c.parent_id)
-        .where(of_level)
-        .order_by(order, bom_lines.c.id)
+        select(lines)
+        .join(items, items.c.id == lines.c.parent_id)
+        .order_by(items.c.part_number_key, lines.c.id)
         .limit(limit)
         .offset(offset)
     ).all()
