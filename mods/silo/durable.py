@@ -10,6 +10,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
+from silo.platform import patiently, sync_folder
+
+__all__ = ["replace_patiently", "replacing", "sync_folder"]
+
 
 @contextmanager
 def replacing(path: Path | str, *, mode: int | None = None) -> Iterator[BinaryIO]:
@@ -28,19 +32,13 @@ def replacing(path: Path | str, *, mode: int | None = None) -> Iterator[BinaryIO
             os.fsync(file.fileno())
         if mode is not None:
             os.chmod(temporary, mode)
-        os.replace(temporary, target)
+        replace_patiently(temporary, target)
     except BaseException:
         Path(temporary).unlink(missing_ok=True)
         raise
     sync_folder(target.parent)
 
 
-def sync_folder(folder: Path | str) -> None:
-    """Put the names in a folder on disk: a rename is there only with its folder. Raises OSError."""
-    if os.name != "posix":  # Windows neither needs nor allows it
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
+def replace_patiently(source: Path | str, target: Path | str) -> None:
+    """``os.replace``, which on Windows waits for a program that has the target open. Raises OSError."""
+    patiently(lambda: os.replace(source, target))

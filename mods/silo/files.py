@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from silo.bom.errors import DocumentError, InputError
@@ -21,6 +21,16 @@ def documents_in(tops: Iterable[str]) -> list[str]:
         else:
             found.append(top)
     return list(dict.fromkeys(found))
+
+
+def job_text(env: Mapping[str, str]) -> str | None:
+    """The arguments of a job inside FreeCAD: the file that ``SILO_ARGS_FILE`` names, else ``SILO_ARGS``.
+
+    An environment variable ends at 32 767 characters on Windows, and at 128 KiB on Linux. Raises OSError.
+    """
+    if name := env.get("SILO_ARGS_FILE"):
+        return Path(name).read_text(encoding="utf-8")
+    return env.get("SILO_ARGS")
 
 
 def check_writable(*paths: str | None) -> None:

@@ -9,11 +9,12 @@ three packages, so the few lines of ``platformdirs`` that matter are here: the X
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 
-_NAME = "silo-mod"
+from silo.platform import NAME
+
+_FOLDER = "silo-mod"
 _LOCAL, _ROAMING = ("LOCALAPPDATA", "AppData/Local"), ("APPDATA", "AppData/Roaming")
 
 
@@ -23,20 +24,20 @@ def _folder(
     home = Path(env.get("HOME") or Path.home())
     if platform == "win32":
         variable, default = windows
-        return Path(env.get(variable) or Path.home() / default) / _NAME
+        return Path(env.get(variable) or Path.home() / default) / _FOLDER
     # XDG says that a relative path is to be ignored.
     chosen = env.get(xdg, "")
     if chosen and os.path.isabs(chosen):
-        return Path(chosen) / _NAME
-    return home / (mac if platform == "darwin" else unix) / _NAME
+        return Path(chosen) / _FOLDER
+    return home / (mac if platform == "darwin" else unix) / _FOLDER
 
 
-def config_folder(env: Mapping[str, str] = os.environ, platform: str = sys.platform) -> Path:
+def config_folder(env: Mapping[str, str] = os.environ, platform: str = NAME) -> Path:
     """Where the configuration lives (not created here)."""
     return _folder(env, platform, "XDG_CONFIG_HOME", ".config", "Library/Application Support", _ROAMING)
 
 
-def data_folder(env: Mapping[str, str] = os.environ, platform: str = sys.platform) -> Path:
+def data_folder(env: Mapping[str, str] = os.environ, platform: str = NAME) -> Path:
     """Where what must not be lost lives: the outbox, the journal of registrations, the embedded database.
 
     On Windows not in the roaming profile: a database that is copied between machines while it is open is soon
@@ -45,6 +46,6 @@ def data_folder(env: Mapping[str, str] = os.environ, platform: str = sys.platfor
     return _folder(env, platform, "XDG_DATA_HOME", ".local/share", "Library/Application Support", _LOCAL)
 
 
-def cache_folder(env: Mapping[str, str] = os.environ, platform: str = sys.platform) -> Path:
+def cache_folder(env: Mapping[str, str] = os.environ, platform: str = NAME) -> Path:
     """Where what can be made again lives."""
     return _folder(env, platform, "XDG_CACHE_HOME", ".cache", "Library/Caches", _LOCAL)

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import IO
 
 from silo.bom.errors import NotFoundError
-from silo.durable import sync_folder
+from silo.durable import replace_patiently, sync_folder
 from silo_server.services.revisions import StoredFile
 
 CHUNK = 1024 * 1024
@@ -129,7 +129,12 @@ class FileStore:
                 return digest.hexdigest(), size
             target = self._place(digest.hexdigest())
             target.parent.mkdir(parents=True, exist_ok=True)
-            os.replace(temporary, target)
+            try:
+                replace_patiently(temporary, target)
+            except PermissionError:
+                # Windows replaces no file that somebody reads. Its name is its hash, so it is the same one.
+                if not target.is_file():
+                    raise
             sync_folder(target.parent)
         finally:
             temporary.unlink(missing_ok=True)

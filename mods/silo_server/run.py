@@ -26,6 +26,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from silo.bom.errors import ConfigError
+from silo.platform import WORKERS_CAN_SHARE_A_SOCKET, allow_many_files, own_the_port
 from silo_server.app import create_app
 from silo_server.bootstrap import Welcome, prepare
 from silo_server.db.engine import Database
@@ -155,6 +156,11 @@ def serve(
     settings = settings_from_environment(database_url=database_url)
     if workers < 1:
         raise ConfigError(f"workers: wanted at least 1, got {workers}")
+    if workers > 1 and not WORKERS_CAN_SHARE_A_SOCKET:
+        raise ConfigError(
+            f"workers: {workers} processes cannot share one address on Windows. Serve with one "
+            "(--workers 1); it answers several requests at once."
+        )
     welcome = _prepare(settings, token or os.environ.get("SILO_API_TOKEN") or None)
     sock = _bind(host, port)
     base_url = _base_url(host, sock.getsockname()[1])
@@ -258,7 +264,7 @@ def _work(settings: Settings, sock: socket.socket, on_up: Callable[[], None] | N
     # all of them (and through every loaded module) again and again while they are made. Half the time goes.
     gc.freeze()
     gc.set_threshold(50_000, 20, 100)
-    _allow_many_connections()
+    allow_many_files()
     server = SiloServer(_config(create_app(settings), settings), on_up or (lambda: None))
     parent = multiprocessing.parent_process()
     if parent is not None:
@@ -273,22 +279,11 @@ def _end_with(sentinel: int, server: SiloServer) -> None:
     server.should_exit = True
 
 
-def _allow_many_connections() -> None:
-    # Each listener is an open file; the usual soft limit of 1024 is far below what the machine allows.
-    try:
-        import resource
-    except ImportError:  # Windows has no such limit
-        return
-    _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    with suppress(OSError, ValueError):
-        resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
-
-
 def _bind(host: str, port: int) -> socket.socket:
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     # asyncio turns Nagle's algorithm off only where the protocol is named; with it each answer takes 40 ms.
     sock = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
-    sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    own_the_port(sock)
     try:
         sock.bind((host, port))
     except (OSError, OverflowError) as error:

@@ -21,7 +21,7 @@ PRETENDER = f"""#!{sys.executable}
 import json, os, signal, sys, time
 assert sys.argv[1] == "-c" and "run_path" in sys.argv[2], sys.argv
 assert not sys.stdin.read(), "FreeCAD must not wait for a terminal"
-job = json.loads(os.environ["SILO_ARGS"])
+job = json.load(open(os.environ["SILO_ARGS_FILE"], encoding="utf-8"))
 with open(job["lines"], "a") as out:
     def tell(data):
         out.write(json.dumps(data) + "\\n"); out.flush()
@@ -134,3 +134,16 @@ def test_without_any_freecad_the_message_says_what_to_do(monkeypatch: pytest.Mon
     monkeypatch.setenv("PATH", "")
     with pytest.raises(ConfigError, match="Install FreeCAD, or set SILO_FREECADCMD"):
         find_freecadcmd(env={})
+
+
+def test_thousands_of_files_are_one_job(tmp_path: Path, freecadcmd: str) -> None:
+    """More than an environment variable could hold, on any platform."""
+    (wanted,) = tops(tmp_path, "good")
+    folder = tmp_path / ("f" * 200)
+    folder.mkdir()
+    names = [str(folder / f"{number:04d}.FCStd") for number in range(2000)]
+    for name in names:
+        Path(name).hardlink_to(wanted)
+    results = list(run_freecad(names, command=freecadcmd))
+    assert [top for top, _ in results] == names
+    assert all(found == GOOD for _, found in results)

@@ -25,6 +25,7 @@ from silo.api.address import ServerAddress
 from silo.bom.errors import ConfigError
 from silo.durable import replacing
 from silo.folders import config_folder
+from silo.platform import MODES_COUNT
 
 log = logging.getLogger("silo.api")
 
@@ -160,7 +161,7 @@ def _verify_text(source: str, text: str) -> bool | str:
 
 
 def _warn_if_open(path: Path, mode: int) -> None:
-    if os.name == "posix" and mode & (stat.S_IRWXG | stat.S_IRWXO):
+    if MODES_COUNT and mode & (stat.S_IRWXG | stat.S_IRWXO):
         log.warning("%s can be read by others and may hold a token; chmod 600 keeps it private", path)
 
 

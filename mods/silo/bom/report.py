@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import os.path
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from types import ModuleType
 from typing import Any
 
 from silo.bom.errors import InputError
@@ -16,14 +18,16 @@ from silo.bom.model import BomDiff, BomEntry, Extraction, rows_as_dicts
 MOST_LINES = 500_000
 
 
-def relative(path: str, base: str) -> str:
-    """``path`` as seen from the folder ``base``, with ``/``; unchanged where there is no such way."""
+def relative(path: str, base: str, rules: ModuleType = os.path) -> str:
+    """``path`` as seen from the folder ``base``, with ``/``; whole where it lies on another Windows drive.
+
+    ``rules``: ``ntpath`` or ``posixpath``, whatever the platform.
+    """
     if not path or not base:
         return path
-    try:
-        return os.path.relpath(path, base).replace(os.sep, "/")
-    except ValueError:  # another Windows drive
-        return path.replace(os.sep, "/")
+    with suppress(ValueError):  # there is no way from one drive to another
+        path = rules.relpath(path, base)
+    return path.replace(rules.sep, "/")
 
 
 def base_of(extraction: Extraction) -> str:

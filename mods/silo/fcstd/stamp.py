@@ -17,7 +17,7 @@ from pathlib import Path
 
 from silo.bom.errors import DocumentError
 from silo.bom.identity import META_KEY, meta_key
-from silo.durable import sync_folder
+from silo.durable import replace_patiently, sync_folder
 from silo.fcstd.container import DOCUMENT_XML, ContainerFile, Entry, FileState
 from silo.fcstd.inflate import Inflater
 from silo.fcstd.library import Library
@@ -159,7 +159,7 @@ def _write(path: str, state: FileState, content: bytes, key: str, identity: str)
         _read_back(path, temporary, key, identity)
         if _state(path) != state:
             raise _changed(path)
-        os.replace(temporary, path)
+        replace_patiently(temporary, path)
     except BaseException:
         with contextlib.suppress(OSError):
             os.unlink(temporary)

@@ -2,8 +2,9 @@
 """FreeCAD as a child process: BOMs of many files, read by ``freecadcmd``, each on its own.
 
 ``freecadcmd script.py args`` would open the arguments as files, run a failing script twice and exit 0 all the
-same (measured, 0.20 to 1.1). So: ``-c`` with runpy, arguments by environment, results through a file, whose
-lines also tell which file FreeCAD was at when it died or hung. It is then started again for the rest.
+same (measured, 0.20 to 1.1). So: ``-c`` with runpy, arguments in a file that the environment names, results
+in another one, whose lines also show at which file FreeCAD died or hung. It is then started again for the
+rest.
 """
 
 from __future__ import annotations
@@ -11,9 +12,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import signal
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -21,6 +20,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
 
+from silo import platform
 from silo.bom.errors import CancelledError, ConfigError, DocumentError, InputError, SiloError
 from silo.bom.model import Extraction
 from silo.bom.snapshot import from_plain
@@ -106,7 +106,7 @@ class FreeCADRun:
     """One process that does one job, and writes its results as JSON lines.
 
     script
-        runs inside FreeCAD, with ``job`` and the path for the ``lines`` as JSON in ``SILO_ARGS``.
+        runs inside FreeCAD. The file that ``SILO_ARGS_FILE`` names holds ``job`` and where ``lines`` go.
     timeout_s
         for one line, FreeCAD's start included.
     """
@@ -134,11 +134,13 @@ class FreeCADRun:
 
     def __enter__(self) -> FreeCADRun:
         self._results.touch()
+        job = Path(self._folder.name) / "job.json"
+        job.write_text(json.dumps({**self.job, "lines": str(self._results)}), encoding="utf-8")
         env = {
             **os.environ,
             **self.env,
             "SILO_SCRIPT": str(self.script),
-            "SILO_ARGS": json.dumps({**self.job, "lines": str(self._results)}),
+            "SILO_ARGS_FILE": str(job),
         }
         try:
             with open(self._log, "wb") as log:
@@ -150,7 +152,7 @@ class FreeCADRun:
                     # FreeCAD reads a FreeCAD.cfg in the current folder; here is none.
                     cwd=self._folder.name,
                     env=env,
-                    start_new_session=sys.platform != "win32",
+                    **platform.child_options(group=True),
                 )
         except OSError as error:
             self._folder.cleanup()
@@ -196,19 +198,14 @@ class FreeCADRun:
             return DocumentError(path, f"FreeCAD did not finish it within {self.timeout_s:g} s")
         assert self._process is not None  # entered
         code = self._process.returncode
-        how = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
+        how = platform.how_it_ended(code)
         if not self.begun:
             raise ConfigError(f"{self.freecadcmd} did not work ({how}). It said: {self._last_words}")
         return DocumentError(path, f"FreeCAD died while it read this file ({how})")
 
     def _stop(self) -> None:
-        if self._process is None or self._process.poll() is not None:
-            return
-        if sys.platform == "win32":
-            self._process.kill()
-        else:
-            os.killpg(self._process.pid, signal.SIGKILL)
-        self._process.wait()
+        if self._process is not None:
+            platform.end(self._process)
 
 
 def _complete_lines(file: IO[str]) -> Iterator[dict[str, Any]]:

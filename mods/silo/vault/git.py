@@ -19,6 +19,7 @@ from pathlib import Path, PurePosixPath
 from typing import BinaryIO
 
 from silo.bom.errors import InputError
+from silo.platform import WINDOWS
 
 _CHUNK = 1 << 20
 _POINTER = re.compile(rb"version https://git-lfs\.github\.com/spec/v1\n(?:.*\n)*?oid sha256:([0-9a-f]{64})\n")
@@ -84,7 +85,7 @@ def _listed(repository: str, revision: str, below: str) -> Iterator[tuple[str, s
             continue
         parts = PurePosixPath(name).parts
         # Git refuses such names; a repository made by something else may hold them.
-        if name.startswith("/") or ".." in parts or (os.name == "nt" and any(c in name for c in ":\\")):
+        if name.startswith("/") or ".." in parts or (WINDOWS and any(c in name for c in ":\\")):
             raise InputError(f"The revision {revision} holds a file named {name!r}, which leaves its folder.")
         yield head.split()[2].decode(), name
 

@@ -6,7 +6,8 @@ Started with its arguments in the environment (FreeCAD would open anything else 
     SILO_ARGS='{"tops": ["vault"], "recursive": true, "report": "sync.md"}' \\
         freecadcmd -c 'import runpy; runpy.run_path(".../headless.py", run_name="__main__")' </dev/null
 
-``SILO_ARGS`` is a JSON object; docs/headless.md tells its keys. With ``lines`` the BOMs are only read, and
+``SILO_ARGS`` is a JSON object, or ``SILO_ARGS_FILE`` names a file with one; docs/headless.md has its keys.
+With ``lines`` the BOMs are only read, and
 written there one JSON object per line as they are finished: that is how ``silo-mod … --via freecad`` asks.
 Otherwise they are synced with the server of ``SILO_API_URL`` and ``SILO_API_TOKEN`` (or the configuration).
 
@@ -33,7 +34,7 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from silo.bom.errors import ConfigError, InputError, SiloError
-from silo.files import check_writable, documents_in
+from silo.files import check_writable, documents_in, job_text
 
 if TYPE_CHECKING:
     from silo.batch import TopResult
@@ -83,7 +84,7 @@ _EXAMPLE = '{"tops": ["TopAssembly.FCStd"]}'
 def main(env: Mapping[str, str] = os.environ) -> int:
     """Do the job that the environment describes; the exit code."""
     try:
-        job = Job.from_text(env.get("SILO_ARGS"))
+        job = Job.from_text(job_text(env))
         check_writable(job.json, job.report)
         if not documents_in(job.tops):
             raise InputError(f"no FreeCAD files (*.FCStd) in {', '.join(job.tops)}")

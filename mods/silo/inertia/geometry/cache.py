@@ -11,13 +11,13 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from silo.bom.errors import InputError
+from silo.bom.report import relative
 from silo.durable import replacing
 from silo.folders import cache_folder
 from silo.inertia.geometry import store
@@ -97,9 +97,9 @@ def provenance(reading: Reading, options: ReadOptions) -> dict[str, Any]:
     """What a reading depended on besides its own bytes; kept with it, checked by :meth:`Cache.get`."""
     folder = Path(reading.assembly.source).resolve().parent
     return {
-        "others": {os.path.relpath(path, folder): content_hash(path) for path in reading.others},
+        "others": {relative(str(path), str(folder)): content_hash(path) for path in reading.others},
         "missing": sorted({file_key(name) for name in reading.missing}),
-        "absent": sorted(os.path.relpath(path, folder) for path in reading.absent),
+        "absent": sorted(relative(str(path), str(folder)) for path in reading.absent),
         "depth": options.sibling_depth,
     }
 

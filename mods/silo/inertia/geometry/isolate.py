@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 import os
 import queue
-import signal
 import subprocess
 import sys
 import tempfile
@@ -21,6 +20,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
+from silo import platform
 from silo.bom.errors import CancelledError, ConfigError, DocumentError
 from silo.inertia.geometry.options import Progress, ReadOptions
 
@@ -103,6 +103,7 @@ def _child(command: Sequence[str], errors: IO[bytes]) -> Iterator[subprocess.Pop
         stdout=subprocess.PIPE,
         stderr=errors,
         env=_environment(),
+        **platform.child_options(),
     )
     try:
         yield process
@@ -118,11 +119,9 @@ def python() -> str:
     """A Python interpreter to start. Inside FreeCAD ``sys.executable`` is FreeCAD itself."""
     if "python" in Path(sys.executable or "").name.lower():
         return sys.executable
-    folder = Path(sys.base_exec_prefix)
-    names = ["python.exe", "bin/python.exe"] if os.name == "nt" else ["bin/python3", "bin/python"]
-    for name in names:
-        if (folder / name).is_file():
-            return str(folder / name)
+    for found in platform.python_beside(sys.base_exec_prefix):
+        if os.path.isfile(found):
+            return found
     raise ConfigError(
         f"no Python interpreter was found beside {sys.executable} to read geometry with; "
         "read it with isolate=False"
@@ -142,10 +141,9 @@ def _death(code: int, errors: IO[bytes], options: ReadOptions) -> str:
     if any(sign in words for sign in _OUT_OF_MEMORY):
         return f"needs more than the {options.memory_mb} MB allowed to read it; allow more memory"
     if code < 0:
-        name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
         return (
-            f"the geometry kernel crashed on it ({name}); the file is damaged, or trips a bug of the kernel. "
-            "Export it again, or with another application protocol"
+            f"the geometry kernel crashed on it ({platform.how_it_ended(code).removeprefix('signal ')}); "
+            "the file is damaged, or trips a bug of the kernel. Export it again, or with another application protocol"
         )
     last = next((line for line in reversed(words.splitlines()) if line.strip()), f"exit code {code}")
     return f"the reader stopped with an error: {last.strip()}"

@@ -21,6 +21,7 @@ from silo.inertia.geometry import store
 from silo.inertia.geometry.options import Reading, ReadOptions
 from silo.inertia.model import GeometryCode, GeometryProblem
 from silo.inertia.wording import counted
+from silo.platform import limit_this_process
 
 _COMPLAINT = re.compile(rb"ERR|Fail|\*\*\*|Exception|Unresolved", re.IGNORECASE)
 _COLOUR = re.compile(rb"\x1b\[[0-9;]*m")
@@ -56,17 +57,8 @@ def without(*packages: str) -> None:
 
 def limit(memory_mb: int, cpu_s: float) -> None:
     """Limits of this process, where the platform has them; no core files."""
-    try:
-        import resource
-    except ImportError:  # Windows: the parent's clock is all there is
-        return
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    if memory_mb:
-        resource.setrlimit(resource.RLIMIT_AS, (memory_mb * 1024**2, memory_mb * 1024**2))
-    if cpu_s:
-        # Only for the case that the parent died: its own clock is the one that counts.
-        seconds = int(cpu_s) + 30
-        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
+    # Time is limited only for the case that the parent died: its own clock is the one that counts.
+    limit_this_process(memory=memory_mb * 1024**2, cpu_s=int(cpu_s) + 30 if cpu_s else 0)
 
 
 def _read(task: dict[str, Any], parent: IO[str], noise: IO[bytes]) -> None:

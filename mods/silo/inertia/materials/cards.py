@@ -11,13 +11,13 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-import sys
 from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
 from silo.inertia.materials.density import parse_density
 from silo.inertia.materials.table import Material
+from silo.platform import WINDOWS
 
 MAX_CARD_BYTES = 1_000_000
 
@@ -54,7 +54,7 @@ def cards_fingerprint() -> str:
 
 def _usual() -> Iterator[Path]:
     home = Path.home()
-    if sys.platform == "win32":
+    if WINDOWS:
         for base in (os.environ.get("PROGRAMFILES", ""), os.environ.get("LOCALAPPDATA", "")):
             if base:
                 yield from sorted(Path(base).glob("FreeCAD*/Mod/Material"), reverse=True)

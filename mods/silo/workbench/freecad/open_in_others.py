@@ -4,7 +4,7 @@
 FreeCAD (0.20 to 1.1) keeps a folder ``<program>_Doc_<Uid>_<hash>_<number>`` in its cache for each open
 document, the hash being the first six digits of the SHA-1 of the file's path, and holds a lock on
 ``<program>_<number>.lock`` while it runs (App/Document.cpp, Gui/Application.cpp; seen in all three). Where
-there are no POSIX locks, nothing is known and nothing is said.
+the platform cannot say whether a lock is held, nothing is known and nothing is said.
 """
 
 from __future__ import annotations
@@ -13,10 +13,7 @@ import hashlib
 import os
 import re
 
-try:
-    import fcntl
-except ImportError:  # Windows
-    fcntl = None  # type: ignore[assignment]
+from silo.platform import is_locked
 
 _FOLDER = re.compile(r"(?P<program>.+)_Doc_[0-9a-fA-F-]{36}_(?P<hash>[0-9a-f]{6})_(?P<number>\d+)")
 
@@ -33,7 +30,7 @@ class OpenInOthers:
         self._hashes: frozenset[str] = frozenset()
         cache, name = os.path.split(own_folder.rstrip("/\\"))
         own = _FOLDER.fullmatch(name)
-        if own is not None and fcntl is not None:
+        if own is not None:
             self._hashes = _open_in_others(cache, own["number"])
 
     def has(self, *paths: str) -> bool:
@@ -52,17 +49,6 @@ def _open_in_others(cache: str, own: str) -> frozenset[str]:
         return frozenset()
     found = [match for name in names if (match := _FOLDER.fullmatch(name)) and match["number"] != own]
     locks = {f"{match['program']}_{match['number']}.lock" for match in found}
-    alive = {lock for lock in locks if _is_held(os.path.join(cache, lock))}
+    alive = {lock for lock in locks if is_locked(os.path.join(cache, lock))}
     # A folder whose lock is free is what a FreeCAD that crashed has left behind.
     return frozenset(m["hash"] for m in found if f"{m['program']}_{m['number']}.lock" in alive)
-
-
-def _is_held(path: str) -> bool:
-    try:
-        with open(path, "r+b") as file:
-            fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    except OSError:
-        return False
-    return False

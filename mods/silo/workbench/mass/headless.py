@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Runs inside ``freecadcmd``: the geometry of one assembly, measured there and left in a file.
 
-``SILO_ARGS`` is a JSON object: ``top`` (the file), ``options`` (as the readers of geometry take them),
-``result`` (where the assembly goes), ``lines`` (where progress goes, one JSON object per line; the last one
-says ``done`` or has the ``error``). :mod:`silo.freecadcmd.mass` is the other side.
+The file that ``SILO_ARGS_FILE`` names holds a JSON object: ``top`` (the file), ``options`` (as the readers of
+geometry take them), ``result`` (where the assembly goes), ``lines`` (where progress goes, one JSON object per
+line; the last one says ``done`` or has the ``error``). :mod:`silo.freecadcmd.mass` is the other side.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 from silo.bom.errors import ConfigError, SiloError
+from silo.files import job_text
 from silo.workbench.headless import error_json
 
 BETWEEN_LINES_S = 0.2
@@ -32,7 +33,7 @@ BETWEEN_LINES_S = 0.2
 
 def main() -> int:
     """Do the job of the environment; the exit code."""
-    job = json.loads(os.environ["SILO_ARGS"])
+    job = json.loads(job_text(os.environ) or "")
     with open(job["lines"], "a", encoding="utf-8") as out:
         _line(out, begun=job["top"])
         try:

@@ -14,7 +14,6 @@ operands of a cut), and of that the visible, where any is.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -24,6 +23,7 @@ import numpy as np
 from silo.bom.document import derived, label_of, object_name, own, same_document
 from silo.bom.model import BomEntry
 from silo.bom.naming import display_name
+from silo.bom.report import relative
 from silo.bom.walk.kinds import Kind, is_container, is_named_assembly, kind_of
 from silo.bom.walk.targets import is_assembly_link, is_link
 from silo.inertia.geometry.freecad.facts import Facts, element_places, file_of, link_placement, scale
@@ -135,7 +135,7 @@ class Walk:
 
     def _key(self, obj: Any) -> str:
         path = file_of(obj)
-        return f"{_relative(path, self.base)}#{object_name(obj)}"
+        return f"{relative(path, self.base)}#{object_name(obj)}"
 
     def _name(self, obj: Any) -> str:
         document = getattr(obj, "Document", None)
@@ -253,10 +253,3 @@ def _metres(matrix: Floats) -> Floats:
     result = matrix.copy()
     result[:3, 3] *= 1e-3
     return result
-
-
-def _relative(path: str, base: str) -> str:
-    try:
-        return os.path.relpath(path, base).replace("\\", "/")
-    except ValueError:  # another drive
-        return path

@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What differs between Windows, macOS and Linux, asked here and nowhere else. Standard library only.
+
+Where a difference shows in what Python offers (a module, a constant, an error's number), that is asked
+instead of the platform's name, so that tests can put either in its place.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any, Protocol
+
+NAME = sys.platform
+WINDOWS = os.name == "nt"
+# Modes tell who may read a file; on Windows access lists do, which a mode does not show.
+MODES_COUNT = os.name == "posix"
+
+# Another program has the file open: a virus scanner, an indexer, a colleague. ERROR_ACCESS_DENIED,
+# ERROR_SHARING_VIOLATION, ERROR_LOCK_VIOLATION of Windows; POSIX has no such error.
+_IN_USE = (5, 32, 33)
+_WAITS_S = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6)
+
+
+class Resources(Protocol):
+    """The part of the module ``resource`` that is used; Windows has no such module."""
+
+    RLIMIT_AS: int
+    RLIMIT_CORE: int
+    RLIMIT_CPU: int
+    RLIMIT_NOFILE: int
+
+    def getrlimit(self, which: int, /) -> tuple[int, int]: ...
+
+    def setrlimit(self, which: int, limits: tuple[int, int], /) -> None: ...
+
+
+def _resources() -> Resources | None:
+    try:
+        import resource
+    except ImportError:
+        return None
+    return resource
+
+
+# --- files ----------------------------------------------------------------------------------------------
+
+
+def patiently(act: Callable[[], None], *, wait: Callable[[float], None] = time.sleep) -> None:
+    """Do something to a file that another program may have open for a moment; some 3 s at most.
+
+    Only Windows refuses that, and only its errors are waited for. Raises OSError as ``act`` does.
+    """
+    for seconds in _WAITS_S:
+        try:
+            act()
+            return
+        except OSError as error:
+            if getattr(error, "winerror", None) not in _IN_USE:
+                raise
+        wait(seconds)
+    act()
+
+
+def sync_folder(folder: str | os.PathLike[str]) -> None:
+    """Put the names in a folder on disk: a rename is there only with its folder. Raises OSError."""
+    if WINDOWS:  # it neither needs nor allows that
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def is_locked(path: str) -> bool | None:
+    """True where another process holds a lock on a file; None where this cannot be known.
+
+    Asking takes the lock for a moment. Must not be asked of a file that this process has locked: closing it
+    gives that lock up.
+    """
+    try:
+        with open(path, "r+b") as file:
+            try:
+                import fcntl
+            except ImportError:
+                return _is_locked_on_windows(file.fileno())
+            fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    return False
+
+
+def _is_locked_on_windows(descriptor: int) -> bool | None:
+    try:
+        import msvcrt
+    except ImportError:
+        return None
+    modes: Any = msvcrt  # its functions are known to type checkers on Windows only
+    try:
+        modes.locking(descriptor, modes.LK_NBLCK, 1)
+    except OSError:
+        return True
+    modes.locking(descriptor, modes.LK_UNLCK, 1)
+    return False
+
+
+# --- processes ------------------------------------------------------------------------------------------
+
+
+def limit_this_process(
+    *, memory: int = 0, cpu_s: int = 0, resources: Resources | None = None
+) -> tuple[str, ...]:
+    """Limit this process as far as the platform can, each limit by itself; no core files.
+
+    memory, cpu_s
+        bytes of address space and seconds of processor time; 0 for no limit.
+
+    Returns the names of the limits that could not be set: Windows has none, macOS refuses one of memory.
+    """
+    found = resources or _resources()
+    wanted = {"core": 0, **({"memory": memory} if memory else {}), **({"cpu": cpu_s} if cpu_s else {})}
+    if found is None:
+        return tuple(wanted)
+    which = {"core": found.RLIMIT_CORE, "memory": found.RLIMIT_AS, "cpu": found.RLIMIT_CPU}
+    refused = []
+    for name, most in wanted.items():
+        try:
+            found.setrlimit(which[name], (most, most + 5 if name == "cpu" else most))
+        except (ValueError, OSError):
+            refused.append(name)
+    return tuple(refused)
+
+
+def allow_many_files(resources: Resources | None = None) -> None:
+    """Raise the limit of open files to what the machine allows: each listener of a server is one."""
+    found = resources or _resources()
+    if found is None:
+        return
+    with suppress(OSError, ValueError):  # macOS names no limit as the limit, and then refuses it
+        _, hard = found.getrlimit(found.RLIMIT_NOFILE)
+        found.setrlimit(found.RLIMIT_NOFILE, (hard, hard))
+
+
+def child_options(*, group: bool = False) -> dict[str, Any]:
+    """Options of ``subprocess`` for a child that nobody sees: no console window opens on Windows.
+
+    group
+        the child and its own children can be ended together, by :func:`end`.
+    """
+    flags = getattr(subprocess, "CREATE_NO_WINDOW", 0)
+    if flags:
+        own = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0) if group else 0
+        return {"creationflags": flags | own}
+    return {"start_new_session": True} if group else {}
+
+
+def end(process: subprocess.Popen[Any]) -> None:
+    """End a child that was started with ``child_options(group=True)``, and wait for it."""
+    if process.poll() is None:
+        if hasattr(os, "killpg"):
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+        else:
+            process.kill()
+        process.wait()
+
+
+def how_it_ended(code: int) -> str:
+    """The exit code of a child in words: ``signal SIGSEGV``, ``exit code 3``."""
+    if code >= 0:
+        return f"exit code {code}"
+    known = {int(number): number.name for number in signal.Signals}
+    return f"signal {known.get(-code, -code)}"
+
+
+def python_beside(prefix: str) -> list[str]:
+    """Where a Python interpreter lies below its prefix."""
+    names = ("python.exe", "bin/python.exe") if WINDOWS else ("bin/python3", "bin/python")
+    return [os.path.join(prefix, *name.split("/")) for name in names]
+
+
+# --- network --------------------------------------------------------------------------------------------
+
+
+class SocketOptions(Protocol):
+    """A socket, as far as its options go."""
+
+    def setsockopt(self, level: int, option: int, value: int, /) -> None: ...
+
+
+def own_the_port(sock: SocketOptions, constants: Any = socket) -> None:
+    """Let no second server listen on the same port, and this one start again at once after its end.
+
+    On Windows SO_REUSEADDR means that two may share the port; there the exclusive use is asked for.
+    """
+    exclusive = getattr(constants, "SO_EXCLUSIVEADDRUSE", None)
+    option = constants.SO_REUSEADDR if exclusive is None else exclusive
+    sock.setsockopt(socket.SOL_SOCKET, option, 1)
+
+
+# Worker processes share one listening socket, which Windows does not hand to the event loop of a child.
+WORKERS_CAN_SHARE_A_SOCKET = not WINDOWS
