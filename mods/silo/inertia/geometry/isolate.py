@@ -143,7 +143,8 @@ def _death(code: int, errors: IO[bytes], options: ReadOptions) -> str:
     if code < 0:
         return (
             f"the geometry kernel crashed on it ({platform.how_it_ended(code).removeprefix('signal ')}); "
-            "the file is damaged, or trips a bug of the kernel. Export it again, or with another application protocol"
+            "the file is damaged, or trips a bug of the kernel. "
+            "Export it again, or with another application protocol"
         )
     last = next((line for line in reversed(words.splitlines()) if line.strip()), f"exit code {code}")
     return f"the reader stopped with an error: {last.strip()}"
