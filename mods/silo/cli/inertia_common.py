@@ -93,6 +93,11 @@ def add_result_options(parser: argparse.ArgumentParser) -> None:
         metavar="OUT",
         help="draw the links with centres of mass and inertia ellipsoids: .glb or .png; may be repeated",
     )
+    group.add_argument(
+        "--html",
+        metavar="OUT",
+        help="write one page to look at: a 3D view to turn, masses by source, warnings, tables",
+    )
     common.add_json_option(parser)
     group.add_argument("--strict", action="store_true", help="exit 1 where there is any warning")
     group.add_argument(
@@ -168,7 +173,7 @@ def _check_targets(args: argparse.Namespace) -> None:
     if bad:
         raise InputError(f"--report writes {', '.join(REPORTS)}; got {', '.join(bad)}")
     urdf = getattr(args, "urdf_out", None)
-    check_outputs([*args.report, *args.preview, *([urdf] if urdf else [])], args.preview)
+    check_outputs([*args.report, *args.preview, *(name for name in (urdf, args.html) if name)], args.preview)
 
 
 def check_outputs(names: Sequence[str], previews: Sequence[str]) -> None:
@@ -268,6 +273,10 @@ def _write_files(args: argparse.Namespace, report: InertiaReport, assembly: Asse
         from silo.inertia.preview.write import write_preview
 
         write_preview(report, assembly, path)
+    if args.html:
+        from silo.inertia.preview.page import report_html
+
+        write_whole(args.html, report_html(report, assembly).encode("utf-8"))
     for name in args.report:
         write_whole(name, _report_text(Path(name), report, drawn).encode("utf-8"))
 

@@ -23,7 +23,7 @@ NOISE = 1e-9
 MAX_PLACES = 6
 """Links and parts that one warning names; JSON has one entry for each."""
 
-_SOURCE_WORDS = {
+SOURCE_WORDS = {
     Source.BOM_MASS: "BOM mass",
     Source.MATERIAL: "material × volume",
     Source.SUB_ASSEMBLY_MASS: "share of the sub-assembly's BOM mass",
@@ -112,7 +112,7 @@ def _parts_table(report: InertiaReport) -> RenderableType:
             str(part.quantity),
             f"{part.volume * 1e6:.5g}",
             _short(part.mass),
-            _SOURCE_WORDS[part.source],
+            SOURCE_WORDS[part.source],
             how(part),
             material_of(part),
         ]
@@ -203,7 +203,7 @@ def _part_rows(report: InertiaReport) -> Iterable[str]:
     for link, part in report.parts():
         yield (
             f"| {_cell(link) or '(no link)'} | {_cell(part.name)} | {part.quantity} | {_short(part.mass)} "
-            f"| {_SOURCE_WORDS[part.source]} | {how(part)} | {_cell(material_of(part))} "
+            f"| {SOURCE_WORDS[part.source]} | {how(part)} | {_cell(material_of(part))} "
             f"| {part.volume * 1e6:.4g} |"
         )
 

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The HTML report of masses in a real browser: the view turns, tables sort, nothing is loaded or run."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+pytest.importorskip("OCP.BRep")
+
+from silo.cli.main import main
+
+ARM = Path(__file__).parents[2] / "examples" / "arm"
+DRAWN = ["--enable-unsafe-swiftshader", "--use-angle=swiftshader", "--ignore-gpu-blocklist"]
+
+
+@pytest.fixture(name="report", scope="module")
+def _report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The example's report, with a part and a material that try to be markup."""
+    folder = tmp_path_factory.mktemp("report")
+    bom = (
+        (ARM / "bom.csv").read_text("utf-8").replace("Threadlocker", "<img src=x onerror=alert(1)></script>")
+    )
+    (folder / "bom.csv").write_text(bom, "utf-8")
+    assert (
+        main(
+            ["inertia", f"{ARM / 'arm.step'}", "--bom", f"{folder / 'bom.csv'}", "--html", f"{folder}/r.html"]
+        )
+        == 0
+    )
+    return folder / "r.html"
+
+
+@pytest.fixture(name="opened")
+def _opened(chromium: Browser, report: Path) -> Iterator[Callable[..., Page]]:
+    """``opened(webgl)``: the page in a browser of its own; requests and errors are in ``page.said``."""
+    browsers = []
+
+    def opened(webgl: bool = True) -> Page:
+        flags = DRAWN if webgl else ["--disable-gpu", "--disable-3d-apis"]
+        path = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+        browsers.append(chromium.browser_type.launch(executable_path=path, args=["--no-sandbox", *flags]))
+        page: Any = browsers[-1].new_page(viewport={"width": 1300, "height": 900})
+        page.said = []
+        page.on("request", lambda request: page.said.append(request.url))
+        page.on("pageerror", lambda error: page.said.append(str(error)))
+        page.on("dialog", lambda dialog: page.said.append(dialog.message))
+        page.goto(report.as_uri())
+        return page  # type: ignore[no-any-return]
+
+    yield opened
+    for browser in browsers:
+        browser.close()
+
+
+def seen(page: Page) -> bytes:
+    return page.locator("#view canvas").screenshot()
+
+
+def test_the_view_turns_and_hides_links(opened: Callable[..., Page]) -> None:
+    """Dragging turns it, a box hides a link, a click names the part; the page asks for nothing."""
+    page: Any = opened()
+    page.wait_for_selector("body[data-ready='35']")
+    first = seen(page)
+    box = page.locator("#view canvas").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] * 0.8
+    page.mouse.click(x, y)
+    expect(page.locator("#picked")).to_contain_text("base_link: ")
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 150, y + 20, steps=3)
+    page.mouse.up()
+    turned = seen(page)
+    assert turned != first
+    page.get_by_label("upper_arm").uncheck()
+    hidden = seen(page)
+    assert hidden != turned
+    page.get_by_label("see through bodies").check()
+    assert seen(page) != hidden
+    assert [word for word in page.said if not word.startswith("file:") or not word.endswith("r.html")] == []
+
+
+def test_tables_sort_and_filter_and_names_are_text(opened: Callable[..., Page]) -> None:
+    """Numbers as numbers; without WebGL there is the picture."""
+    page: Any = opened(webgl=False)
+    expect(page.locator("#view img")).to_be_visible()
+    expect(page.locator("#picked")).to_contain_text("a picture instead")
+    rows = page.locator("#parts tbody tr")
+    page.get_by_role("button", name="Total kg").click()
+    values = [float(text) for text in rows.locator("td:nth-child(6)").all_inner_texts()]
+    assert values == sorted(values)
+    page.get_by_role("button", name="Total kg").click()
+    values = [float(text) for text in rows.locator("td:nth-child(6)").all_inner_texts()]
+    assert values == sorted(values, reverse=True)
+    page.get_by_label("Filter parts").fill("gripper tpu")
+    expect(page.locator("#shown")).to_have_text("1 of 19 lines")
+    expect(page.locator("#parts tbody tr:visible")).to_contain_text("Finger")
+    page.locator("summary", has_text="row unused").click()
+    expect(page.locator("#warnings")).to_contain_text("<img src=x onerror=alert(1)></script>")
+    assert page.locator("#warnings img").count() == 0
+    assert [word for word in page.said if not word.endswith("r.html")] == []
