@@ -65,7 +65,10 @@ class NumberAnswer(Answer):
 
 
 class LineBody(Wire):
-    """``POST …/bom`` and ``PUT …/bom/{child}``: a line as a person writes it."""
+    """``POST …/bom`` and ``PUT …/bom/{child}``: a line as a person writes it.
+
+    ``source`` is for a merge by single calls, on a server that has no other.
+    """
 
     child_part_number: str | None = None
     quantity: Quantity | None = None
@@ -76,6 +79,7 @@ class LineBody(Wire):
     reference_designators: list[str] | None = None
     child_revision: int | None = None
     metadata: dict[str, Any] | None = None
+    source: str | None = None
 
 
 def body(kind: type[Body], values: Mapping[str, Any], thing: str) -> Body:

@@ -3,31 +3,22 @@
 
 from __future__ import annotations
 
-import json
+from functools import partial
 from typing import Any
-
-from pydantic import ValidationError
 
 from silo.api.bodies import LineBody, body
 from silo.api.caller import LISTS, Caller, Params
-from silo.api.replies import Reply, complaint
+from silo.api.merging import merge_by_lines, merge_result, read_back, without_manual
+from silo.api.replies import Reply
 from silo.api.transport import Cancel
-from silo.api.wire import (
-    BomLine,
-    FlatLine,
-    MergeDiff,
-    MergeEntry,
-    MergeRequest,
-    MergeResult,
-    MergeWarning,
-    QuantityLine,
-    WhereUsedLine,
+from silo.api.wire import BomLine, FlatLine, MergeRequest, MergeResult, WhereUsedLine
+from silo.bom.errors import (
+    ConflictError,
+    CycleError,
+    NotFoundError,
+    RouteMissingError,
+    VersionConflictError,
 )
-from silo.bom.diff import same_quantity
-from silo.bom.errors import NotFoundError, RouteMissingError, ServerFaultError, SiloError
-
-UNCLEAR = "answer_not_understood"
-"""The warning of a merge whose answer was not understood, and that the BOM shows all the same."""
 
 
 class BomCalls(Caller):
@@ -83,14 +74,52 @@ class BomCalls(Caller):
 
         With a ``sync_id`` the request is repeated when the way breaks: the server gives its first answer.
 
+        A server without merge gets the plan as single calls (:mod:`silo.api.merging`); one that refuses lines
+        of people gets the others.
+
         Raises :class:`NotFoundError` for an unknown assembly but :class:`RouteMissingError` for a server
-        without merge, :class:`RejectedError` with all bad entries, :class:`CycleError`,
-        :class:`ServerFaultError` for an answer that reports a failure or that the BOM does not bear out,
+        that knows neither merge nor single lines, :class:`RejectedError` with all bad entries,
+        :class:`CycleError`, :class:`ServerFaultError` for an answer that reports a failure or that the BOM
+        does not bear out,
         :class:`VersionConflictError` for ``if_match``, :class:`ReadOnlyError`.
         """
+        once = partial(self._merge_once, part_number, if_match=if_match, cancelled=cancelled)
+        host = self._address.host
+        try:
+            reply = once(request)
+        except RouteMissingError as missing:
+            if if_match is not None:
+                raise  # Single calls cannot promise that nobody changed the BOM meanwhile.
+            try:
+                return merge_by_lines(self, part_number, request, host, cancelled=cancelled)
+            except NotFoundError:
+                raise missing from None  # It has no single lines either.
+        except CycleError:
+            raise
+        except ConflictError as error:
+            if isinstance(error, VersionConflictError) or request.dry_run:
+                raise
+            rest = without_manual(self, part_number, request, lambda r: self._result(part_number, r, once(r)))
+            if rest is None:
+                raise
+            return rest
+        return self._result(part_number, request, reply)
+
+    def _result(self, part_number: str, request: MergeRequest, reply: Reply) -> MergeResult:
+        result = merge_result(reply)
+        return result if result is not None else read_back(self, part_number, request, self._address.host)
+
+    def _merge_once(
+        self,
+        part_number: str,
+        request: MergeRequest,
+        *,
+        if_match: int | str | None,
+        cancelled: Cancel | None,
+    ) -> Reply:
         headers = {} if if_match is None else {"If-Match": '"{}"'.format(str(if_match).strip('"'))}
         try:
-            reply = self._change(
+            return self._change(
                 "POST",
                 f"the BOM of {part_number}",
                 *_bom(part_number),
@@ -100,41 +129,12 @@ class BomCalls(Caller):
                 repeatable=bool(request.sync_id or request.dry_run),
                 cancelled=cancelled,
                 # Without "dry_run" it would be a merge.
-                extensions=() if request.dry_run else ("source", "sync_id", "document"),
+                extensions=()
+                if request.dry_run
+                else ("source", "sync_id", "document", "left_out", "components"),
             )
         except NotFoundError as error:
             raise self._what_is_missing(part_number, error) from error
-        result = merge_result(reply)
-        return result if result is not None else self._read_back(part_number, request)
-
-    def _read_back(self, part_number: str, request: MergeRequest) -> MergeResult:
-        """The result of a merge whose answer says neither success nor failure, as the BOM shows it."""
-        sent = f"{self._address.host}: the BOM of {part_number} was sent, but the answer was not understood"
-        if request.dry_run:
-            raise ServerFaultError(f"{sent}; nothing was to be changed")
-        try:
-            lines = {line.child_part_number.casefold(): line for line in self.get_bom(part_number)}
-        except SiloError as error:
-            raise ServerFaultError(f"{sent}, and the BOM cannot be read back ({error})") from error
-        wrong = [entry for entry in request.entries if not _shows(lines.get(_key(entry)), entry)]
-        if wrong:
-            names = ", ".join(entry.child_part_number for entry in wrong[:5])
-            more = f" and {len(wrong) - 5} more" if len(wrong) > 5 else ""
-            raise ServerFaultError(f"{sent}, and its BOM does not show {names}{more} as in the assembly")
-        told = [lines[_key(entry)] for entry in request.entries]
-        return MergeResult(
-            diff=MergeDiff(
-                unchanged=[
-                    QuantityLine(part_number=line.child_part_number, quantity=line.quantity) for line in told
-                ]
-            ),
-            warnings=[
-                MergeWarning(
-                    type=UNCLEAR, part_number=part_number, message=f"{sent}; the BOM shows all of its lines"
-                )
-            ],
-            sync_id=request.sync_id,
-        )
 
     def add_bom_line(self, part_number: str, child: str, /, **values: Any) -> BomLine:
         """Add a line by hand (``source`` manual): ``quantity``, ``unit``, ``notes``, ``find_number``, …
@@ -142,7 +142,13 @@ class BomCalls(Caller):
         The fields are those of :class:`silo.api.bodies.LineBody`. A merge never touches such a line.
         """
         line = body(LineBody, {"quantity": 1, **values, "child_part_number": child}, "a BOM line")
-        reply = self._change("POST", f"{child} on the BOM of {part_number}", *_bom(part_number), body=line)
+        reply = self._change(
+            "POST",
+            f"{child} on the BOM of {part_number}",
+            *_bom(part_number),
+            body=line,
+            extensions=("source", "find_number", "notes"),
+        )
         return reply.model(BomLine)
 
     def update_bom_line(self, part_number: str, child: str, /, **changes: Any) -> BomLine:
@@ -165,50 +171,6 @@ class BomCalls(Caller):
         return RouteMissingError(
             f"{host} knows {part_number} but not how to merge a BOM; it needs a newer Silo ({error})"
         )
-
-
-def merge_result(reply: Reply) -> MergeResult | None:
-    """The answer to a merge, read strictly: only what says what it did counts as success.
-
-    None: neither success nor failure can be read from it. Raises :class:`ServerFaultError` for an answer
-    that is a failure by its own words, whatever its status.
-    """
-    if reply.is_html:
-        return None
-    said = complaint(reply)
-    try:
-        data = json.loads(reply.content)
-    except (ValueError, RecursionError):
-        return None
-    if not isinstance(data, dict):
-        return None
-    word = str(data.get("status") or "").casefold()
-    if data.get("error") or data.get("success") is False or data.get("ok") is False or word in _FAILED:
-        raise ServerFaultError(
-            f"{reply.where.asked}: the server answered {reply.status} but reports a failure"
-            f"{': ' + said.text if said.text else ''}"
-        )
-    diff = data.get("diff")
-    if not isinstance(diff, dict) or not _LISTS.intersection(diff) or (word and word not in _DONE):
-        return None
-    try:
-        return MergeResult.model_validate(data)
-    except ValidationError:
-        return None
-
-
-_DONE = {"merged", "ok", "success", "done", "unchanged", "no_changes", "dry_run", "preview"}
-_FAILED = {"error", "failed", "failure", "rejected", "rolled_back", "aborted"}
-_LISTS = {"added", "removed", "quantity_changed", "unchanged"}
-
-
-def _key(entry: MergeEntry) -> str:
-    return entry.child_part_number.casefold()
-
-
-def _shows(line: BomLine | None, entry: MergeEntry) -> bool:
-    # A line that a person owns may have another quantity: a merge leaves it.
-    return line is not None and (line.source == "manual" or same_quantity(line.quantity, entry.quantity))
 
 
 def _bom(part_number: str) -> tuple[str, str, str]:

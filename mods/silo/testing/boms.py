@@ -5,21 +5,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
-from urllib.parse import quote
 
 from silo.api.wire import (
     BomLine,
     FlatLine,
-    MergeDiff,
     MergeRequest,
-    MergeResult,
-    MergeWarning,
-    QuantityLine,
-    QuantityUpdate,
 )
 from silo.bom.errors import CycleError, RejectedError
 from silo.bom.left_out import Reason, remembered
-from silo.bom.model import BomDiff
 
 Bom = Callable[[str], Sequence[BomLine]]
 
@@ -79,46 +72,6 @@ def _way(bom: Bom, here: str, goal: str, path: tuple[str, ...]) -> tuple[str, ..
         if found is not None:
             return found
     return None
-
-
-def result_of(diff: BomDiff, part_number: str, request: MergeRequest) -> MergeResult:
-    """The answer of spec §5 for a planned merge."""
-    warnings = [
-        MergeWarning(
-            type="unreferenced",
-            part_number=change.part_number,
-            message="Present in server BOM but not in assembly",
-        )
-        for change in diff.removed
-    ] + [
-        MergeWarning(
-            type="conflict",
-            part_number=conflict.part_number,
-            message="Set by a person to another quantity than the assembly's",
-            assembly_quantity=conflict.local_quantity,
-            server_quantity=conflict.remote_quantity,
-        )
-        for conflict in diff.conflicts
-    ]
-    return MergeResult(
-        diff=MergeDiff(
-            added=[QuantityLine(**change) for change in diff.added],
-            removed=[QuantityLine(**change) for change in diff.removed],
-            quantity_changed=[
-                QuantityUpdate(
-                    part_number=change.part_number,
-                    old_quantity=change.remote_quantity,
-                    new_quantity=change.local_quantity,
-                )
-                for change in diff.quantity_changed
-            ],
-            unchanged=[QuantityLine(**change) for change in diff.unchanged],
-        ),
-        warnings=warnings,
-        resolve_url=f"/items/{quote(part_number, safe='')}/bom",
-        sync_id=request.sync_id,
-        left_out=request.left_out or None,
-    )
 
 
 def expanded(bom: Bom, part_number: str, depth: int) -> list[BomLine]:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Self
 from uuid import UUID, uuid4
 
 from silo.api.bodies import ItemBody, ItemChanges, LineBody, body
+from silo.api.merging import result_of
 from silo.api.multipart import Progress
 from silo.api.sse import MERGE, STATE
 from silo.api.transport import Cancel, stop_if
@@ -45,7 +46,6 @@ from silo.testing.boms import (
     expanded,
     flat,
     missing_of,
-    result_of,
     with_components,
 )
 from silo.testing.store import CATEGORIES, FakeStore, FakeStream, Stored
