@@ -27,6 +27,11 @@ class GeometryCode(StrEnum):
     NOT_CONVERGENT = "not_convergent"  # the integration did not reach its tolerance
     STATED_VOLUME = "stated_volume"  # the file states another volume (above 1e-3)
     STATED_CENTROID = "stated_centroid"
+    OPEN_SHELL = "open_shell"  # a solid whose faces do not close: its volume is no fact
+    SHELL_VOLUME = "shell_volume"  # surfaces that close, and are no solid in the file: taken for one
+    COINCIDENT_SOLIDS = "coincident_solids"  # a solid that lies exactly on another one: counted once
+    OVERLAPPING_SOLIDS = "overlapping_solids"  # solids of one product that share space
+    COINCIDENT_PARTS = "coincident_parts"  # a part that is placed twice at one place: both are counted
     NO_SOLID = "no_solid"  # surfaces or wires only
     NO_GEOMETRY = "no_geometry"  # nothing at all: an unresolved external file, an empty product
     EXTERNAL_FILE = "external_file"  # a split assembly's file was found, or was not

@@ -29,6 +29,10 @@ DOUBTS = (
     BomCode.AMBIGUOUS_MASS,
     GeometryCode.INVALID_SHAPE,
     GeometryCode.MESH_MISMATCH,
+    GeometryCode.OPEN_SHELL,
+    GeometryCode.OVERLAPPING_SOLIDS,
+    GeometryCode.NOT_WATERTIGHT,
+    GeometryCode.WINDING,
 )
 """Warnings under which a number is not written: it may well be another part's, or in another unit."""
 

@@ -62,3 +62,22 @@ def scaled_problems(instances: Sequence[Instance]) -> list[GeometryProblem]:
             "volume and inertia are scaled with it, a mass from the BOM is not",
         )
     ]
+
+
+def coincident_problems(instances: Sequence[Instance]) -> list[GeometryProblem]:
+    """One problem for all parts that stand exactly where the same part stands already."""
+    seen: dict[tuple[str, bytes], Instance] = {}
+    twice = []
+    for instance in instances:
+        # 0.1 µm and 1e-7 of a turn; adding 0 makes -0 the 0 that it is.
+        place = (np.round(instance.transform, 7) + 0.0).tobytes()
+        if seen.setdefault((instance.prototype, place), instance) is not instance:
+            twice.append(instance.name)
+    if not twice:
+        return []
+    more = f" and {len(twice) - 3} more" if len(twice) > 3 else ""
+    words = (
+        f"parts that stand exactly where the same part stands already: {len(twice)} "
+        f"({', '.join(twice[:3])}{more}); all of them are counted"
+    )
+    return [GeometryProblem(GeometryCode.COINCIDENT_PARTS, words)]

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from silo.inertia.core import combine_arrays
-from silo.inertia.geometry.mesh import Floats, Mesh, is_inside
+from silo.inertia.geometry.mesh import Floats, Mesh
+from silo.inertia.geometry.together import Together
 from silo.inertia.model import GeometryCode, GeometryProblem, SolidProps
+from silo.inertia.wording import counted
 
 MESH_TOLERANCE = 0.02
 """|V_mesh - V_brep| / V above this is bad geometry: all valid parts of 280 real ones stay below 0.7 %."""
@@ -29,6 +31,14 @@ NO_VOLUME: Note = (
     "the solid has no volume that can be computed; it is left out",
 )
 INVALID: Note = (GeometryCode.INVALID_SHAPE, "the geometry kernel's own check finds this shape invalid")
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """What keeps a solid from being closed: open edges, and its volume [m^3] taken from another point."""
+
+    edges: int
+    other_m3: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,39 +112,27 @@ def no_solid(measured: Measured) -> GeometryProblem:
     return GeometryProblem(GeometryCode.NO_GEOMETRY, "the file holds no solid and no surface for it")
 
 
-def without_cavities(
-    pairs: list[tuple[SolidProps, Mesh | None]], problems: list[GeometryProblem]
-) -> tuple[SolidProps, ...]:
-    """Reversed solids that lie inside the material of another one are cavities: taken off, and said."""
-    solids = [props for props, _ in pairs]
-    if len({s.reversed for s in solids}) < 2:
-        return tuple(solids)
-    hosts = [i for i, s in enumerate(solids) if not s.reversed]
-    gone = set()
-    for i, (props, mesh) in enumerate(pairs):
-        host = next((h for h in hosts if props.reversed and _encloses(pairs[h][1], mesh)), None)
-        if host is not None:
-            solids[host] = _minus(solids[host], props)
-            gone.add(i)
-    taken, turned = len(gone), sum(s.reversed for s in solids) - len(gone)
-    problems.append(
-        GeometryProblem(
-            GeometryCode.NEGATIVE_VOLUME,
-            "some solids of this product are inside out and some are not: "
-            f"{taken} taken as cavities of the solid around them, {turned} as bodies",
-        )
+def shell_note(shells: int, solids: int) -> GeometryProblem:
+    """Surfaces that close were taken for solids."""
+    what = counted(shells, "closed surface", "closed surfaces")
+    beside = ", beside its solids" if solids else ""
+    words = f"{what}, no solid in the file{beside}: the volume inside was taken"
+    return GeometryProblem(GeometryCode.SHELL_VOLUME, words)
+
+
+def open_note(gap: Gap, volume_m3: float) -> Note:
+    """A solid whose faces do not close."""
+    words = (
+        f"its faces do not close ({counted(gap.edges, 'open edge')}), so it has no exact volume: "
+        f"{volume_m3 * 1e6:.6g} cm³ from one point, {gap.other_m3 * 1e6:.6g} cm³ from another"
     )
-    return tuple(s for i, s in enumerate(solids) if i not in gone)
+    return (GeometryCode.OPEN_SHELL, words)
 
 
-def _encloses(outer: Mesh | None, inner: Mesh | None) -> bool:
-    return outer is not None and inner is not None and len(inner) > 0 and is_inside(inner, outer)
-
-
-def _minus(body: SolidProps, cavity: SolidProps) -> SolidProps:
-    rest = combine_arrays(
-        [body.volume_m3, -cavity.volume_m3],
-        np.array([body.com_m, cavity.com_m]),
-        np.array([body.inertia_unit, -cavity.inertia_unit]),
+def cavity_note(found: Together) -> GeometryProblem:
+    """Some solids were taken as cavities of others."""
+    words = (
+        "some solids of this product are inside out and some are not: "
+        f"{found.cavities} taken as cavities of the solid around them, {found.turned} as bodies"
     )
-    return SolidProps(rest.mass, rest.com, rest.inertia, body.reversed)
+    return GeometryProblem(GeometryCode.NEGATIVE_VOLUME, words)

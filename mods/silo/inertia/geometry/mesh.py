@@ -21,6 +21,10 @@ PICTURE_TRIANGLES = 120_000
 """The most triangles that are kept of one prototype; a populated circuit board has millions."""
 
 
+WELD = 1e-6
+"""Share of a mesh's size; vertices that are closer may be made one."""
+
+
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """The triangles of one prototype, in the prototype's axes.
@@ -94,9 +98,77 @@ def _centred(mesh: Mesh) -> tuple[Floats, Floats]:
     return mesh.vertices - centre, centre
 
 
+def welded(vertices: Floats, faces: Indices) -> Mesh:
+    """Equal vertices made one (an STL repeats each six times), triangles without area taken out.
+
+    Where edges are open then, vertices closer than a millionth of the mesh are made one as well, if that
+    closes them.
+    """
+    mesh = _merged(vertices, faces)
+    if not len(mesh) or not open_edges(mesh):
+        return mesh
+    step = float(mesh.extents.max()) * WELD
+    if step == 0.0:
+        return mesh
+    grid = np.round(mesh.vertices / step)
+    _, first, place = np.unique(grid, axis=0, return_index=True, return_inverse=True)
+    closer = _merged(mesh.vertices[first[place.reshape(-1)]], mesh.faces)
+    return closer if not open_edges(closer) else mesh
+
+
+def _merged(vertices: Floats, faces: Indices) -> Mesh:
+    unique, place = np.unique(vertices, axis=0, return_inverse=True)
+    faces = place.reshape(-1)[faces]
+    flat = (faces[:, 0] == faces[:, 1]) | (faces[:, 1] == faces[:, 2]) | (faces[:, 2] == faces[:, 0])
+    return Mesh(unique, faces[~flat])
+
+
+def without_doubled(mesh: Mesh) -> tuple[Mesh, int, int]:
+    """The mesh with each triangle once: (mesh, repeated triangles, triangles that met their own back).
+
+    Triangles that stand there twice are a copy; a triangle and the same turned over enclose nothing.
+    """
+    order = np.argsort(mesh.faces, axis=1)
+    rows = np.take_along_axis(mesh.faces, order, axis=1)
+    even = np.isin(order @ np.array([9, 3, 1]), _EVEN)
+    kinds, kind = np.unique(rows, axis=0, return_inverse=True)
+    kind = kind.reshape(-1)
+    if len(kinds) == len(mesh.faces):
+        return mesh, 0, 0
+    forward = np.bincount(kind, weights=even, minlength=len(kinds))
+    backward = np.bincount(kind, weights=~even, minlength=len(kinds))
+    kept = np.zeros(len(mesh.faces), dtype=bool)
+    # The first triangle that looks to the side of which there are more.
+    for number in np.nonzero(forward != backward)[0]:
+        side = even if forward[number] > backward[number] else ~even
+        kept[np.nonzero((kind == number) & side)[0][0]] = True
+    met = 2 * int(np.minimum(forward, backward).sum())
+    return Mesh(mesh.vertices, mesh.faces[kept]), int(len(mesh.faces) - kept.sum()) - met, met
+
+
+_EVEN = [0 * 9 + 1 * 3 + 2, 1 * 9 + 2 * 3 + 0, 2 * 9 + 0 * 3 + 1]
+
+
+def open_edges(mesh: Mesh) -> int:
+    """How many edges are not used exactly twice, once in each direction."""
+    directed = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    ends = np.sort(directed, axis=1)
+    _, number = np.unique(ends, axis=0, return_inverse=True)
+    forward = directed[:, 0] == ends[:, 0]
+    ups = np.bincount(number.reshape(-1), weights=forward)
+    downs = np.bincount(number.reshape(-1), weights=~forward)
+    return int(((ups != 1) | (downs != 1)).sum())
+
+
 def components(mesh: Mesh, most: int) -> list[Mesh]:
-    """The mesh cut into pieces that share no vertex (merge equal vertices first); whole if over ``most``."""
-    face_labels = _vertex_labels(mesh)[mesh.faces[:, 0]]
+    """The mesh cut into pieces that share no edge; whole if there are more than ``most``.
+
+    Pieces that touch in a corner only are two: each may be inside out by itself.
+    """
+    edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    _, number = np.unique(edges, axis=0, return_inverse=True)
+    rows = number.reshape(-1, 3)
+    face_labels = _labels(rows, int(rows.max()) + 1 if len(rows) else 0)[rows[:, 0]]
     labels = np.unique(face_labels)
     if not 1 < len(labels) <= most:
         return [mesh]
@@ -108,14 +180,14 @@ def _compact(vertices: Floats, faces: Indices) -> Mesh:
     return Mesh(vertices[used], place.reshape(-1, 3))
 
 
-def _vertex_labels(mesh: Mesh) -> Indices:
-    """(n,) for each vertex the lowest vertex index it is connected to."""
-    labels = np.arange(len(mesh.vertices))
+def _labels(rows: Indices, count: int) -> Indices:
+    """(count,) for each thing the lowest one that it is connected to by ``rows`` (n, 3)."""
+    labels = np.arange(count)
     while True:
-        lowest = labels[mesh.faces].min(axis=1)
+        lowest = labels[rows].min(axis=1)
         before = labels.copy()
         for column in range(3):
-            np.minimum.at(labels, mesh.faces[:, column], lowest)
+            np.minimum.at(labels, rows[:, column], lowest)
         # Following labels to their own label halves the number of rounds that long strips would need.
         labels = labels[labels]
         if np.array_equal(labels, before):

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -33,12 +34,14 @@ from silo.inertia.geometry.measured import (
     NO_VOLUME,
     Measured,
     Notes,
+    cavity_note,
     integration_notes,
     mesh_notes,
-    without_cavities,
+    shell_note,
 )
 from silo.inertia.geometry.mesh import PICTURE_TRIANGLES, Floats, Mesh, joined, simplified
 from silo.inertia.geometry.options import ReadOptions, Report
+from silo.inertia.geometry.together import Body, together
 from silo.inertia.model import Assembly, GeometryCode, GeometryProblem, SolidProps
 from silo.workbench.freecad import live
 from silo.workbench.mass.shape_faces import face_of, faces_of
@@ -146,22 +149,28 @@ class _Product:
         # FreeCAD keeps an object's placement as the location of its shape; the walk's own takes its place.
         placed = [(shape, t @ np.linalg.inv(matrix_of(shape.Placement))) for shape, t in shapes]
         solids = [(solid, matrix) for shape, matrix in placed for solid in shape.Solids]
-        pairs: list[tuple[SolidProps, Mesh | None]] = []
+        shells = [(solid, matrix) for shape, matrix in placed for solid in _closed_shells(shape)]
+        if shells:
+            self.problems.append(shell_note(len(shells), len(solids)))
+        solids += shells
+        bodies: list[Body] = []
         for number, (solid, matrix) in enumerate(solids, start=1):
             where = f"solid {number} of {len(solids)}: " if len(solids) > 1 else ""
             found, moved = self._find(solid, where)
             if found.props is not None:
-                pairs.append(_placed(found.props, found.mesh, matrix @ moved))
+                bodies.append(_placed(found, matrix @ moved, solid, matrix))
         faces = any(shape.Faces for shape, _ in shapes)
-        meshes = [mesh for _, mesh in pairs if mesh is not None]
+        meshes = [body.mesh for body in bodies if body.mesh is not None]
         if self.mesh_check and not solids and faces:
             meshes = [
                 _moved(_mesh(shape, _fineness(shape)), matrix) for shape, matrix in placed if shape.Faces
             ]
         picture = simplified(joined(meshes), PICTURE_TRIANGLES) if meshes else None
-        props = without_cavities(pairs, self.problems)
+        settled = together(bodies, _common, self.problems)
+        if settled.mixed:
+            self.problems.append(cavity_note(settled))
         wires = any(shape.Edges for shape, _ in shapes)
-        return Measured(props, tuple(self.problems), picture, faces, wires)
+        return Measured(settled.solids, tuple(self.problems), picture, faces, wires)
 
     def _find(self, solid: Any, where: str) -> tuple[_Solid, Floats]:
         """The solid or an equal one that was measured before, and (4, 4) [mm] from there to here."""
@@ -267,13 +276,57 @@ def mesh_volume(mesh: Mesh) -> float:
     return float(np.einsum("ni,ni->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6)
 
 
-def _placed(props: SolidProps, mesh: Mesh | None, matrix: Floats) -> tuple[SolidProps, Mesh | None]:
-    """A solid after a placement (4, 4) [mm]."""
-    metres = matrix.copy()
+def _placed(found: _Solid, moved: Floats, solid: Any, matrix: Floats) -> Body:
+    """A measured solid after ``moved``; ``solid`` after ``matrix`` ((4, 4) [mm]) is the same."""
+    assert found.props is not None
+    props, metres = found.props, moved.copy()
     metres[:3, 3] *= MM
     volumes, coms, units = place([props.volume_m3], [props.com_m], [props.inertia_unit], [metres])
-    moved = SolidProps(float(volumes[0]), coms[0], units[0], props.reversed)
-    return moved, _moved(mesh, matrix) if mesh is not None else None
+    there = SolidProps(float(volumes[0]), coms[0], units[0], props.reversed)
+    box = solid.BoundBox
+    ends = ((box.XMin, box.XMax), (box.YMin, box.YMax), (box.ZMin, box.ZMax))
+    corners = np.array([(*corner, 1.0) for corner in product(*ends)]) @ matrix.T
+    corners = corners[:, :3] * MM
+    mesh = _moved(found.mesh, moved) if found.mesh is not None else None
+    return Body(there, corners.min(axis=0), corners.max(axis=0), mesh, (solid, matrix))
+
+
+def _closed_shells(shape: Any) -> list[Any]:
+    """The shells of a shape that stand in no solid and close, as solids."""
+    if len(shape.Shells) == sum(len(solid.Shells) for solid in shape.Solids):
+        return []
+    import Part
+
+    inside = [shell for solid in shape.Solids for shell in solid.Shells]
+    loose = [shell for shell in shape.Shells if not any(shell.isSame(other) for other in inside)]
+    return [Part.Solid(shell) for shell in loose if shell.isClosed()]
+
+
+def _common(one: Body, other: Body) -> SolidProps | None:
+    """What two solids have in common, by FreeCAD's boolean operation; None where that fails."""
+    try:
+        both = _shape(one).common(_shape(other))
+        least = min(one.props.volume_m3, other.props.volume_m3)
+        volume = float(both.Volume) * MM**3 if both.Solids else 0.0
+        if not 0 <= volume <= (1 + 1e-5) * least:
+            return None
+        if volume == 0.0:
+            return SolidProps(0.0, np.zeros(3), np.zeros((3, 3)))
+        tensor = np.array(both.MatrixOfInertia.A, dtype=np.float64).reshape(4, 4)[:3, :3]
+        return SolidProps(volume, np.array(tuple(both.CenterOfMass)) * MM, tensor * MM**5)
+    except (ValueError, RuntimeError, AttributeError):
+        return None
+
+
+def _shape(body: Body) -> Any:
+    solid, matrix = body.shape
+    moved = solid.copy()
+    # FreeCAD's own classes, without importing FreeCAD here.
+    placement, matrix_class = type(solid.Placement), type(solid.Placement.toMatrix())
+    moved.Placement = placement(matrix_class(*matrix.ravel().tolist())).multiply(solid.Placement)
+    if body.props.reversed:
+        moved.reverse()
+    return moved
 
 
 def _moved(mesh: Mesh, matrix: Floats) -> Mesh:

@@ -233,7 +233,8 @@ def test_an_open_solid_is_invalid_and_its_mesh_disagrees(
     path = tmp_path / "open.brep"
     assert BRepTools.Write_s(solid, str(path))
     (prototype,) = read_in(path).prototypes.values()
-    assert codes_of(prototype) == [GeometryCode.INVALID_SHAPE, GeometryCode.MESH_MISMATCH]
+    expected = [GeometryCode.INVALID_SHAPE, GeometryCode.MESH_MISMATCH, GeometryCode.OPEN_SHELL]
+    assert codes_of(prototype) == expected
 
 
 def test_a_nesting_bomb_is_refused_before_the_kernel_sees_it(tmp_path: Path, read_in: Any) -> None:
@@ -268,3 +269,17 @@ def test_a_product_that_contains_itself_is_refused(tmp_path: Path, read_in: Any)
     )
     with pytest.raises(DocumentError, match="the product 'ring' contains itself"):
         read_in(path)
+
+
+def test_a_part_twice_at_one_place_is_told(
+    step: Any, box: Any, trsf: Any, tmp_path: Path, read_in: Any, codes_of: Any
+) -> None:
+    """An accident of copying; both are counted, since the BOM counts both."""
+    document = step()
+    top, part = document.assembly("top"), document.part(box(10, 10, 10), "cube")
+    for name, at in (("one", (0, 0, 0)), ("two", (0, 0, 0)), ("three", (20, 0, 0))):
+        document.place(top, part, trsf(at), name)
+    assembly = read_in(document.write(tmp_path / "twice.step"))
+    assert codes_of(assembly) == [GeometryCode.COINCIDENT_PARTS]
+    assert "1 (two)" in assembly.problems[0].message
+    assert len(assembly.instances) == 3

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from silo.bom.errors import DocumentError, InputError
-from silo.inertia.geometry.checks import name_problems, scaled_problems
+from silo.inertia.geometry.checks import coincident_problems, name_problems, scaled_problems
 from silo.inertia.geometry.freecad.walk import Leaf, Walk
 from silo.inertia.geometry.graph import Child, unfold
 from silo.inertia.geometry.measured import Measured, no_solid
@@ -33,6 +33,7 @@ def assembled(
         prototypes[key] = _prototype(walk, key, measure)
     problems = [GeometryProblem(code, message) for code, listed in walk.notes.items() for message in listed]
     problems += scaled_problems(unfolded.instances)
+    problems += coincident_problems(unfolded.instances)
     return Assembly(
         name=node.name,
         prototypes=prototypes,

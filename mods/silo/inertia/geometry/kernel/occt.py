@@ -30,10 +30,11 @@ except ImportError as error:  # pragma: no cover - a machine without a desktop's
         "On Debian and Ubuntu: apt-get install libgl1"
     ) from error
 
-from OCP.BRepAdaptor import BRepAdaptor_Surface
+from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Surface
 from OCP.GeomAbs import (
     GeomAbs_Cone,
     GeomAbs_Cylinder,
+    GeomAbs_Line,
     GeomAbs_Plane,
     GeomAbs_Sphere,
     GeomAbs_Torus,
@@ -41,7 +42,7 @@ from OCP.GeomAbs import (
 from OCP.Message import Message
 from OCP.TDataStd import TDataStd_Name
 from OCP.TDF import TDF_Label, TDF_Tool
-from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SOLID
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SHAPE, TopAbs_SHELL, TopAbs_SOLID
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS
 
@@ -60,6 +61,7 @@ VERSION: str = OCP.__version__
 
 _ELEMENTARY = (GeomAbs_Plane, GeomAbs_Cylinder, GeomAbs_Cone, GeomAbs_Sphere, GeomAbs_Torus)
 
+_as_edge = getattr(TopoDS, "Edge_s", None) or TopoDS.Edge
 _as_face = getattr(TopoDS, "Face_s", None) or TopoDS.Face
 
 
@@ -120,6 +122,16 @@ def faces_of(shape: Any) -> list[Any]:
     return [_as_face(face) for face in _explored(shape, TopAbs_FACE)]
 
 
+def loose_shells_of(shape: Any) -> list[Any]:
+    """The shells of a shape that stand in no solid, placed."""
+    return _explored(shape, TopAbs_SHELL, TopAbs_SOLID)
+
+
+def loose_faces_of(shape: Any) -> list[Any]:
+    """The faces of a shape that stand in no shell, placed and oriented."""
+    return [_as_face(face) for face in _explored(shape, TopAbs_FACE, TopAbs_SHELL)]
+
+
 def has_edges(shape: Any) -> bool:
     """True where there is any edge, in a face or alone."""
     return not shape.IsNull() and TopExp_Explorer(shape, TopAbs_EDGE).More()
@@ -135,10 +147,18 @@ def is_elementary(face: Any) -> bool:
     return BRepAdaptor_Surface(face, False).GetType() in _ELEMENTARY
 
 
-def _explored(shape: Any, kind: Any) -> list[Any]:
+def is_flat(solid: Any) -> bool:
+    """True where all faces are planes and all edges straight: its triangles are the very solid."""
+    planes = (BRepAdaptor_Surface(face, False).GetType() == GeomAbs_Plane for face in faces_of(solid))
+    return all(planes) and all(
+        BRepAdaptor_Curve(_as_edge(edge)).GetType() == GeomAbs_Line for edge in _explored(solid, TopAbs_EDGE)
+    )
+
+
+def _explored(shape: Any, kind: Any, outside: Any = TopAbs_SHAPE) -> list[Any]:
     if shape is None or shape.IsNull():
         return []
-    explorer = TopExp_Explorer(shape, kind)
+    explorer = TopExp_Explorer(shape, kind, outside)
     found = []
     while explorer.More():
         found.append(explorer.Current())

@@ -19,36 +19,34 @@ from typing import Any
 import numpy as np
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
 from OCP.BRepCheck import BRepCheck_Analyzer
-from OCP.BRepGProp import BRepGProp
 from OCP.gp import gp_Trsf, gp_Vec
-from OCP.GProp import GProp_GProps
-from OCP.Standard import Standard_Failure
 from OCP.TopLoc import TopLoc_Location
 
 from silo.inertia.core import place
-from silo.inertia.geometry.exact.quadrature import Moments
 from silo.inertia.geometry.kernel import occt
-from silo.inertia.geometry.kernel.faces import moments
+from silo.inertia.geometry.kernel.closure import closed_shells, gap_of
+from silo.inertia.geometry.kernel.common import KernelCommon
+from silo.inertia.geometry.kernel.moments import by_kernel, converged
 from silo.inertia.geometry.kernel.tessellate import (
     MM,
+    bounds,
     box,
     cross_check,
     in_metres,
     tessellated,
     triangles,
     trsf_matrix,
-    xyz,
 )
 from silo.inertia.geometry.measured import (
-    CONVERGED,
     INVALID,
-    MESH_TOLERANCE,
     NO_VOLUME,
     Measured,
     Notes,
+    cavity_note,
     integration_notes,
     mesh_notes,
-    without_cavities,
+    open_note,
+    shell_note,
 )
 from silo.inertia.geometry.mesh import (
     PICTURE_TRIANGLES,
@@ -59,6 +57,7 @@ from silo.inertia.geometry.mesh import (
     mesh_volume,
     simplified,
 )
+from silo.inertia.geometry.together import Body, together
 from silo.inertia.model import GeometryCode, GeometryProblem, SolidProps
 
 TENSOR_SHARE = 1e-4
@@ -75,11 +74,15 @@ NEAR = 50.0
 
 
 def measure(shapes: list[Any], *, eps: float, mesh_check: bool) -> Measured:
-    """All solids of ``shapes``, in their common axes."""
+    """All solids of ``shapes``, in their common axes; shells that close count as solids, with a word."""
     problems: list[GeometryProblem] = []
-    pairs: list[tuple[SolidProps, Mesh | None]] = []
+    bodies: list[Body] = []
     known: dict[tuple[int, Any], _Bare] = {}
-    found = [solid for shape in shapes for solid in occt.solids_of(shape)]
+    solids = [solid for shape in shapes for solid in occt.solids_of(shape)]
+    shells = closed_shells(shapes)
+    if shells:
+        problems.append(shell_note(len(shells), len(solids)))
+    found = [*solids, *shells]
     picture = _Picture.of(shapes, len(found)) if mesh_check else None
     for number, solid in enumerate(found, start=1):
         # The kernel's shared body of equal solids; kept in _Bare, so that its id stays its own.
@@ -89,15 +92,17 @@ def measure(shapes: list[Any], *, eps: float, mesh_check: bool) -> Measured:
             known[key] = _measured(solid.Located(TopLoc_Location()), body, eps, picture)
             where = f"solid {number} of {len(found)}: " if len(found) > 1 else ""
             problems += [GeometryProblem(code, where + message) for code, message in known[key].notes]
-        pairs += _placed(known[key], trsf_matrix(solid.Location().Transformation()))
-    solids = without_cavities(pairs, problems)
-    meshes = [mesh for _, mesh in pairs if mesh is not None]
+        bodies += _placed(known[key], solid)
+    settled = together(bodies, KernelCommon(), problems)
+    if settled.mixed:
+        problems.append(cavity_note(settled))
+    meshes = [body.mesh for body in bodies if body.mesh is not None]
     bare = [] if found else [shape for shape in shapes if occt.faces_of(shape)]
     if mesh_check and bare:
         meshes = [tessellated(shape)[0] for shape in bare]
     whole = simplified(joined(meshes), PICTURE_TRIANGLES) if meshes else None
     wires = any(occt.has_edges(shape) for shape in shapes)
-    return Measured(solids, tuple(problems), whole, bool(found or bare), wires)
+    return Measured(settled.solids, tuple(problems), whole, bool(found or bare), wires)
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,12 +121,17 @@ class _Picture:
 
 @dataclass(frozen=True, eq=False)
 class _Bare:
-    """One solid in the axes of its bare geometry; ``props`` None where it has no volume."""
+    """One solid in the axes of its bare geometry; ``props`` None where it has no volume.
+
+    flat
+        its mesh is the very solid.
+    """
 
     body: Any
     props: SolidProps | None
     mesh: Mesh | None
     notes: Notes
+    flat: bool = False
 
 
 def _measured(solid: Any, body: Any, eps: float, picture: _Picture | None) -> _Bare:
@@ -132,23 +142,29 @@ def _measured(solid: Any, body: Any, eps: float, picture: _Picture | None) -> _B
     if not BRepCheck_Analyzer(solid).IsValid():
         notes.append(INVALID)
     mesh = _checked_mesh(solid, props, picture, notes) if picture is not None else None
-    return _Bare(body, props, mesh, notes)
+    if props is not None and (gap := gap_of(solid)) is not None:
+        notes.append(open_note(gap, props.volume_m3))
+    flat = mesh is not None and props is not None and occt.is_flat(solid)
+    return _Bare(body, props, mesh, notes, flat)
 
 
-def _placed(bare: _Bare, location: Floats) -> list[tuple[SolidProps, Mesh | None]]:
+def _placed(bare: _Bare, solid: Any) -> list[Body]:
     """The solid where it stands, with our own algebra; empty where it has no volume."""
     if bare.props is None:
         return []
     props, mesh = bare.props, bare.mesh
-    if np.array_equal(location, np.eye(4)):
-        return [(props, mesh)]
-    matrix = in_metres(location)
-    volumes, coms, units = place([props.volume_m3], [props.com_m], [props.inertia_unit], [matrix])
-    if mesh is not None:
-        mirrored = np.linalg.det(matrix[:3, :3]) < 0
-        faces = mesh.faces[:, ::-1] if mirrored else mesh.faces
-        mesh = Mesh(mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3], faces)
-    return [(SolidProps(float(volumes[0]), coms[0], units[0], props.reversed), mesh)]
+    location = trsf_matrix(solid.Location().Transformation())
+    if not np.array_equal(location, np.eye(4)):
+        matrix = in_metres(location)
+        volumes, coms, units = place([props.volume_m3], [props.com_m], [props.inertia_unit], [matrix])
+        if mesh is not None:
+            mirrored = np.linalg.det(matrix[:3, :3]) < 0
+            faces = mesh.faces[:, ::-1] if mirrored else mesh.faces
+            mesh = Mesh(mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3], faces)
+        props = SolidProps(float(volumes[0]), coms[0], units[0], props.reversed)
+    low, high = bounds(solid)
+    shape = solid.Reversed() if props.reversed else solid
+    return [Body(props, low * MM, high * MM, mesh, shape, bare.flat)]
 
 
 def _integrated(solid: Any, eps: float, notes: Notes) -> SolidProps | None:
@@ -160,7 +176,7 @@ def _integrated(solid: Any, eps: float, notes: Notes) -> SolidProps | None:
         centre = np.zeros(3)
     if all(occt.is_elementary(face) for face in occt.faces_of(solid)):
         eps *= TENSOR_SHARE
-    found = _converged(solid, _by_kernel(solid, eps), eps)
+    found = converged(solid, by_kernel(solid, eps), eps)
     if not np.isfinite(found.volume) or found.volume == 0.0:
         notes.append(NO_VOLUME)
         return None
@@ -170,27 +186,6 @@ def _integrated(solid: Any, eps: float, notes: Notes) -> SolidProps | None:
     sign = -1.0 if found.volume < 0 else 1.0
     com = (found.com + centre) * MM
     return SolidProps(sign * volume_m3, com, sign * found.inertia * MM**5, reversed=sign < 0)
-
-
-def _by_kernel(solid: Any, eps: float) -> Moments:
-    system = GProp_GProps()
-    error = float(BRepGProp.VolumeProperties_s(solid, system, eps, False, False))
-    tensor = system.MatrixOfInertia()
-    inertia = np.array([[tensor.Value(i, j) for j in (1, 2, 3)] for i in (1, 2, 3)])
-    return Moments(float(system.Mass()), np.array(xyz(system.CentreOfMass())), inertia, error)
-
-
-def _converged(solid: Any, kernel: Moments, eps: float) -> Moments:
-    """The kernel's integration, or our own where that one gave up and ours did not."""
-    if kernel.error <= CONVERGED or not np.isfinite(kernel.volume) or kernel.volume == 0.0:
-        return kernel
-    try:
-        ours = moments(solid, abs(kernel.volume), eps)
-    except (Standard_Failure, ValueError, RuntimeError, ArithmeticError):
-        return kernel
-    # An open or torn shell has no volume that both could agree on; then the doubt stays the kernel's.
-    close = abs(ours.volume - kernel.volume) <= MESH_TOLERANCE * abs(kernel.volume)
-    return ours if close and ours.error < kernel.error else kernel
 
 
 def _rebuilt(shape: Any, offset: Floats) -> Any:

@@ -127,12 +127,17 @@ def _face_mesh(triangulation: Any, located: Any, backwards: bool) -> Mesh:
 
 def box(shape: Any) -> tuple[Floats, float]:
     """Middle (3,) and diagonal [mm] of the shape's box."""
+    low, high = bounds(shape)
+    return (low + high) / 2, float(np.linalg.norm(high - low))
+
+
+def bounds(shape: Any) -> tuple[Floats, Floats]:
+    """Lowest and highest corner [mm] of the shape's box; zeros where it is empty."""
     found = Bnd_Box()
     BRepBndLib.Add_s(shape, found)
     if found.IsVoid():
-        return np.zeros(3), 0.0
-    low, high = np.array(xyz(found.CornerMin())), np.array(xyz(found.CornerMax()))
-    return (low + high) / 2, float(np.linalg.norm(high - low))
+        return np.zeros(3), np.zeros(3)
+    return np.array(xyz(found.CornerMin())), np.array(xyz(found.CornerMax()))
 
 
 def xyz(point: Any) -> tuple[float, float, float]:

@@ -7,6 +7,7 @@ computed all the same and said: a number from an open mesh looks like any other 
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,12 +17,15 @@ import numpy as np
 
 from silo.bom.errors import ConfigError, DocumentError
 from silo.inertia.core import combine_arrays
-from silo.inertia.geometry.checks import implausible_size, name_problems, scaled_problems
+from silo.inertia.geometry.checks import coincident_problems, implausible_size, name_problems, scaled_problems
 from silo.inertia.geometry.detect import Kind
 from silo.inertia.geometry.graph import MAX_DEPTH, Child, Floats, Node, unfold
-from silo.inertia.geometry.mesh import Indices, Mesh, components, is_inside, mesh_solid
+from silo.inertia.geometry.mesh import Mesh, components, mesh_solid, open_edges, welded, without_doubled
+from silo.inertia.geometry.mesh_common import MeshCommon
 from silo.inertia.geometry.options import MESH_UNITS, Reading, ReadOptions, Report
+from silo.inertia.geometry.together import Body, together
 from silo.inertia.model import Assembly, GeometryCode, GeometryProblem, Prototype, SolidProps
+from silo.inertia.wording import counted
 
 MAX_COMPONENTS = 500
 """Meshes in more pieces than this are measured as a whole: scans come in thousands of crumbs."""
@@ -60,6 +64,7 @@ def read_mesh(path: Path, kind: Kind, options: ReadOptions, report: Report) -> R
     unfolded = unfold(nodes, roots, options.max_instances)
     problems += implausible_size(prototypes, unit_name)
     problems += scaled_problems(unfolded.instances)
+    problems += coincident_problems(unfolded.instances)
     used = dict.fromkeys(instance.prototype for instance in unfolded.instances)
     assembly = Assembly(
         name=path.stem,
@@ -105,7 +110,7 @@ def _from_trimesh(path: Path, kind: Kind, loaded: Any) -> MeshScene:
         vertices = np.asarray(geometry.vertices, dtype=np.float64)
         if not np.isfinite(vertices).all():
             raise DocumentError(str(path), f"the mesh '{name}' has coordinates that are no numbers")
-        meshes[name] = merged(vertices, np.asarray(faces, dtype=np.int64))
+        meshes[name] = welded(vertices, np.asarray(faces, dtype=np.int64))
         nodes[name] = Node(name, path.stem if len(loaded.geometry) == 1 else name, (), True)
     if not meshes:
         raise DocumentError(str(path), "holds no triangles")
@@ -140,14 +145,6 @@ def _tree(graph: Any, nodes: dict[str, Node]) -> tuple[Child, ...]:
     found = [root for root in roots if root is not None]
     mesh = graph.transforms.node_data.get(top, {}).get("geometry")
     return tuple([Child(nodes[mesh].name, mesh)] if mesh in nodes else []) + tuple(found)
-
-
-def merged(vertices: Floats, faces: Indices) -> Mesh:
-    """Equal vertices made one (an STL repeats each six times), triangles without area taken out."""
-    unique, place = np.unique(vertices, axis=0, return_inverse=True)
-    faces = place.reshape(-1)[faces]
-    flat = (faces[:, 0] == faces[:, 1]) | (faces[:, 1] == faces[:, 2]) | (faces[:, 2] == faces[:, 0])
-    return Mesh(unique, faces[~flat])
 
 
 def _unit(scene: MeshScene, options: ReadOptions) -> tuple[float, str, list[GeometryProblem]]:
@@ -191,63 +188,47 @@ def _prototype(key: str, name: str, mesh: Mesh) -> Prototype:
 
 
 def _measured(mesh: Mesh, problems: list[GeometryProblem]) -> SolidProps:
-    import trimesh
-
-    body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
-    closed, agreed = bool(body.is_watertight), bool(body.is_winding_consistent)
-    if not closed:
-        problems.append(
-            GeometryProblem(
-                GeometryCode.NOT_WATERTIGHT,
-                f"the mesh is open ({_open_edges(mesh)} free or shared edges), so it has no exact volume",
-            )
-        )
-    if not agreed:
-        problems.append(
-            GeometryProblem(
-                GeometryCode.WINDING,
-                "its triangles do not agree on what is outside; its volume cannot be trusted",
-            )
-        )
-    if closed and agreed:
-        return _oriented(mesh, problems)
-    return mesh_solid(mesh)
-
-
-def _open_edges(mesh: Mesh) -> int:
-    edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    counts = np.unique(edges, axis=0, return_counts=True)[1]
-    return int((counts != 2).sum())
-
-
-def _oriented(mesh: Mesh, problems: list[GeometryProblem]) -> SolidProps:
-    """A closed mesh, piece by piece: a piece inside out is a cavity inside another one, else it is turned."""
+    """The moments of a part's triangles; every doubt is added to ``problems``."""
+    mesh, repeated, _ = without_doubled(mesh)
+    if repeated:
+        what = counted(repeated, "of its triangles is", "of its triangles are")
+        words = f"{what} there more than once; each is counted once"
+        problems.append(GeometryProblem(GeometryCode.COINCIDENT_SOLIDS, words))
+    if not len(mesh):
+        return SolidProps(0.0, np.zeros(3), np.zeros((3, 3)))
+    edges = open_edges(mesh)
+    if edges:
+        problems.append(_not_closed(mesh, edges))
+        return mesh_solid(mesh)
     pieces = components(mesh, MAX_COMPONENTS)
-    if len(pieces) == 1:
-        solid = mesh_solid(mesh)
-        turned = int(solid.reversed)
-    else:
-        solid, turned = _sum(pieces)
-    if turned:
-        which = "the mesh is" if len(pieces) == 1 else f"{turned} of its {len(pieces)} pieces are"
-        problems.append(
-            GeometryProblem(GeometryCode.NEGATIVE_VOLUME, f"{which} inside out; the sign was turned")
+    if len(pieces) == 1 and len(components(mesh, sys.maxsize)) > 1:
+        words = (
+            f"its triangles are in more than {MAX_COMPONENTS} pieces, which may overlap; they were added up"
         )
-    return solid
-
-
-def _sum(pieces: list[Mesh]) -> tuple[SolidProps, int]:
-    solids = [mesh_solid(piece) for piece in pieces]
-    outward = [piece for piece, solid in zip(pieces, solids, strict=True) if not solid.reversed]
-    signs, turned = [], 0
-    for piece, solid in zip(pieces, solids, strict=True):
-        cavity = solid.reversed and any(is_inside(piece, other) for other in outward)
-        turned += int(solid.reversed and not cavity)
-        signs.append(-1.0 if cavity else 1.0)
-    sign = np.array(signs)
+        problems.append(GeometryProblem(GeometryCode.OVERLAPPING_SOLIDS, words))
+    found = together([_body(piece) for piece in pieces], MeshCommon(), problems)
+    if found.turned:
+        which = "the mesh is" if len(pieces) == 1 else f"{found.turned} of its {len(pieces)} pieces are"
+        words = f"{which} inside out; the sign was turned"
+        problems.append(GeometryProblem(GeometryCode.NEGATIVE_VOLUME, words))
+    solids = found.solids
     whole = combine_arrays(
-        sign * np.array([s.volume_m3 for s in solids]),
+        np.array([s.volume_m3 for s in solids]),
         np.array([s.com_m for s in solids]),
-        sign[:, None, None] * np.array([s.inertia_unit for s in solids]),
+        np.array([s.inertia_unit for s in solids]),
     )
-    return SolidProps(whole.mass, whole.com, whole.inertia, reversed=turned > 0), turned
+    return SolidProps(whole.mass, whole.com, whole.inertia, reversed=found.turned > 0)
+
+
+def _body(piece: Mesh) -> Body:
+    return Body(mesh_solid(piece), piece.vertices.min(axis=0), piece.vertices.max(axis=0), piece)
+
+
+def _not_closed(mesh: Mesh, edges: int) -> GeometryProblem:
+    """Holes, or triangles that disagree; either way the volume depends on the point that it is taken from."""
+    undirected = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    if (np.unique(undirected, axis=0, return_counts=True)[1] == 2).all():
+        words = "its triangles do not agree on what is outside; its volume cannot be trusted"
+        return GeometryProblem(GeometryCode.WINDING, words)
+    words = f"the mesh is open ({edges} free or shared edges), so it has no exact volume"
+    return GeometryProblem(GeometryCode.NOT_WATERTIGHT, words)

@@ -6,7 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from silo.bom.errors import DocumentError, InputError
-from silo.inertia.geometry.checks import implausible_size, name_problems, scaled_problems
+from silo.inertia.geometry.checks import coincident_problems, implausible_size, name_problems, scaled_problems
 from silo.inertia.geometry.graph import unfold
 from silo.inertia.geometry.kernel.solids import measure
 from silo.inertia.geometry.measured import no_solid
@@ -34,6 +34,7 @@ def read_step(path: Path, options: ReadOptions, report: Report) -> Reading:
         prototypes[key] = _prototype(step, key, options, siblings.problems.get(key))
     problems = [*split_problems(siblings), *stated_totals(step, prototypes)]
     problems += [*lost_stretches(step), *scaled_problems(unfolded.instances)]
+    problems += coincident_problems(unfolded.instances)
     problems += implausible_size(prototypes, step.unit or "mm")
     if not step.unit and any(prototype.volume_m3 for prototype in prototypes.values()):
         words = "the file states no unit of length that is understood; it was read as mm"
