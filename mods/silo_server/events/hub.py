@@ -25,7 +25,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from silo_server.db.engine import Database
 from silo_server.services import events as log
-from silo_server.services.events import LoggedEvent
+from silo_server.services.events import LoggedEvent, Mark
 
 logger = logging.getLogger("silo_server.events")
 
@@ -38,10 +38,14 @@ PAGE = 500
 class Frame:
     """An event as it goes over the wire, with what filters look at."""
 
-    id: int
+    mark: Mark
     item_uuid: str | None
     part_number_key: str | None
     payload: bytes
+
+    @property
+    def id(self) -> int:
+        return self.mark.id
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,14 +53,15 @@ class Batch:
     """What a listener gets next: frames, its new cursor, and whether it must re-read everything first."""
 
     frames: Sequence[Frame]
-    cursor: int
+    cursor: Mark
     reset: bool = False
 
 
 def to_frame(event: LoggedEvent) -> Frame:
     """``id:``, ``event:``, ``data:`` and an empty line; the data is JSON and so has no line break."""
-    payload = f"id: {event.id}\nevent: {event.name}\ndata: {event.data}\n\n".encode()
-    return Frame(event.id, event.item_uuid, event.part_number_key, payload)
+    mark = event.mark
+    payload = f"id: {mark}\nevent: {event.name}\ndata: {event.data}\n\n".encode()
+    return Frame(mark, event.item_uuid, event.part_number_key, payload)
 
 
 class Hub:
@@ -67,7 +72,8 @@ class Hub:
         self._ring: deque[Frame] = deque()
         self._ring_bytes = 0
         self._ring_start = 0  # the ring holds every event with an id above this
-        self.head = 0
+        self.head = Mark(0)
+        self.epoch = 0  # counts how often the log turned out to be another one
         self.listeners = 0
         self.closed = False
         self.beats = 0
@@ -80,7 +86,8 @@ class Hub:
     async def start(self) -> None:
         """Begin at the log's present end."""
         self._loop = asyncio.get_running_loop()
-        self.head = self._ring_start = (await asyncio.to_thread(self._read_bounds))[1]
+        self.head = await asyncio.to_thread(self._read_head)
+        self._ring_start = self.head.id
         self._db.on_events = self.poke
         if not self._db.settings.is_sqlite:
             self._listener = _PostgresListener(self._db, self.poke)
@@ -110,12 +117,12 @@ class Hub:
         """Until there is news, a heartbeat is due, or the hub closes."""
         await self._news.wait()
 
-    async def take(self, cursor: int) -> Batch:
+    async def take(self, cursor: Mark) -> Batch:
         """What comes after ``cursor``: from the ring where it reaches back far enough, else from the log."""
-        if cursor >= self.head:
+        if cursor.id >= self.head.id:
             return Batch((), cursor)
-        if cursor >= self._ring_start:
-            return Batch(self._newer(cursor), self.head)
+        if cursor.id >= self._ring_start:
+            return Batch(self._newer(cursor.id), self.head)
         return await asyncio.to_thread(self._read_log, cursor)
 
     def _newer(self, cursor: int) -> list[Frame]:
@@ -128,16 +135,10 @@ class Hub:
         newer.reverse()
         return newer
 
-    async def place(self, last_event_id: int | None) -> tuple[int, bool]:
+    async def place(self, last: Mark | None) -> tuple[Mark, bool]:
         """(cursor to begin at, whether a ``reset`` is due) for a client that says what it saw last."""
         # The log and not the ring says where "now" is: the ring may be a moment behind a commit.
-        horizon, head = await asyncio.to_thread(self._read_bounds)
-        if last_event_id is None:
-            return head, False
-        # An id from the future is of another database (or of the real Silo before a restart).
-        if last_event_id < horizon or last_event_id > max(head, self.head):
-            return max(head, self.head), True
-        return last_event_id, False
+        return await asyncio.to_thread(self._read_place, last)
 
     async def _dispatch(self) -> None:
         while True:
@@ -152,13 +153,10 @@ class Hub:
 
     async def _read_news(self) -> None:
         while True:
-            horizon, page = await asyncio.to_thread(self._read_page, self.head)
-            if horizon > self.head:
-                # The log was trimmed beyond what was read here, or a backup was restored: a gap.
-                self._ring.clear()
-                self._ring_bytes = 0
-                self.head = self._ring_start = horizon
-                self._wake()
+            page = await asyncio.to_thread(self._read_page, self.head)
+            if page is None:
+                await self._begin_again()
+                continue
             if not page:
                 return
             for frame in page:
@@ -168,8 +166,17 @@ class Hub:
                 gone = self._ring.popleft()
                 self._ring_bytes -= len(gone.payload)
                 self._ring_start = gone.id
-            self.head = page[-1].id
+            self.head = page[-1].mark
             self._wake()
+
+    async def _begin_again(self) -> None:
+        """The log was trimmed beyond what was read, or the database put back: all read everything again."""
+        logger.warning("the event log is another one than before; every listener gets a reset")
+        self.head = await asyncio.to_thread(self._read_head)
+        self._ring.clear()
+        self._ring_bytes, self._ring_start = 0, self.head.id
+        self.epoch += 1
+        self._wake()
 
     async def _beat(self) -> None:
         while True:
@@ -184,22 +191,29 @@ class Hub:
             self._news.set()
         news.set()
 
-    def _read_page(self, after: int) -> tuple[int, list[Frame]]:
+    def _read_page(self, after: Mark) -> list[Frame] | None:
+        """What comes after ``after``; None where that is no place of this log."""
         with self._db.read() as tx:
-            horizon = log.horizon_of(tx)
-            return horizon, [to_frame(event) for event in log.read_after(tx, max(after, horizon), PAGE)]
+            if not log.reaches(tx, after):
+                return None
+            return [to_frame(event) for event in log.read_after(tx, after.id, PAGE)]
 
-    def _read_bounds(self) -> tuple[int, int]:
+    def _read_head(self) -> Mark:
         with self._db.read() as tx:
-            return log.bounds(tx)
+            return log.head(tx)
 
-    def _read_log(self, cursor: int) -> Batch:
+    def _read_place(self, last: Mark | None) -> tuple[Mark, bool]:
         with self._db.read() as tx:
-            horizon, head = log.bounds(tx)
-            if cursor < horizon:
-                return Batch((), head, reset=True)
-            frames = [to_frame(event) for event in log.read_after(tx, cursor, PAGE)]
-        return Batch(frames, frames[-1].id if frames else head)
+            if last is not None and log.reaches(tx, last):
+                return log.mark_at(tx, last.id), False
+            return log.head(tx), last is not None
+
+    def _read_log(self, cursor: Mark) -> Batch:
+        with self._db.read() as tx:
+            if not log.reaches(tx, cursor):
+                return Batch((), log.head(tx), reset=True)
+            frames = [to_frame(event) for event in log.read_after(tx, cursor.id, PAGE)]
+            return Batch(frames, frames[-1].mark if frames else log.head(tx))
 
 
 class _PostgresListener:

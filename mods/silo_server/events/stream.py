@@ -11,6 +11,7 @@ from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
 
 from silo_server.events.hub import Batch, Frame, Hub
+from silo_server.services.events import Mark
 
 HEADERS = {
     "cache-control": "no-store",
@@ -35,7 +36,7 @@ class ItemFilter:
 
 
 class EventStream(Response):
-    """The stream. ``last_event_id`` None = only what is new from now on.
+    """The stream. ``last``: what the client saw last, None = only what is new from now on.
 
     ``still_allowed`` is asked with every heartbeat: a stream must not outlive the token that opened it.
     """
@@ -45,14 +46,14 @@ class EventStream(Response):
     def __init__(
         self,
         hub: Hub,
-        last_event_id: int | None,
+        last: Mark | None,
         items: Sequence[str] = (),
         still_allowed: Callable[[], bool] = lambda: True,
     ) -> None:
         super().__init__(headers=HEADERS)
         del self.headers["content-length"]
         self._hub = hub
-        self._last = last_event_id
+        self._last = last
         self._still_allowed = still_allowed
         self._filter = ItemFilter(frozenset(item.casefold() for item in items))
 
@@ -77,8 +78,11 @@ class EventStream(Response):
         cursor, reset = await hub.place(self._last)
         # The first bytes tell proxies and clients that the stream stands.
         await _send(send, _hello(cursor) + (_reset(cursor) if reset else b""))
-        beats = hub.beats
+        beats, epoch = hub.beats, hub.epoch
         while not hub.closed:
+            if hub.epoch != epoch:
+                epoch, cursor = hub.epoch, hub.head
+                await _send(send, _reset(cursor))
             batch = await hub.take(cursor)
             cursor = batch.cursor
             payload = self._payload(batch)
@@ -89,7 +93,7 @@ class EventStream(Response):
                     break
             if payload:
                 await _send(send, payload)
-            if cursor >= hub.head and beats == hub.beats and not hub.closed:
+            if cursor.id >= hub.head.id and (beats, epoch) == (hub.beats, hub.epoch) and not hub.closed:
                 await hub.wait()
         await send({"type": "http.response.body", "body": b"", "more_body": False})
 
@@ -98,12 +102,12 @@ class EventStream(Response):
         return _reset(batch.cursor) + frames if batch.reset else frames
 
 
-def _hello(cursor: int) -> bytes:
+def _hello(cursor: Mark) -> bytes:
     # With the id a listener that is cut off before its first event can ask for what it missed.
     return f": connected\nid: {cursor}\nretry: 2000\n\n".encode()
 
 
-def _reset(cursor: int) -> bytes:
+def _reset(cursor: Mark) -> bytes:
     return f"id: {cursor}\nevent: reset\ndata: {{}}\n\n".encode()
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import asdict
 from typing import Annotated, Any, Literal
 
@@ -28,6 +29,7 @@ from silo_server.routes.context import (
 from silo_server.services import audit, events
 
 router = APIRouter(tags=["system"])
+EVENT_ID = re.compile(r"(?P<number>[0-9]{1,18})(?:-(?P<tag>[0-9a-f]{8}))?")
 MODULES = (
     "core",
     "schemas",
@@ -81,7 +83,7 @@ async def stream_events(
     server: ServerDep,
     caller: Viewer,
     item: Annotated[list[str] | None, Query(max_length=100)] = None,
-    last_event_id: Annotated[str | None, Query(max_length=20)] = None,
+    last_event_id: Annotated[str | None, Query(max_length=40)] = None,
 ) -> Response:
     """Events as they happen. ``Last-Event-ID`` (or ``last_event_id``) replays what came after it.
 
@@ -131,9 +133,10 @@ def set_mode(server: ServerDep, caller: Admin, body: ModeBody) -> dict[str, Any]
         return {"mode": mode}
 
 
-def _event_id(text: str | None) -> int | None:
+def _event_id(text: str | None) -> events.Mark | None:
     if text is None or text == "":
         return None
-    if not (text.isascii() and text.isdigit() and len(text) <= 18):
-        raise RejectedError(f"Last-Event-ID: wanted a number, got {text[:40]!r}")
-    return int(text)
+    found = EVENT_ID.fullmatch(text)
+    if found is None:
+        raise RejectedError(f"Last-Event-ID: wanted the id of an event (a number), got {text[:40]!r}")
+    return events.Mark(int(found["number"]), found["tag"] or "")

@@ -8,6 +8,7 @@ Names: the spec's ``bom_merge``; the real Silo's ``item.created``, ``item.update
 from __future__ import annotations
 
 import json
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -22,6 +23,14 @@ from silo_server.json_values import dumps
 from silo_server.values import Item, NewEvent, Revision
 
 HORIZON = "event_horizon"
+LOGGED = (
+    events.c.id,
+    events.c.name,
+    events.c.data,
+    events.c.item_uuid,
+    events.c.part_number_key,
+    events.c.at,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +42,28 @@ class LoggedEvent:
     data: str
     item_uuid: str | None
     part_number_key: str | None
+    at: str
+
+    @property
+    def mark(self) -> Mark:
+        """What a listener that was given this event comes back with."""
+        return Mark(self.id, f"{zlib.crc32(f'{self.name} {self.at} {self.data}'.encode()):08x}")
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """A place in the log: an event's number, and a tag of what it said; "" where there is no event.
+
+    A restored database gives the numbers that it had given out since the backup to other events. The tag
+    shows that: it is the log's epoch, for each event alone, so that however a database is put back, a
+    listener that saw what is no more gets a ``reset``.
+    """
+
+    id: int
+    tag: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.id}-{self.tag}" if self.tag else str(self.id)
 
 
 def item_created(tx: Tx, item: Item) -> None:
@@ -80,10 +111,7 @@ def server_state(tx: Tx, mode: str) -> None:
 def read_after(tx: Tx, after: int, limit: int = 500) -> list[LoggedEvent]:
     """The next events after id ``after``, oldest first."""
     rows = tx.conn.execute(
-        select(events.c.id, events.c.name, events.c.data, events.c.item_uuid, events.c.part_number_key)
-        .where(events.c.id > after)
-        .order_by(events.c.id)
-        .limit(limit)
+        select(*LOGGED).where(events.c.id > after).order_by(events.c.id).limit(limit)
     ).all()
     return [LoggedEvent(*row) for row in rows]
 
@@ -119,6 +147,28 @@ def bounds(tx: Tx) -> tuple[int, int]:
     horizon = horizon_of(tx)
     head = tx.conn.scalar(select(func.max(events.c.id))) or 0
     return horizon, max(head, horizon)
+
+
+def head(tx: Tx) -> Mark:
+    """The newest place of the log."""
+    return mark_at(tx, bounds(tx)[1])
+
+
+def reaches(tx: Tx, mark: Mark) -> bool:
+    """True where the log goes back to ``mark`` without a gap: what came after it can be given, all of it.
+
+    False for one that was trimmed away, that is of the future, or whose event is another one by now.
+    """
+    horizon, newest_id = bounds(tx)
+    if not horizon <= mark.id <= newest_id:
+        return False
+    return not mark.tag or mark.id == horizon or mark_at(tx, mark.id) == mark
+
+
+def mark_at(tx: Tx, event_id: int) -> Mark:
+    """The mark of the event with this id; without a tag where there is none, or no more."""
+    row = tx.conn.execute(select(*LOGGED).where(events.c.id == event_id)).one_or_none()
+    return LoggedEvent(*row).mark if row is not None else Mark(event_id)
 
 
 def trim(tx: Tx, keep: int, keep_bytes: int | None = None, limit: int | None = None) -> int:

@@ -53,7 +53,7 @@ def activity_page(
     """The newest events, newest first; ``after`` leaves out what is known already."""
     with server.db.read(caller) as tx:
         found = events.newest(tx, MOST, after)
-        last = events.bounds(tx)[1]
+        last = events.head(tx)
     entries = [entry_of(event) for event in found]
     return page(
         request, "activity.html", caller, entries=entries, last=last, names=" ".join(NAMES), live=True

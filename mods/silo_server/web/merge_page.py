@@ -187,7 +187,7 @@ def _show(
         merge = found.last_merge
         merged = history.get_change(tx, item, merge.id)[1] if merge else []
         recent = history.list_changes(tx, item, LATER_CHANGES)
-        seen = events.bounds(tx)[1]
+        seen = events.head(tx)
     return page(
         request,
         "merge.html",

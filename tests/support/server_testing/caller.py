@@ -137,24 +137,25 @@ class Api:
         """The BOM as part number → quantity."""
         return {number: line["quantity"] for number, line in self.lines(parent).items()}
 
-    def events(self, query: str = "", last_event_id: int | None = None) -> EventReader:
+    def events(self, query: str = "", last_event_id: int | str | None = None) -> EventReader:
         """Open the event stream."""
         return EventReader(self, query, last_event_id)
 
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """One event of the stream."""
+    """One event of the stream; ``mark`` is its id as it was sent, to come back with."""
 
     id: int | None
     name: str
     data: Any
+    mark: str = ""
 
 
 class EventReader:
     """The event stream as a list of events to come; a context manager."""
 
-    def __init__(self, api: Api, query: str, last_event_id: int | None) -> None:
+    def __init__(self, api: Api, query: str, last_event_id: int | str | None) -> None:
         headers = {"Authorization": f"Bearer {api.token}"}
         if last_event_id is not None:
             headers["Last-Event-ID"] = str(last_event_id)
@@ -195,8 +196,9 @@ class EventReader:
             assert raw, "the stream ended"
             line = raw.decode().rstrip("\n")
             if line == "" and "event" in fields:
-                number = fields.get("id")
-                return Event(int(number) if number else None, fields["event"], json.loads(fields["data"]))
+                mark = fields.get("id", "")
+                number = int(mark.partition("-")[0]) if mark else None
+                return Event(number, fields["event"], json.loads(fields["data"]), mark)
             if line == "":
                 fields.clear()  # the greeting: an id, and no event
                 continue

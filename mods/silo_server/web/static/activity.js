@@ -15,7 +15,7 @@ async function refresh() {
   if (busy) return;
   busy = true;
   try {
-    const answer = await fetch(`/activity?after=${list.dataset.last}`);
+    const answer = await fetch(`/activity?after=${parseInt(list.dataset.last, 10)}`);
     const page = new DOMParser().parseFromString(await answer.text(), "text/html");
     const fresh = page.getElementById("entries");
     if (!fresh) return location.reload(); // logged out meanwhile

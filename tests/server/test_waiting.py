@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""While one waits, the others go on: foreign locks, locked rows, a frozen PostgreSQL, a database put back."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import sqlite3
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import psycopg
+import pytest
+from server_testing import Api, Databases, bom, wait_until
+from sqlalchemy import make_url
+
+from silo_server.db.engine import WRITERS_WAITING, Database
+from silo_server.run import running_server
+from silo_server.services import credentials
+from silo_server.settings import Settings
+
+TOKEN = "silo_waiting"
+READ_EVENTS = "SELECT id, name, item_uuid, part_number_key, data, at FROM events ORDER BY id"
+WRITE_EVENT = (
+    "INSERT INTO events (id, name, item_uuid, part_number_key, data, at) VALUES (%s, %s, %s, %s, %s, %s)"
+)
+
+
+@contextlib.contextmanager
+def locked_against_writers(url: str) -> Iterator[None]:
+    """Another process holds what every writer needs: SQLite's write lock, or the rows on PostgreSQL."""
+    if url.startswith("sqlite"):
+        other = sqlite3.connect(url.removeprefix("sqlite:///"), isolation_level=None, check_same_thread=False)
+        other.execute("BEGIN IMMEDIATE")
+        try:
+            yield
+        finally:
+            other.execute("ROLLBACK")
+            other.close()
+        return
+    plain = make_url(url).set(drivername="postgresql").render_as_string(hide_password=False)
+    with psycopg.connect(plain) as connection:
+        connection.execute("SELECT 1 FROM items FOR UPDATE")
+        connection.execute("LOCK TABLE api_tokens, audit IN SHARE MODE")
+        yield
+        connection.rollback()
+
+
+def test_reads_and_health_go_on_while_writers_wait(url: str, tmp_path: Path) -> None:
+    """So many writers that every place is taken: reads are answered, further writers are sent away."""
+    with (
+        running_server(url, token=TOKEN, files_dir=tmp_path) as server,
+        Api(server.base_url, TOKEN) as api,
+    ):
+        parent, child = api.items(2)
+        statuses: list[tuple[int, str]] = []
+
+        def write(number: int) -> None:
+            with Api(server.base_url, TOKEN) as mine:
+                body = {"child_part_number": child, "quantity": number + 1}
+                answer = mine.call("POST", bom(parent), body)
+                statuses.append((answer.status, answer.headers.get("retry-after", "")))
+
+        count = WRITERS_WAITING + 30
+        threads = [threading.Thread(target=write, args=(n,)) for n in range(count)]
+        with locked_against_writers(url):
+            for thread in threads:
+                thread.start()
+            wait_until(lambda: len(statuses) > 0, "a writer being sent away")
+            assert {status for status, _ in statuses} == {503}
+            assert all(retry for _, retry in statuses)
+            # Most of the writers hold a thread now, and wait. Nobody who reads notices.
+            assert sum(thread.is_alive() for thread in threads) > 20
+            for path in ("/health", "/ready", f"/api/items/{parent}", "/api/items", bom(parent)):
+                assert api.call("GET", path).status == 200
+            assert sum(thread.is_alive() for thread in threads) > 20
+        for thread in threads:
+            thread.join(90)
+        assert {status for status, _ in statuses} <= {201, 409, 503}
+        assert len(statuses) == count
+        assert api.call("PUT", f"/api/items/{parent}", {"name": "free again"}).status == 200
+
+
+def test_the_last_use_of_a_token_is_noted_when_it_can_be(db: Database) -> None:
+    """Reading with a token needs no write; what could not be noted is noted later."""
+    with db.read() as tx:
+        token = credentials.list_tokens(tx)[0]
+    assert credentials.actor_by_token(db, "silo_test", "") is not None
+    assert list(db.token_uses) == [token.id]
+    with db.read() as tx:
+        assert credentials.list_tokens(tx)[0].last_used_at is None
+    credentials.note_token_uses(db)
+    assert db.token_uses == {}
+    with db.read() as tx:
+        assert credentials.list_tokens(tx)[0].last_used_at is not None
+
+
+@pytest.mark.postgres
+def test_a_frozen_postgres_stops_neither_health_nor_us(databases: Databases, tmp_path: Path) -> None:
+    """Every process of the database stopped: health answers, ready says no, a request ends with 503."""
+    url = databases.new("postgres")
+    with (
+        running_server(url, token=TOKEN, files_dir=tmp_path) as server,
+        Api(server.base_url, TOKEN) as api,
+    ):
+        number = api.item()
+        plain = make_url(url).set(drivername="postgresql").render_as_string(hide_password=False)
+        with psycopg.connect(plain) as connection:
+            query = "SELECT pid FROM pg_stat_activity WHERE datname = current_database() AND pid <> %s"
+            mine = connection.info.backend_pid
+            backends = [pid for (pid,) in connection.execute(query, (mine,))]
+            status = Path(f"/proc/{mine}/status").read_text()
+        # Without the one that starts new ones they could be replaced.
+        backends.append(int(status.partition("PPid:")[2].split()[0]))
+        stopped = []
+        for pid in backends:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGSTOP)
+                stopped.append(pid)
+        try:
+            assert api.call("GET", "/health").status == 200
+            ready = api.call("GET", "/ready")
+            assert (ready.status, ready.json()["database"]) == (503, "unreachable")
+            assert api.call("GET", f"/api/items/{number}").status == 503
+        finally:
+            for pid in stopped:
+                os.kill(pid, signal.SIGCONT)
+        wait_until(lambda: api.call("GET", f"/api/items/{number}").status == 200, "a read after the thaw")
+        wait_until(lambda: api.call("GET", "/ready").status == 200, "being ready after the thaw")
+
+
+def put_back(url: str, saved: Path, *, save: bool) -> None:
+    """Save the database as an administrator does without us, or put it back behind a running server."""
+    if url.startswith("sqlite"):
+        path = url.removeprefix("sqlite:///")
+        source, target = (path, saved) if save else (saved, path)
+        with sqlite3.connect(source) as old, sqlite3.connect(target) as new:
+            old.backup(new)
+        return
+    plain = make_url(url).set(drivername="postgresql").render_as_string(hide_password=False)
+    # The tables that matter here: the log, and what gives out its numbers.
+    with psycopg.connect(plain) as connection:
+        if save:
+            saved.write_text(json.dumps(connection.execute(READ_EVENTS).fetchall()))
+            return
+        rows = json.loads(saved.read_text())
+        connection.execute("DELETE FROM events")
+        for row in rows:
+            connection.execute(WRITE_EVENT, row)
+        connection.execute("SELECT setval(pg_get_serial_sequence('events', 'id'), %s)", (rows[-1][0],))
+
+
+def test_a_database_put_back_behind_listeners_is_a_reset(url: str, tmp_path: Path) -> None:
+    """Whether they listen or come back, and although the log has passed their id again since."""
+    settings = Settings(database_url=url, files_dir=tmp_path / "files", poll_seconds=0.05)
+    with (
+        running_server(url, token=TOKEN, settings=settings) as server,
+        Api(server.base_url, TOKEN) as api,
+        api.events() as stream,
+    ):
+        before = api.item()
+        assert stream.next("item.created").data["part_number"] == before
+        put_back(url, tmp_path / "saved", save=True)
+        known = [api.item() for _ in range(3)]
+        last = stream.next("item.created")
+        while last.data["part_number"] != known[-1]:
+            last = stream.next("item.created")
+        put_back(url, tmp_path / "saved", save=False)
+        assert stream.next("reset")
+        for _ in range(5):
+            new = api.item()
+        while stream.next("item.created").data["part_number"] != new:
+            pass
+        with api.events(last_event_id=last.mark) as again:
+            assert again.next().name == "reset"
+        with api.events() as now:
+            api.item()
+            mark = now.next("item.created").mark
+        with api.events(last_event_id=mark) as same:
+            later = api.item()
+            event = same.next()
+            assert (event.name, event.data["part_number"]) == ("item.created", later)
