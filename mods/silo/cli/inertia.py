@@ -50,7 +50,11 @@ def register(commands: Commands) -> None:
         "--urdf", metavar="FILE", help="write <inertial> into this URDF, the rest of it untouched"
     )
     group.add_argument("--urdf-out", metavar="FILE", help="write the URDF here, and leave --urdf as it is")
-    group.add_argument("--snippet", choices=SNIPPETS, help="print <inertial> elements to paste, nothing else")
+    group.add_argument(
+        "--snippet",
+        choices=SNIPPETS,
+        help="print a file of the links with their <inertial> and nothing else; joints and shapes are yours",
+    )
     shared.add_bom_options(parser)
     shared.add_material_options(parser)
     parser.add_argument(
@@ -151,12 +155,13 @@ def _write_urdf(args: argparse.Namespace, report: InertiaReport) -> None:
 
 def _print_snippet(kind: str, report: InertiaReport) -> None:
     from silo.cli.show import plain
-    from silo.inertia.output.snippets import snippets
+    from silo.inertia.output.snippets import document
     from silo.inertia.output.values import writable
 
-    text = snippets(writable(report.links.values()), kind)
-    encoding = sys.stdout.encoding or "ascii"
-    sys.stdout.write(text.encode(encoding, "xmlcharrefreplace").decode(encoding))
+    text = document(writable(report.links.values()), kind, report.assembly)
+    # A file that says nothing of its encoding is UTF-8; a pipe of another code page gets ASCII.
+    utf8 = (sys.stdout.encoding or "ascii").lower().replace("-", "") == "utf8"
+    sys.stdout.write(text if utf8 else text.encode("ascii", "xmlcharrefreplace").decode())
     # The elements do not say it themselves, and in another frame than the link's they are wrong.
     for name, link in report.links.items():
         print(f"{plain(name)}: frame of the numbers: {plain(link.frame.description)}", file=sys.stderr)

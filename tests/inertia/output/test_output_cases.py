@@ -22,7 +22,7 @@ from silo.inertia.core import MassProps, combine
 from silo.inertia.frames import ASSEMBLY_FRAME, origin_frame
 from silo.inertia.links import link_map
 from silo.inertia.output.data import CSV_HEADER, report_csv, report_data, report_json
-from silo.inertia.output.snippets import SNIPPETS, snippets
+from silo.inertia.output.snippets import SNIPPETS, document, snippets
 from silo.inertia.output.text import report_markdown, report_tables
 from silo.inertia.output.values import number, settled, writable
 from silo.inertia.report import LinkResult
@@ -99,6 +99,54 @@ def test_case_41_snippets_read_back(report: Any, kind: str) -> None:
         assert np.abs(read[name].inertia - ours.inertia).max() <= 1e-12 * np.abs(ours.inertia).max()
         assert read[name].check(tolerance=0.0) == ()
         assert np.abs(ours.inertia[0, 1]) > 1e-6  # the products are there to be mixed up
+
+
+NAMES = ("arm", "a <b> & 'c' \"d\"", "é 手 ß")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_mjcf_file_loads_in_mujoco(report: Any, name: str) -> None:
+    """As written, without a change; mass, centre and principal moments read back."""
+    mujoco = pytest.importorskip("mujoco")
+    links = {name if old == "arm" else old: props for old, props in real_links(report).items()}
+    model = mujoco.MjModel.from_xml_string(document(links, "mjcf", f"robot {name}"))
+    for link, props in links.items():
+        body = model.body(link)
+        assert body.mass[0] == pytest.approx(props.mass, rel=1e-12)
+        assert body.ipos == pytest.approx(props.com, rel=1e-12, abs=1e-15)
+        turn = np.zeros(9)
+        mujoco.mju_quat2Mat(turn, body.iquat)
+        turn = turn.reshape(3, 3)
+        tensor = turn @ np.diag(body.inertia) @ turn.T
+        assert np.abs(tensor - props.inertia).max() <= 1e-9 * np.abs(props.inertia).max()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_sdf_file_loads_in_a_reader_of_sdformat(report: Any, name: str) -> None:
+    """As written; mass, centre and every element of the tensor read back."""
+    pysdf = pytest.importorskip("pysdf")
+    links = {name if old == "arm" else old: props for old, props in real_links(report).items()}
+    read = pysdf.SDF.from_xml(document(links, "sdf", f"robot {name}"))
+    assert read.model.name == f"robot {name}"
+    found = {link.name: link.inertial for link in read.iter("link")}
+    assert found.keys() == links.keys()
+    for link, props in links.items():
+        got, t = found[link], found[link].inertia
+        assert float(got.mass) == pytest.approx(props.mass, rel=1e-12)
+        pose = [float(v) for v in str(got.pose.text).split()]
+        assert pose[:3] == pytest.approx(props.com, rel=1e-12, abs=1e-15)
+        assert pose[3:] == [0, 0, 0]
+        rows = [[t.ixx, t.ixy, t.ixz], [t.ixy, t.iyy, t.iyz], [t.ixz, t.iyz, t.izz]]
+        assert np.abs(np.array(rows, float) - props.inertia).max() <= 1e-12 * np.abs(props.inertia).max()
+
+
+def test_names_that_a_format_keeps_for_itself_are_refused() -> None:
+    """MuJoCo has a body "world" already; SDFormat separates names by two colons."""
+    props = MassProps(1.0, [0, 0, 0], np.eye(3))  # type: ignore[arg-type]
+    for kind, name in (("mjcf", "world"), ("sdf", "world"), ("sdf", "a::b"), ("sdf", "__root__")):
+        with pytest.raises(InputError, match="does not allow"):
+            document({name: props}, kind, "robot")
+    assert "a b" in document({"x": props}, "sdf", "a::b")
 
 
 def mujoco_model(links: dict[str, MassProps]) -> Any:

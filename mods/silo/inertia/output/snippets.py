@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from xml.sax.saxutils import quoteattr
 
+from silo.bom.errors import InputError
 from silo.inertia.core import MassProps
 from silo.inertia.output.values import number
 from silo.inertia.types import InertialProperties
@@ -59,6 +60,14 @@ _FORMATS: dict[str, tuple[str, Callable[[MassProps], str]]] = {
     "sdf": ("link", sdf_inertial),
     "mjcf": ("body", mjcf_inertial),
 }
+# What stands around all links, so that the file loads as it is; {} is the model's name.
+_AROUND = {
+    "urdf": ("<robot name={}>", "</robot>"),
+    "sdf": ('<sdf version="1.9">\n<model name={}>', "</model>\n</sdf>"),
+    "mjcf": ("<mujoco model={}>\n<worldbody>", "</worldbody>\n</mujoco>"),
+}
+# Names that a format keeps for itself.
+_RESERVED = {"mjcf": {"world"}, "sdf": {"world"}}
 SNIPPETS = tuple(_FORMATS)
 
 
@@ -70,3 +79,24 @@ def snippets(links: Mapping[str, MassProps], kind: str) -> str:
         body = write(props).replace("\n", "\n  ")
         blocks.append(f"<{element} name={quoteattr(name)}>\n  {body}\n</{element}>\n")
     return "".join(blocks)
+
+
+def document(links: Mapping[str, MassProps], kind: str, name: str) -> str:
+    """A file of all links that the format's own reader loads; the joints are yours to add.
+
+    InputError where a link has a name that the format does not allow.
+    """
+    taken = _RESERVED.get(kind, set())
+    bad = [link for link in links if link in taken or (kind == "sdf" and ("::" in link or _is_dunder(link)))]
+    if bad:
+        raise InputError(
+            f"{kind.upper()} does not allow a link with the name {', '.join(bad)}; a link map can rename it"
+        )
+    title = name.replace("::", " ") if kind == "sdf" else name
+    start, end = _AROUND[kind]
+    head = "" if kind == "mjcf" else '<?xml version="1.0"?>\n'
+    return f"{head}{start.format(quoteattr(title or 'assembly'))}\n{snippets(links, kind)}{end}\n"
+
+
+def _is_dunder(name: str) -> bool:
+    return name.startswith("__") and name.endswith("__")
