@@ -91,6 +91,34 @@ def draft_array(scene: Scene) -> Any:
     return scene.top.add("Part::FeaturePython", "Array", Base=base, Count=3)
 
 
+def screw(doc: Doc, name: str = "Screw", **properties: Any) -> Any:
+    values = {"Type": "ISO4762", "Diameter": "M4", "Length": "16", **properties}
+    return doc.add("Part::FeaturePython", name, **values)
+
+
+def counted_beside() -> Iterable[Finding]:
+    scene = Scene()
+    screw(scene.top)
+    return scene.walked(scene.top.link("L", scene.bolt))
+
+
+def consumed(scene: Scene) -> Any:
+    tool = screw(scene.top)
+    cut = scene.top.add("Part::Cut", "Cut", Base=scene.top.body("Plate"), Tool=tool)
+    return scene.top.folder("Drilled", tool, cut)
+
+
+def no_hardware() -> Iterable[Finding]:
+    scene = Scene()
+    return extract(scene.top.assembly(screw(scene.top)), hardware=False).findings
+
+
+def newer() -> Iterable[Finding]:
+    scene = Scene()
+    edit(scene.top, ProgramVersion="7.2.1R1 (Git)")
+    return scene.walked(scene.top.link("L", scene.bolt))
+
+
 SCENES: dict[FindingCode, Callable[[], Iterable[Finding]]] = {
     **{
         code: broken(code)
@@ -117,6 +145,19 @@ SCENES: dict[FindingCode, Callable[[], Iterable[Finding]]] = {
     FindingCode.MIRRORED: met_by_a_member(lambda s: s.top.link("L", s.bolt, ScaleVector=(-1.0, 1.0, 1.0))),
     FindingCode.VARIANT: met_by_a_member(variant),
     FindingCode.DRAFT_ARRAY: met_by_a_member(draft_array),
+    FindingCode.ARRAY_SIZE: met_by_a_member(
+        lambda s: s.top.add("Part::FeaturePython", "Array", Base=s.top.link("Base", s.bolt), Count=0)
+    ),
+    FindingCode.CONSUMED: met_by_a_member(consumed),
+    FindingCode.NO_HARDWARE: no_hardware,
+    FindingCode.SAME_ARTICLE: met_by_a_member(
+        lambda s: s.top.folder("F", screw(s.top, "A", Type="DIN933"), screw(s.top, "B", Type="ISO4017"))
+    ),
+    FindingCode.COUNTED_BESIDE: counted_beside,
+    FindingCode.UNKNOWN_LINK_TYPE: met_by_a_member(
+        lambda s: s.top.add("Part::LinkSpiral", "L", LinkedObject=s.bolt, ElementCount=3)
+    ),
+    FindingCode.NEWER_FREECAD: newer,
     FindingCode.LOCAL_GEOMETRY: met_by_a_member(lambda s: s.top.body("Local")),
     FindingCode.FOREIGN_COMPONENT: met_by_a_member(
         lambda s: s.top.add("Part::FeaturePython", "b_Bolt", sourceFile="b.FCStd", a2p_Version="0.4")
@@ -154,6 +195,7 @@ BLOCKING = {
     FindingCode.LOST_ASSEMBLY,
     FindingCode.CYCLE,
     FindingCode.TOO_DEEP,
+    FindingCode.ARRAY_SIZE,
 }
 
 

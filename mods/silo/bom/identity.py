@@ -34,19 +34,28 @@ def _text(value: object) -> str | None:
 
 def identity_of(obj: object) -> str | None:
     """The Silo UUID of a component (the real part or assembly, not a link to it); None while unregistered."""
+    return own_identity(obj) or document_identity(getattr(obj, "Document", None))
+
+
+def own_identity(obj: object) -> str | None:
+    """The identity that is written for this very object, not for its document."""
     for name in ("SiloItemId", "SiloUUID"):
         if found := _text(own(obj, name)):
             return found
-    doc = getattr(obj, "Document", None)
+    name = object_name(obj)
+    return _text(_meta(getattr(obj, "Document", None)).get(meta_key(name))) if name else None
+
+
+def document_identity(doc: object) -> str | None:
+    """The identity that is written for a whole document."""
     if doc is None:
         return None
+    return _text(document_property(doc, "SiloUUID")) or _text(_meta(doc).get(META_KEY))
+
+
+def _meta(doc: object) -> Mapping[str, str]:
     meta = getattr(doc, "Meta", None)
-    known: Mapping[str, str] = meta if isinstance(meta, Mapping) else {}
-    return (
-        _text(known.get(meta_key(object_name(obj))))
-        or _text(document_property(doc, "SiloUUID"))
-        or _text(known.get(META_KEY))
-    )
+    return meta if isinstance(meta, Mapping) else {}
 
 
 def walk_entries(entries: Iterable[BomEntry]) -> Iterator[BomEntry]:

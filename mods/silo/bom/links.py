@@ -15,20 +15,23 @@ together. It walks live FreeCAD objects, objects read from FCStd files and the t
 from __future__ import annotations
 
 import os.path
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
 
 from silo.bom.document import NAMELESS, label_of, object_name
 from silo.bom.findings import Finding, FindingCode, Place
-from silo.bom.identity import identity_findings, identity_of
+from silo.bom.identity import identity_findings, identity_of, walk_entries
 from silo.bom.model import BomEntry, Extraction
-from silo.bom.roots import links_beside
-from silo.bom.walk.contents import Count, Key, Lost, Reader
+from silo.bom.roots import Whole, as_it_is, beside, loose_hardware
+from silo.bom.walk.arrays import is_array
+from silo.bom.walk.contents import Reader
+from silo.bom.walk.counts import Count, Key, Lost
 from silo.bom.walk.kinds import is_container, is_named_assembly
 from silo.bom.walk.notes import Notes
 from silo.bom.walk.rings import Rings
-from silo.bom.walk.targets import Inspect, is_array, resolve_target
+from silo.bom.walk.standard import same_articles, standard_uuid
+from silo.bom.walk.targets import Inspect, resolve_target
 
 # Real assemblies are some ten levels deep; deeper is an attack or a loop that no other guard saw.
 MAX_LEVELS = 64
@@ -51,6 +54,8 @@ def extract(
     level: int = 1,
     inspect: Inspect | None = None,
     canonical: Canonical | None = None,
+    whole: Whole = as_it_is,
+    hardware: bool = True,
 ) -> Extraction:
     """Walk an assembly.
 
@@ -58,8 +63,12 @@ def extract(
         tells why a live link has no target; links read from FCStd files know it themselves.
     canonical
         makes one path of the several that may name one file (``os.path.realpath`` for live documents).
+    whole
+        gives a document with all its objects for one that FreeCAD loaded in part.
+    hardware
+        False leaves standard parts out.
     """
-    walker = _Walker(inspect, canonical)
+    walker = _Walker(inspect, canonical, whole, hardware)
     top = assembly_obj
     entries: tuple[BomEntry, ...] = ()
     target = resolve_target(top, inspect)
@@ -72,18 +81,36 @@ def extract(
     if entries or walker.notes.any_blocking():
         walker.notes.container(top)
     else:
-        walker.notes.empty(head)
-    walker.notes.beside(links_beside(top, inspect))
+        walker.notes.empty(head, walker.modelled_in(top))
+    walker.notes.beside(beside(top, walker.silent), empty=not entries)
+    for one, other in same_articles_of(walk_entries(entries)):
+        walker.notes.same_article(one, other)
     findings = (*walker.notes.findings(), *identity_findings([replace(head, children=entries)]))
     return Extraction(assembly=head, entries=entries, findings=findings)
 
 
+def same_articles_of(entries: Iterable[BomEntry]) -> list[tuple[BomEntry, BomEntry]]:
+    """Standard parts that are one article under two standards."""
+    known = {entry.standard: entry for entry in entries if entry.standard}
+    return [(known[one], known[other]) for one, other in same_articles(known)]
+
+
 class _Walker:
-    def __init__(self, inspect: Inspect | None, canonical: Canonical | None) -> None:
+    def __init__(
+        self, inspect: Inspect | None, canonical: Canonical | None, whole: Whole, hardware: bool
+    ) -> None:
         self._canonical = canonical
         self._paths: dict[str, str] = {}
         self.notes = Notes(self._path)
-        self._reader = Reader(self.notes, self.key, inspect)
+        # For a look at what is not counted, which is nobody's business twice.
+        self.silent = Reader(Notes(self._path), self.key, inspect, hardware=hardware)
+        self._reader = Reader(
+            self.notes,
+            self.key,
+            inspect,
+            beside=lambda container: loose_hardware(container, self.silent, whole) if hardware else (),
+            hardware=hardware,
+        )
         self._rings = Rings({})
         self._memo: dict[tuple[Key, int, Key], tuple[BomEntry, ...]] = {}
         self._heads: dict[Key, BomEntry] = {}
@@ -102,7 +129,7 @@ class _Walker:
         """
         if isinstance(obj, Lost):
             return (self._canonical_path(obj.file), obj.name)
-        path, name = key = self.key(obj)
+        path, name = key = self._reader.component(obj)
         if not path or not name.startswith(NAMELESS):
             return key
         shown = self._nameless.setdefault(id(obj.Document), [])
@@ -110,6 +137,10 @@ class _Walker:
         if place == len(shown):
             shown.append(obj)
         return (path, f"{NAMELESS}{place + 1}" if place else "")
+
+    def modelled_in(self, top: Any) -> int:
+        """How many objects are modelled in an assembly's own file."""
+        return len(self._reader.contents(top).local)
 
     def _path(self, obj: Any) -> str:
         return self._canonical_path(getattr(getattr(obj, "Document", None), "FileName", "") or "")
@@ -128,10 +159,14 @@ class _Walker:
             stem = os.path.splitext(os.path.basename(path.replace("\\", "/")))[0]
             return BomEntry(path, object_name=name, missing=True, label=obj.label, document_label=stem)
         if key not in self._heads:
+            standard, registered = self._reader.standard(obj)
+            if standard and not registered:  # where it first occurs
+                path, name = self.key(obj)
             self._heads[key] = BomEntry(
                 doc_path=path,
-                silo_uuid=identity_of(obj),
+                silo_uuid=standard_uuid(standard) if standard and not registered else identity_of(obj),
                 object_name=name,
+                standard=standard or None,
                 label=label_of(obj),
                 document_label=getattr(getattr(obj, "Document", None), "Label", "") or "",
                 is_assembly=is_named_assembly(obj),
@@ -150,7 +185,11 @@ class _Walker:
         for _ in range(MAX_LEVELS):
             below: dict[Key, Any] = {}
             for key, container in layer.items():
+                self.notes.newer(container.Document)
                 counts = self._reader.contents(container).counts
+                for count in counts:
+                    if not isinstance(count.target, Lost) and self._reader.standard(count.target)[0]:
+                        self.entry_for(count.target)  # the top's own screws come first
                 targets = {self.component(count.target): count.target for count in counts}
                 held = {name: target for name, target in targets.items() if self._is_container(name, target)}
                 holds[key] = sorted(held)

@@ -12,12 +12,9 @@ from dataclasses import dataclass, field, fields
 from typing import Any, TypeVar
 
 from silo.bom.findings import Finding, FindingCode, Place, Severity
-from silo.bom.walk.standard import standard_uuid
+from silo.bom.walk.standard import STANDARD_PARTS, standard_uuid
 
 T = TypeVar("T")
-
-# Stands in the place of the file in the key of a standard part, whose designation is all that it is.
-STANDARD_PARTS = "standard part:"
 
 
 class Frozen(tuple[T, ...]):

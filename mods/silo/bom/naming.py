@@ -25,6 +25,7 @@ _HUMP = re.compile(r"(?<=[a-z])(?=[A-Z])")
 _GENERIC = re.compile(
     r"(?:body|part|assembly|model|unnamed|link|compound|solid|fusion|cut)[ _]?\d*$", re.IGNORECASE
 )
+_STANDARD_WORDS = ("fastener", "screw", "hardware", "standard part", "purchased", "bought")
 # In the order of preference, for components whose name fits no category.
 _PART_WORDS = ("part", "machin", "custom", "manufactur", "component", "mechanic")
 
@@ -59,6 +60,8 @@ def proposed_name(entry: BomEntry, *, shares_file: bool = False) -> str:
     FreeCAD makes a document's label from its file's name; only one that a person chose (it differs) stands
     before an object's own label. Where a file gives several components, the object's label tells them apart.
     """
+    if entry.standard:
+        return entry.standard
     of_document, of_object = clean_name(entry.document_label), clean_name(entry.label)
     stem = clean_name(os.path.splitext(os.path.basename(entry.doc_path))[0])
     chosen = of_document not in ("", stem)
@@ -68,7 +71,12 @@ def proposed_name(entry: BomEntry, *, shares_file: bool = False) -> str:
 
 
 def display_name(entry: BomEntry) -> str:
-    """What to call a component before people: its own label, or its document's where that says nothing."""
+    """What to call a component before people: its own label, or its document's where that says nothing.
+
+    A standard part is called by its designation.
+    """
+    if entry.standard:
+        return entry.standard
     label = clean_name(entry.label)
     return label if label and not _GENERIC.match(label) else clean_name(entry.document_label) or label
 
@@ -88,6 +96,10 @@ def proposed_category(entry: BomEntry, name: str, categories: Mapping[str, str])
     fitting = [code for code in categories if (code in of_assemblies) == entry.is_assembly]
     if not fitting:
         return next(iter(categories), "")
+    for wanted in _STANDARD_WORDS if entry.standard else ():
+        for code in fitting:
+            if wanted in categories[code].casefold():
+                return code
     words = _stems(name)
     scored = [(len(words & _stems(categories[code])), code) for code in fitting]
     best = max(score for score, _ in scored)

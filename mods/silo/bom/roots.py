@@ -8,17 +8,40 @@ no container. An Assembly4 ``Parts`` folder beside the model holds spares and is
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from silo.bom.document import derived, label_of, object_name, own, same_document
 from silo.bom.errors import InputError
-from silo.bom.walk.kinds import COMPONENTS, INLINE, Kind, flattened, is_assembly3, kind_of, no_component
-from silo.bom.walk.targets import Inspect, first_of, is_assembly_link, is_excluded, is_link, resolve_target
+from silo.bom.walk.arrays import left_out_by
+from silo.bom.walk.consumed import consumed
+from silo.bom.walk.contents import Reader
+from silo.bom.walk.kinds import (
+    COMPONENTS,
+    INLINE,
+    REPEATERS,
+    Kind,
+    flattened,
+    is_assembly3,
+    is_named_assembly,
+    kind_of,
+    sources,
+)
+from silo.bom.walk.notes import Notes
+from silo.bom.walk.targets import first_of, is_assembly_link
 
 # What to do where a document holds several assemblies. The window says it in words of its own.
 NAME_ONE = "Name the one that is meant (--assembly NAME)."
 
+# The rank of a part that holds no components; what it holds makes it likelier.
+_HOLDS_NOTHING = 4
+# What may show components of other files, standard parts or declared ones.
+_SHOWING = COMPONENTS | REPEATERS | {Kind.STANDARD, Kind.ELEMENT, Kind.LOCAL, Kind.FOREIGN, Kind.CONTAINER}
+_LOOSE = COMPONENTS | REPEATERS | {Kind.LINK_GROUP, Kind.FOREIGN, Kind.STANDARD}
+_HARDWARE = REPEATERS | {Kind.LINK, Kind.LINK_GROUP, Kind.STANDARD}
+_BESIDE = COMPONENTS | REPEATERS | {Kind.LINK_GROUP, Kind.STANDARD, Kind.CONTAINER, Kind.LOCAL, Kind.FOREIGN}
+
+Whole = Callable[[Any], Any]
 _CONTAINERS = frozenset({Kind.CONTAINER, Kind.LINK_GROUP, Kind.ASSEMBLY_LINK})
 _FOLDERS = frozenset({Kind.FOLDER})
 
@@ -48,7 +71,7 @@ def _members_of(objects: Iterable[Any], kinds: frozenset[Kind]) -> set[str]:
     return names
 
 
-def _rank(obj: Any) -> int | None:
+def _rank(obj: Any, reader: Reader) -> int | None:
     if derived(obj, "Assembly::AssemblyObject"):
         return 0
     if is_assembly3(obj):
@@ -57,11 +80,24 @@ def _rank(obj: Any) -> int | None:
         return None
     if own(obj, "Type") == "Assembly":
         return 1
-    return 2 if _holds_components(obj) else 3
+    return _HOLDS_NOTHING - _holds(obj, reader)
 
 
-def _holds_components(obj: Any) -> bool:
-    return any(kind in COMPONENTS for _, _, kind in flattened(obj, id))
+def _holds(container: Any, reader: Reader) -> int:
+    """2 for components of other files, 1 for standard or declared parts only, 0 for neither."""
+    shows_others = False
+    for _, obj, kind in flattened(container, id):
+        if kind in COMPONENTS:
+            target = first_of(getattr(obj, "LinkedObject", None))
+            # A broken link stands for a component as well.
+            if target is None or not same_document(target.Document, container.Document):
+                return 2
+        shows_others = shows_others or kind in _SHOWING
+    if not shows_others:
+        return 0
+    brought = reader.contents(container).counts
+    far = any(not same_document(count.target.Document, container.Document) for count in brought)
+    return 2 if far else 1 if brought else 0
 
 
 def find_assemblies(document: Any) -> list[Any]:
@@ -73,15 +109,23 @@ def _candidates(document: Any) -> list[tuple[tuple[int, bool], Any]]:
     objects = list(getattr(document, "Objects", ()) or ())
     inner = _members_of(objects, _CONTAINERS)
     in_folders = _members_of(objects, _FOLDERS)
+    reader = _silent_reader()
     found = []
     for obj in objects:
         name = object_name(obj)
-        if name in inner or (rank := _rank(obj)) is None:
+        if name in inner or (rank := _rank(obj, reader)) is None:
             continue
         # People sort assemblies into folders too; a plain part in a folder is a spare.
         if name not in in_folders or rank < 2:
             found.append(((rank, name in in_folders), obj))
     return sorted(found, key=lambda candidate: candidate[0])
+
+
+def _silent_reader() -> Reader:
+    def path_of(obj: Any) -> str:
+        return getattr(getattr(obj, "Document", None), "FileName", "") or ""
+
+    return Reader(Notes(path_of), lambda obj: (path_of(obj), object_name(obj)), None)
 
 
 def choose_assembly(document: Any, name: str | None = None) -> Any:
@@ -94,17 +138,33 @@ def choose_assembly(document: Any, name: str | None = None) -> Any:
     """
     if name is not None:
         return _named(document, name)
+    likely = _likely(document)
+    if len(likely) > 1:
+        raise InputError(f"{_file(document)} holds {len(likely)} assemblies: {_told(likely)}. {NAME_ONE}")
+    return likely[0] if likely else _root_or_part(document)
+
+
+def _likely(document: Any) -> list[Any]:
+    """The containers that may be the assembly: real assemblies, and parts that hold components."""
+    found = _candidates(document)
+    if not found or found[0][0][0] > _HOLDS_NOTHING - 2:
+        return []
+    reader = _silent_reader()
+    best = [obj for standing, obj in found if standing == found[0][0]]
+    return [obj for obj in best if _holds(obj, reader) == 2] or best
+
+
+def _root_or_part(document: Any) -> Any:
+    """The one part of a file that has nothing else to count, or the document itself."""
     found = _candidates(document)
     best = [obj for standing, obj in found if standing == found[0][0]]
-    if best and found[0][0][0] < 3:
-        likely = [obj for obj in best if _holds_components(obj)] or best
-        if len(likely) > 1:
-            raise InputError(f"{_file(document)} holds {len(likely)} assemblies: {_told(likely)}. {NAME_ONE}")
-        return likely[0]
-    loose = _loose_links(document)
-    if loose or not best:
-        return DocumentRoot(document, loose)
-    return best[0]
+    loose = _loose(document, _LOOSE)
+    holds_hardware = bool(found) and found[0][0][0] < _HOLDS_NOTHING
+    if best and not loose and (len(best) == 1 or not holds_hardware):
+        return best[0]
+    parts = best if holds_hardware else []
+    group = loose if loose or parts else _loose(document, frozenset({Kind.LOCAL}))
+    return DocumentRoot(document, [*parts, *group])
 
 
 def _file(document: Any) -> str:
@@ -129,37 +189,110 @@ def _named(document: Any, name: str) -> Any:
     raise InputError(f"{_file(document)} has no assembly named {name!r}; it has: {_told(containers)}.")
 
 
-def _loose_links(document: Any) -> list[Any]:
+def _loose(document: Any, kinds: frozenset[Kind]) -> list[Any]:
+    """The objects of these kinds that lie in no container, no Body and no feature."""
     objects = list(getattr(document, "Objects", ()) or ())
     inner = _members_of(objects, _CONTAINERS)
-    wanted = (*COMPONENTS, Kind.LINK_GROUP, Kind.DRAFT_ARRAY, Kind.FOREIGN)
-    return [obj for obj in objects if object_name(obj) not in inner and kind_of(obj) in wanted]
+    found = [obj for obj in objects if object_name(obj) not in inner and kind_of(obj) in kinds]
+    if kinds.isdisjoint({Kind.LOCAL, Kind.STANDARD}):
+        return found
+    local = [obj for obj in objects if kind_of(obj) is Kind.LOCAL]
+    eaten = consumed(local, object_name)
+    inside = {object_name(one) for obj in local for one in own(obj, "Group") or ()}
+    return [
+        obj
+        for obj in found
+        if kind_of(obj) is not Kind.LOCAL
+        or (object_name(obj) not in eaten and object_name(obj) not in inside)
+    ]
 
 
-def links_beside(top: Any, inspect: Inspect | None = None) -> list[Any]:
-    """Links to components of other files that lie in the document of ``top``, but in no container at all.
+def as_it_is(document: Any) -> Any:
+    """A document that is there with all its objects."""
+    return document
 
-    They are not counted, and nobody may have noticed. What lies in folders are spares; links that other links
-    or arrays of the document show are their sources.
+
+def _sources_of(objects: Sequence[Any]) -> set[str]:
+    """Names of the objects that links, arrays and compounds of the document show."""
+    names = set()
+    for obj in objects:
+        kind = kind_of(obj)
+        if kind in COMPONENTS:
+            shown = [first_of(getattr(obj, "LinkedObject", None))]
+        elif kind in (Kind.DRAFT_ARRAY, Kind.COMPOUND):
+            shown = sources(obj)
+        else:
+            continue
+        names |= {
+            object_name(one) for one in shown if one is not None and same_document(one.Document, obj.Document)
+        }
+    return names
+
+
+def loose_hardware(container: Any, reader: Reader, whole: Whole = as_it_is) -> list[Any]:
+    """Standard parts beside an assembly, which can only belong to it: it is the one assembly of its file.
+
+    Single ones, arrays, compounds and links of them, also in folders. What other objects of the document
+    show are sources, and what lies in Assembly4's folder ``Parts`` are spares.
+    """
+    if isinstance(container, DocumentRoot) or getattr(container, "is_document_root", False):
+        return []
+    document = whole(container.Document)
+    objects = list(getattr(document, "Objects", ()) or ())
+    if not any(kind_of(obj) is Kind.STANDARD for obj in objects):
+        return []
+    spares = [obj for obj in objects if object_name(obj) == "Parts" and kind_of(obj) is Kind.FOLDER]
+    inside = _members_of(objects, _CONTAINERS) | _members_of(spares, _FOLDERS) | _sources_of(objects)
+    loose = [obj for obj in objects if kind_of(obj) in _HARDWARE and object_name(obj) not in inside]
+    loose = [obj for obj in loose if _is_hardware(obj, reader)]
+    if not loose:
+        return []
+    likely = _likely(document)
+    is_the_one = len(likely) == 1 and object_name(likely[0]) == object_name(container)
+    return loose if is_the_one else []
+
+
+def _is_hardware(obj: Any, reader: Reader) -> bool:
+    brought = reader.brings(obj)
+    return bool(brought) and all(
+        kind_of(one) is Kind.STANDARD and same_document(one.Document, obj.Document) for one in brought
+    )
+
+
+def beside(top: Any, reader: Reader) -> list[Any]:
+    """What lies in the document of ``top``, but in no container, and holds components.
+
+    It is not counted, and nobody may have noticed. What lies in folders are spares; what other objects of the
+    document show are their sources; another assembly has a BOM of its own.
     """
     objects = list(getattr(getattr(top, "Document", None), "Objects", ()) or ())
     if not objects or isinstance(top, DocumentRoot) or is_assembly3(top):
         return []
     inside = _members_of(objects, _CONTAINERS | _FOLDERS)
-    loose = [obj for obj in objects if object_name(obj) not in inside and kind_of(obj) in COMPONENTS]
+    loose = [
+        obj
+        for obj in objects
+        if object_name(obj) not in inside
+        and kind_of(obj) in _BESIDE
+        and not (object_name(obj) == object_name(top) or is_named_assembly(obj))
+    ]
     if not loose:
         return []
-    sources = {id(first_of(getattr(obj, "LinkedObject", None))) for obj in objects if is_link(obj)}
-    sources |= {id(first_of(own(obj, "Base"))) for obj in objects if kind_of(obj) is Kind.DRAFT_ARRAY}
-    return [obj for obj in loose if id(obj) not in sources and _counts(obj, inspect)]
+    shown = _sources_of(objects)
+    counted = {object_name(obj) for obj in loose_hardware(top, reader)}
+    return [
+        obj
+        for obj in loose
+        if object_name(obj) not in shown | counted
+        and not _holds_object(obj, top)
+        and not left_out_by(obj)
+        and reader.brings(obj)
+    ]
 
 
-def _counts(link: Any, inspect: Inspect | None) -> bool:
-    if own(link, "Suppressed") is True or is_excluded(link):
-        return False
-    target = resolve_target(link, inspect)
-    return (
-        target.obj is not None
-        and not (target.element or target.excluded or no_component(target.obj))
-        and not same_document(target.obj.Document, link.Document)
+def _holds_object(container: Any, obj: Any) -> bool:
+    """True where the chosen assembly lies in this container, which then is not beside it."""
+    wanted = object_name(obj)
+    return kind_of(container) in INLINE and any(
+        name == wanted for name, _, _ in flattened(container, object_name)
     )

@@ -11,9 +11,10 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Iterable
 from typing import Any
 
-from silo.bom.document import label_of
-from silo.bom.walk.kinds import COMPONENTS, kind_of
-from silo.bom.walk.targets import array_count, first_of, is_array, is_assembly_link, is_link, resolve_target
+from silo.bom.document import label_of, same_document
+from silo.bom.walk.arrays import array_count, is_array
+from silo.bom.walk.kinds import COMPONENTS, Kind, kind_of
+from silo.bom.walk.targets import first_of, is_assembly_link, is_link, resolve_target
 
 
 def stale_copies(link: Any, assembly: Any, key: Callable[[Any], Hashable]) -> tuple[list[str], list[str]]:
@@ -24,9 +25,9 @@ def stale_copies(link: Any, assembly: Any, key: Callable[[Any], Hashable]) -> tu
     assembly
         what it stands for in the end.
     """
-    source = first_of(getattr(link, "LinkedObject", None))
-    originals = list(_group(source if is_assembly_link(source) else assembly))
-    copies = [copy for copy in _group(link) if kind_of(copy) in COMPONENTS]
+    originals = _originals(link, assembly)
+    own = {key(part) for part in own_parts(link, assembly, key)}
+    copies = [copy for copy in _group(link) if kind_of(copy) in COMPONENTS and key(copy) not in own]
     if not copies:  # never recomputed: nothing is shown, so nothing is wrong
         return [], []
     by_key = {key(original): original for original in originals}
@@ -47,6 +48,34 @@ def stale_copies(link: Any, assembly: Any, key: Callable[[Any], Hashable]) -> tu
         if name not in shown and kind_of(original) in COMPONENTS
     ]
     return sorted(gone), sorted(lacking)
+
+
+def own_parts(link: Any, assembly: Any, key: Callable[[Any], Hashable]) -> list[Any]:
+    """What somebody put into a flexible AssemblyLink himself: standard parts, and links that are no copies.
+
+    A copy leads to an object of the assembly's file, most often a link. A link array of FreeCAD 1.1 leads to
+    the part itself, so an array is taken for a copy.
+    """
+    source = first_of(getattr(link, "LinkedObject", None))
+    documents = [one.Document for one in (assembly, source) if one is not None]
+    originals = {key(one) for one in _originals(link, assembly)}
+    parts = []
+    for member in _group(link):
+        kind = kind_of(member)
+        if kind is Kind.STANDARD:
+            parts.append(member)
+        elif kind in COMPONENTS and not is_array(member):
+            end = first_of(getattr(member, "LinkedObject", None))
+            if end is None or key(end) in originals or is_link(end) or is_assembly_link(end):
+                continue
+            if not any(same_document(end.Document, document) for document in documents):
+                parts.append(member)
+    return parts
+
+
+def _originals(link: Any, assembly: Any) -> list[Any]:
+    source = first_of(getattr(link, "LinkedObject", None))
+    return list(_group(source if is_assembly_link(source) else assembly))
 
 
 def _group(container: Any) -> Iterable[Any]:

@@ -12,7 +12,8 @@ from enum import Enum, auto
 from typing import Any, TypeVar
 
 from silo.bom.document import derived, object_name, own
-from silo.bom.walk.targets import is_assembly_link, is_link
+from silo.bom.walk.standard import fastener_type, is_tool
+from silo.bom.walk.targets import first_of, is_assembly_link, is_link
 
 T = TypeVar("T", bound=Hashable)
 
@@ -25,7 +26,11 @@ class Kind(Enum):
     LINK_GROUP = auto()  # a bundle of links: its ElementList counts
     CONTAINER = auto()  # an inline part or assembly: what it holds counts in the parent
     FOLDER = auto()  # a plain folder: its content is flattened into the parent's Group already
+    ELEMENT = auto()  # one element of a link array that was put into a group
     DRAFT_ARRAY = auto()  # Count instances of Base
+    COMPOUND = auto()  # shows its Links, which stand for nothing of their own beside it
+    COPY = auto()  # a clone or a mirror image: shows its originals once more
+    STANDARD = auto()  # a standard part of the Fasteners workbench
     FOREIGN = auto()  # a part of another add-on, with its shape inside and no link
     LOCAL = auto()  # geometry modelled in this very file
     NOTHING = auto()  # joints, sheets, sketches, datums, variables
@@ -33,6 +38,8 @@ class Kind(Enum):
 
 COMPONENTS = frozenset({Kind.LINK, Kind.ASSEMBLY_LINK})
 INLINE = frozenset({Kind.LINK_GROUP, Kind.CONTAINER, Kind.FOLDER})
+# Objects that show others of the same file, maybe several times.
+REPEATERS = frozenset({Kind.DRAFT_ARRAY, Kind.COMPOUND, Kind.COPY})
 
 _NO_FOLDERS = (
     "Assembly::JointGroup",
@@ -41,6 +48,8 @@ _NO_FOLDERS = (
     "Assembly::SnapshotGroup",
     "Assembly::SimulationGroup",
 )
+# Draft arrays without links have no count before FreeCAD 1.0, those along paths and points have no type.
+_ARRAY_MARKS = ("Count", "ArrayType", "PathObject", "PointObject")
 _NO_GEOMETRY = ("Part::Part2DObject", "Part::Datum", "PartDesign::SubShapeBinder", "App::DatumElement")
 _GEOMETRY = ("Part::Feature", "Mesh::Feature", "Points::Feature")
 # What a link may point at without meaning a component, in words for people. (A binder has a shape.)
@@ -86,15 +95,43 @@ def kind_of(obj: object) -> Kind:
         return _python_kind(obj)
     if any(derived(obj, name) for name in _NO_GEOMETRY):
         return Kind.NOTHING
+    if derived(obj, "Part::Compound"):
+        return Kind.COMPOUND
+    if derived(obj, "Part::Mirroring"):
+        return Kind.COPY
+    if derived(obj, "App::LinkElement"):
+        return Kind.ELEMENT
+    if kind := _standard_kind(obj):
+        return kind
     return Kind.LOCAL if any(derived(obj, name) for name in _GEOMETRY) else Kind.NOTHING
 
 
 def _python_kind(obj: object) -> Kind:
-    if has_own(obj, "Base", "Count"):
+    if has_own(obj, "Base") and any(has_own(obj, name) for name in _ARRAY_MARKS):
         return Kind.DRAFT_ARRAY
     if has_own(obj, "sourceFile", "a2p_Version"):
         return Kind.FOREIGN
-    return Kind.CONTAINER if is_assembly3(obj) else Kind.LOCAL
+    if is_assembly3(obj):
+        return Kind.CONTAINER
+    if has_own(obj, "Objects") and (has_own(obj, "Fuse") or has_own(obj, "Scale")):
+        return Kind.COPY  # a Draft clone
+    return _standard_kind(obj) or Kind.LOCAL
+
+
+def _standard_kind(obj: object) -> Kind | None:
+    kind = fastener_type(obj)
+    if not kind:
+        return None
+    return Kind.NOTHING if is_tool(kind) else Kind.STANDARD
+
+
+def sources(repeater: object) -> list[Any]:
+    """The objects that an array, a compound or a copy shows."""
+    for name in ("Base", "Links", "Objects", "Source"):
+        if (found := own(repeater, name)) is not None:
+            several = found if isinstance(found, list) or name in ("Links", "Objects") else (found,)
+            return [source for one in several if (source := first_of(one)) is not None]
+    return []
 
 
 def is_assembly3(obj: object) -> bool:
@@ -119,11 +156,17 @@ def members(container: object) -> Iterable[Any]:
     return group
 
 
-def flattened(container: object, key: Callable[[Any], T]) -> Iterator[tuple[T, Any, Kind]]:
+def _shows_all(_obj: object, _kind: Kind) -> bool:
+    return False
+
+
+def flattened(
+    container: object, key: Callable[[Any], T], closed: Callable[[Any, Kind], bool] = _shows_all
+) -> Iterator[tuple[T, Any, Kind]]:
     """Everything that lies in a container at any depth within its own file, each object once, with its key.
 
     Inline parts, groups and folders come before what they hold. Links are not followed. ``key`` tells objects
-    apart.
+    apart; ``closed`` says of an inner container that what it holds is its own affair.
     """
     seen: set[T] = set()
     open_containers = [iter(members(container))]
@@ -140,13 +183,15 @@ def flattened(container: object, key: Callable[[Any], T]) -> Iterator[tuple[T, A
         if kind is Kind.LINK_GROUP and object_name(obj).startswith("CopyOnChangeGroup"):
             continue
         yield name, obj, kind
-        if kind in INLINE:
+        if kind in INLINE and not closed(obj, kind):
             open_containers.append(iter(members(obj)))
 
 
 def is_container(obj: object) -> bool:
     """True where an object (the real one, no link) may hold components."""
     if derived(obj, "App::Part") or derived(obj, "App::LinkGroup") or is_assembly3(obj):
+        return True
+    if derived(obj, "Part::Feature") and kind_of(obj) in REPEATERS:
         return True
     # A Body keeps its features to itself; anything else with members may hold links.
     return not derived(obj, "Part::Feature") and bool(own(obj, "Group"))

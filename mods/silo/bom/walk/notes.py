@@ -6,6 +6,7 @@ A finding reads the same whatever the order in which its objects were met: place
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -28,6 +29,16 @@ _BROKEN_TEXT = {
     FindingCode.BROKEN_LINK: "A link has lost its target",
     FindingCode.LOST_ASSEMBLY: "{file} holds the assembly {obj}, which this FreeCAD is too old to load",
 }
+_KNOWN_LINKS = frozenset(
+    {
+        *("App::Link", "App::LinkPython", "Part::LinkArray", "Part::LinkArrayLinear", "Part::LinkArrayPolar"),
+        *("Part::LinkArrayCircular", "Part::LinkArrayPath", "Part::LinkArrayPoint"),
+        *("Assembly::AssemblyLink", "App::LinkElement", "App::LinkElementPython"),
+    }
+)
+# The newest FreeCAD of the test matrix.
+NEWEST_TESTED = (1, 1)
+_VERSION = re.compile(r"(\d+)\.(\d+)(?:\.\d+)?")
 _BY_OBJECT = (FindingCode.MISSING_OBJECT, FindingCode.LOST_ASSEMBLY)
 
 
@@ -50,6 +61,16 @@ class _Note:
             names = _names(list(dict.fromkeys(self.users[place] for place in where)))
             message = f"{message}; {self.tail.format(users=names)}."
         return Finding(code, self.severity, message, tuple(where))
+
+
+class _Whole:
+    """A document as the place of a finding."""
+
+    def __init__(self, document: Any) -> None:
+        self.Document = document
+        self.Name = ""
+        self.Label = getattr(document, "Label", "") or getattr(document, "FileName", "")
+        self.is_document_root = True
 
 
 class Notes:
@@ -126,9 +147,9 @@ class Notes:
             FindingCode.CYCLE,
             self._path_of(obj),
             Severity.ERROR,
-            f"{self._path_of(obj) or label_of(obj)} holds a group of links that contains itself",
+            f"{self._path_of(obj) or label_of(obj)} holds links that lead back to what holds them",
             obj,
-            "the ring is closed by {users}",
+            "the ring goes through {users}",
         )
 
     def too_deep(self, obj: Any, levels: int) -> None:
@@ -202,16 +223,83 @@ class Notes:
             f"links to {label_of(target)}, {words}: no component, not counted",
         )
 
-    def in_document(self, link: Any, target: Any, *, holds_components: bool) -> None:
-        if holds_components:
-            text = (
-                f"links to {label_of(target)} in this same file and is not counted, though that holds "
-                "components of other files; move it to a file of its own to count it"
+    def in_document(self, link: Any, target: Any, *, leads_back: bool = False) -> None:
+        """A link within the file that brings no component.
+
+        leads_back
+            to what holds the link, which FreeCAD cannot show.
+        """
+        what = "what holds it, and brings nothing" if leads_back else "construction geometry, not counted"
+        self._each(
+            FindingCode.IN_DOCUMENT_LINK,
+            link,
+            Severity.WARNING if leads_back else Severity.INFO,
+            f"links to {label_of(target)} in this same file: {what}",
+        )
+
+    def consumed(self, obj: Any, feature: Any) -> None:
+        self._each(
+            FindingCode.CONSUMED,
+            obj,
+            Severity.INFO,
+            f"is used up by {label_of(feature)} (a cut, a boolean or a fusion) and not counted",
+        )
+
+    def no_hardware(self, fastener: Any) -> None:
+        self._add(
+            FindingCode.NO_HARDWARE,
+            "",
+            Severity.INFO,
+            "Standard parts are left out, as the settings say",
+            fastener,
+            "not counted: {users}",
+        )
+
+    def same_article(self, one: BomEntry, other: BomEntry) -> None:
+        """One article under two standards."""
+        places = {Place(*(entry.doc_path, entry.object_name)): entry.label for entry in (one, other)}
+        self._notes[FindingCode.SAME_ARTICLE, f"{one.standard} {other.standard}"] = _Note(
+            Severity.INFO,
+            f"{one.standard} and {other.standard} are the same article under two standards: two lines.",
+            users=places,
+        )
+
+    def unknown_array(self, array: Any, base: Any) -> None:
+        self._each(
+            FindingCode.ARRAY_SIZE,
+            array,
+            Severity.ERROR,
+            f"is a Draft array of {label_of(base)} and does not say how many it shows; open it in FreeCAD, "
+            "recompute and save",
+        )
+
+    def link_type(self, link: Any) -> None:
+        """A type of link that no tested FreeCAD knows."""
+        kind = getattr(link, "TypeId", "")
+        if kind and kind not in _KNOWN_LINKS:
+            self._add(
+                FindingCode.UNKNOWN_LINK_TYPE,
+                kind,
+                Severity.WARNING,
+                f"The object type {kind} is not known; it looks like a link and was read as one",
+                link,
+                "check the quantity of {users}",
             )
-        else:
-            text = f"links to {label_of(target)} in this same file: construction geometry, not counted"
-        severity = Severity.WARNING if holds_components else Severity.INFO
-        self._each(FindingCode.IN_DOCUMENT_LINK, link, severity, text)
+
+    def newer(self, document: Any) -> None:
+        """A file that a FreeCAD saved which nothing here was tested with."""
+        saved_by = getattr(document, "ProgramVersion", "") or ""
+        found = _VERSION.match(saved_by)
+        if found and (int(found[1]), int(found[2])) > NEWEST_TESTED:
+            major, minor = NEWEST_TESTED
+            self._add(
+                FindingCode.NEWER_FREECAD,
+                "",
+                Severity.INFO,
+                f"Saved by FreeCAD {found[0]}, newer than {major}.{minor}, the newest tested",
+                _Whole(document),
+                "the files: {users}",
+            )
 
     def stale(self, link: Any, target: Any, gone: Sequence[str], new: Sequence[str]) -> None:
         parts = [f"no longer there: {_names(gone)}"] if gone else []
@@ -252,21 +340,43 @@ class Notes:
                 top,
             )
 
-    def empty(self, head: BomEntry) -> None:
-        self._notes[FindingCode.EMPTY_BOM, ""] = _Note(
-            Severity.WARNING,
-            f"{head.label} holds no components that are linked from other files, so its BOM is empty.",
-            users={Place(head.doc_path, head.object_name): head.label},
-        )
+    def empty(self, head: BomEntry, declarable: int = 0) -> None:
+        """``declarable``: objects modelled in the file itself, of which each could be a component."""
+        text = f"{head.label} holds no components that are linked from other files, so its BOM is empty."
+        if declarable:
+            what = "1 object is" if declarable == 1 else f"{declarable} objects are"
+            text += (
+                f" {what} modelled in the file itself: declare those that are parts to count them (Register "
+                "Parts in FreeCAD, or silo-mod register)."
+            )
+        place = Place(head.doc_path, head.object_name)
+        self._notes[FindingCode.EMPTY_BOM, ""] = _Note(Severity.WARNING, text, users={place: head.label})
 
-    def beside(self, links: Sequence[Any]) -> None:
-        """Links to other files that lie in the top document, but not in the assembly."""
-        for link in links:
+    def beside(self, objects: Sequence[Any], *, empty: bool = False) -> None:
+        """What lies in the top document, but not in the assembly, and holds components.
+
+        empty
+            the assembly holds none at all, so it may be the wrong one.
+        """
+        for obj in objects:
             self._add(
                 FindingCode.BESIDE_ASSEMBLY,
                 "",
-                Severity.WARNING,
-                "Components of other files lie in the document itself, beside the assembly",
-                link,
+                Severity.ERROR if empty else Severity.WARNING,
+                "Components lie in the document itself, beside the assembly"
+                + (", which holds none; move them into it, or name the one that is meant" if empty else ""),
+                obj,
                 "not counted: {users}",
+            )
+
+    def beside_counted(self, container: Any, objects: Sequence[Any]) -> None:
+        """Standard parts that lie beside an assembly, and can only belong to it."""
+        for obj in objects:
+            self._add(
+                FindingCode.COUNTED_BESIDE,
+                str(self._place(container)),
+                Severity.INFO,
+                f"Standard parts lie in the document beside {label_of(container)} and are counted with it",
+                obj,
+                "these are: {users}",
             )

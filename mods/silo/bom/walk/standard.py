@@ -23,6 +23,9 @@ from silo.bom.document import derived, own
 # The namespace of standard parts; it never changes, or every screw would become a new item.
 NAMESPACE = uuid.UUID("5d8d3a1e-6f0b-5c7a-9a54-2f1d7c0e4b36")
 
+# Stands in the place of the file in the key of a standard part, whose designation is all that it is.
+STANDARD_PARTS = "standard part:"
+
 _TYPES = ("Part::FeaturePython", "PartDesign::FeaturePython")
 # The add-on gives every fastener some of these beside its size.
 _TRAITS = ("Thread", "MatchOuter", "Invert", "Offset", "BaseObject", "LeftHanded", "LengthCustom")
@@ -207,24 +210,24 @@ def _fraction(length: Fraction) -> str:
     return " ".join([*parts, str(rest)] if rest else parts) + "in"
 
 
-def _millimetres(value: Any) -> float | None:
+def millimetres(value: Any) -> float | None:
     """A number; of a quantity of FreeCAD its value, which is in mm."""
     value = getattr(value, "Value", value)
     return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
 
 
 def _number(value: Any) -> str:
-    number = _millimetres(value)
+    number = millimetres(value)
     return "" if number is None else f"{round(number, 4):.4f}".rstrip("0").rstrip(".")
 
 
 def _is_positive(value: Any) -> bool:
-    number = _millimetres(value)
+    number = millimetres(value)
     return number is not None and number > 0
 
 
 def _is_several(value: Any) -> bool:
-    number = _millimetres(value)
+    number = millimetres(value)
     return number is not None and number > 1
 
 

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 from silo.bom.document import LinkProblem, derived, object_name, own, same_document
 from silo.bom.findings import FindingCode
 from silo.bom.paths import is_element_name, located, split_sub_name
+from silo.bom.walk.arrays import array_count, elements
 
 Inspect = Callable[[Any], "LinkProblem | None"]
 
@@ -75,18 +76,6 @@ def is_assembly_link(obj: object) -> bool:
     return derived(obj, "Assembly::AssemblyLink")
 
 
-def array_count(link: object) -> int:
-    """Instances of one link object: ``max(1, ElementCount)``, its elements not counted again."""
-    count = own(link, "ElementCount", 0)
-    return count if isinstance(count, int) and count > 0 else 1
-
-
-def is_array(link: object) -> bool:
-    """True for a link array, also one with a single element."""
-    count = own(link, "ElementCount", 0)
-    return isinstance(count, int) and count > 0
-
-
 def first_of(linked: Any) -> Any:
     """The object of a ``LinkedObject``, which is a tuple (object, sub-name) where there is a sub-name."""
     return linked[0] if isinstance(linked, tuple) else linked
@@ -118,11 +107,15 @@ def is_mirrored(link: object, index: int | None = None) -> bool:
     index
         of one element of an array; else any mirrored element tells.
     """
-    scales = tuple(own(link, "ScaleList") or ())
-    if any(_negative(vector) for vector in (scales if index is None else scales[index : index + 1])):
+    one = slice(None) if index is None else slice(index, index + 1)
+    if any(_negative(vector) for vector in tuple(own(link, "ScaleList") or ())[one]):
         return True
+    return _scaled_negative(link) or any(_scaled_negative(element) for element in elements(link)[one])
+
+
+def _scaled_negative(obj: object) -> bool:
     # FreeCAD keeps Scale and ScaleVector in step; a reader may know only one of them.
-    vector, scale = own(link, "ScaleVector"), own(link, "Scale")
+    vector, scale = own(obj, "ScaleVector"), own(obj, "Scale")
     if vector is not None and _components(vector) != (1.0, 1.0, 1.0):
         return _negative(vector)
     return isinstance(scale, int | float) and scale < 0
@@ -144,7 +137,9 @@ def _resolve(link: object, trail: _Trail) -> Target:
         if is_link(current):
             count *= array_count(current) if index is None else 1
             mirrored ^= is_mirrored(current, index)
-        elif not is_assembly_link(current) and not derived(current, "App::LinkElement"):
+        elif derived(current, "App::LinkElement"):
+            mirrored ^= _scaled_negative(current)
+        elif not is_assembly_link(current):
             return Target(current, count, mirrored, variant, excluded, element)
         trail.hops -= 1
         if trail.hops < 0:

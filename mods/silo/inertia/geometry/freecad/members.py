@@ -16,6 +16,9 @@ from silo.inertia.wording import listed
 Note = Callable[[str, str], None]
 """Takes a remark: its code, and a plain sentence."""
 
+MODELLED = (Kind.LOCAL, Kind.COMPOUND, Kind.COPY)
+"""Geometry that is modelled in the container's own file."""
+
 _CONSUMING = frozenset(
     [
         "Base",
@@ -46,8 +49,9 @@ def counted(container: Any, facts: Facts, note: Note) -> list[Any]:
     found = list(_flat(container, facts, note, set()))
     eaten = {name for member in found for name in _consumed(member)}
     left = [m for m in found if object_name(m) not in eaten or kind_of(m) is Kind.CONTAINER]
-    hidden = [m for m in left if kind_of(m) is Kind.LOCAL and own(m, "Visibility") is False]
-    shown = [m for m in left if kind_of(m) is Kind.LOCAL and own(m, "Visibility") is not False]
+    bodies = [m for m in left if kind_of(m) in MODELLED]
+    hidden = [m for m in bodies if own(m, "Visibility") is False]
+    shown = [m for m in bodies if own(m, "Visibility") is not False]
     if hidden and shown:
         names = listed([label_of(m) for m in hidden])
         note("hidden", f"bodies hidden beside visible ones are not counted: {names}")
@@ -69,7 +73,7 @@ def _flat(container: Any, facts: Facts, note: Note, seen: set[str]) -> Iterable[
             )
         elif kind is Kind.FOLDER:
             yield from _flat(member, facts, note, seen)
-        elif kind in (Kind.LOCAL, Kind.FOREIGN):
+        elif kind in (*MODELLED, Kind.FOREIGN, Kind.STANDARD):
             if facts.shape(member) is not None:
                 yield member
             elif derived(member, "Mesh::Feature"):
@@ -80,7 +84,7 @@ def _flat(container: Any, facts: Facts, note: Note, seen: set[str]) -> Iterable[
 
 def _consumed(feature: Any) -> Iterable[str]:
     """Names of the objects that a feature takes its shape from."""
-    if kind_of(feature) not in (Kind.LOCAL, Kind.DRAFT_ARRAY):
+    if kind_of(feature) not in (*MODELLED, Kind.DRAFT_ARRAY):
         return
     for name in getattr(feature, "PropertiesList", ()):
         if name in _CONSUMING or (name == "Group" and derived(feature, "PartDesign::Boolean")):

@@ -27,7 +27,7 @@ from silo.bom.report import relative
 from silo.bom.walk.kinds import Kind, is_container, is_named_assembly, kind_of
 from silo.bom.walk.targets import is_assembly_link, is_link
 from silo.inertia.geometry.freecad.facts import Facts, element_places, file_of, link_placement, scale
-from silo.inertia.geometry.freecad.members import child_named, counted, steps_of
+from silo.inertia.geometry.freecad.members import MODELLED, child_named, counted, steps_of
 from silo.inertia.geometry.freecad.stated_materials import NOTHING, Material
 from silo.inertia.geometry.graph import MAX_DEPTH, Child, Floats, Node
 
@@ -93,7 +93,7 @@ class Walk:
 
     def _container(self, key: str, obj: Any, moved: dict[str, Floats]) -> None:
         found = counted(obj, self.facts, self.note)
-        shapes = [member for member in found if kind_of(member) in (Kind.LOCAL, Kind.FOREIGN)]
+        shapes = [member for member in found if kind_of(member) in (*MODELLED, Kind.FOREIGN)]
         materials = {self.facts.material(member) for member in shapes}
         own_material = self.facts.material(obj)
         one_piece = len(shapes) == len(found) and (own_material != NOTHING or len(materials) <= 1)

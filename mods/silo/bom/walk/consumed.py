@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Which objects a feature makes its shape of: the tool of a cut, the operands of a boolean or a fusion.
+
+People subtract screws from parts to make holes, and nuts to make pockets. Such an object is no piece to buy.
+Compounds, clones and arrays show what they hold and consume nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterable, Iterator
+from typing import Any, TypeVar
+
+from silo.bom.document import derived, own
+
+T = TypeVar("T", bound=Hashable)
+
+_OPERANDS = ("Base", "Tool", "Shapes", "Source", "Sections", "Spine", "Profile", "BaseFeature")
+_BY_PYTHON = ("Tool", "Subtractions")
+
+
+def consumed(objects: Iterable[Any], key: Callable[[Any], T]) -> dict[T, Any]:
+    """What these features (of kind LOCAL) consume: key → the feature."""
+    eaten: dict[T, Any] = {}
+    for feature in _features(objects):
+        for operand in _operands(feature):
+            eaten.setdefault(key(operand), feature)
+    return eaten
+
+
+def _features(objects: Iterable[Any]) -> Iterator[Any]:
+    for obj in objects:
+        yield obj
+        if derived(obj, "PartDesign::Body"):
+            yield from own(obj, "Group") or ()
+
+
+def _operands(feature: Any) -> Iterator[Any]:
+    if derived(feature, "Part::FeaturePython"):
+        names: tuple[str, ...] = _BY_PYTHON
+        # Fragments, slices and filters of compounds; what only draws others has neither.
+        if own(feature, "Tool") is not None or own(feature, "FilterType") is not None:
+            names = (*names, "Base")
+        if own(feature, "Mode") is not None or own(feature, "Tolerance") is not None:
+            names = (*names, "Objects")
+    elif derived(feature, "PartDesign::Boolean"):
+        names = (*_OPERANDS, "Group")
+    else:
+        names = _OPERANDS
+    for name in names:
+        value = own(feature, name)
+        for one in value if isinstance(value, list | tuple) else (value,):
+            operand = one[0] if isinstance(one, tuple) and one else one
+            if hasattr(operand, "Document"):
+                yield operand
