@@ -23,7 +23,7 @@ from silo.bom.errors import SiloError
 from silo.bom.findings import FindingCode
 from silo.bom.links import extract
 from silo.bom.model import Extraction
-from silo.bom.report import flat_counts
+from silo.bom.report import flat_lines
 from silo.bom.roots import choose_assembly
 from silo.fcstd import Library
 from silo.freecadcmd.run import run_freecad
@@ -170,8 +170,10 @@ def test_public_assemblies_give_the_truth(matrix: Matrix, public: list[PublicAss
             wrong.append(f"{assembly.name}: {found}")
             continue
         counts = {
-            (os.path.relpath(path, assembly.project), name): count
-            for (path, name), count in flat_counts(found.entries).items()
+            (os.path.relpath(entry.doc_path, assembly.project), entry.object_name): count
+            for entry, count in flat_lines(found.entries)
+            if not entry.standard
+            or (os.path.relpath(entry.doc_path, assembly.project), entry.object_name) in assembly.counts
         }
         if counts != assembly.counts:
             wrong.append(f"{assembly.name}: {set(counts.items()) ^ set(assembly.counts.items())}")

@@ -17,9 +17,10 @@ from enum import StrEnum
 from typing import Any
 
 from silo.bom.findings import Finding
-from silo.bom.model import STANDARD_PARTS, BomEntry
+from silo.bom.model import BomEntry
 from silo.bom.naming import display_name
 from silo.bom.report import relative, shorten
+from silo.bom.walk.standard import STANDARD_PARTS
 
 
 class Reason(StrEnum):

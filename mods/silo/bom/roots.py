@@ -16,6 +16,7 @@ from silo.bom.errors import InputError
 from silo.bom.walk.arrays import left_out_by
 from silo.bom.walk.consumed import consumed
 from silo.bom.walk.contents import Reader
+from silo.bom.walk.counts import Lost
 from silo.bom.walk.kinds import (
     COMPONENTS,
     INLINE,
@@ -96,8 +97,13 @@ def _holds(container: Any, reader: Reader) -> int:
     if not shows_others:
         return 0
     brought = reader.contents(container).counts
-    far = any(not same_document(count.target.Document, container.Document) for count in brought)
+    far = any(_is_far(count.target, container) for count in brought)
     return 2 if far else 1 if brought else 0
+
+
+def _is_far(target: Any, container: Any) -> bool:
+    """True for a component of another file, also for one that is missing there."""
+    return isinstance(target, Lost) or not same_document(target.Document, container.Document)
 
 
 def find_assemblies(document: Any) -> list[Any]:
@@ -163,8 +169,11 @@ def _root_or_part(document: Any) -> Any:
     if best and not loose and (len(best) == 1 or not holds_hardware):
         return best[0]
     parts = best if holds_hardware else []
-    group = loose if loose or parts else _loose(document, frozenset({Kind.LOCAL}))
-    return DocumentRoot(document, [*parts, *group])
+    if not loose and not parts:
+        # A file with one body is that part; of several, each may be declared.
+        bodies = _loose(document, frozenset({Kind.LOCAL}))
+        loose = bodies if len(bodies) > 1 else []
+    return DocumentRoot(document, [*parts, *loose])
 
 
 def _file(document: Any) -> str:

@@ -34,7 +34,7 @@ def register(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the BOM; 0 also with findings, which are part of the answer."""
-    extraction = common.read_assembly(args.top, args.assembly)
+    extraction = common.read_assembly(args.top, args.assembly, hardware=not args.no_hardware)
     if args.resolve:
         with common.client_of(args) as client:
             common.reach(client, extraction)

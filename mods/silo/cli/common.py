@@ -47,6 +47,14 @@ def add_assembly_options(parser: argparse.ArgumentParser) -> None:
     """``TOP.FCStd`` and ``--assembly``."""
     parser.add_argument("top", metavar="TOP.FCStd", help="the assembly's file")
     parser.add_argument("--assembly", metavar="NAME", help="the assembly to read, where a file holds several")
+    add_hardware_option(parser)
+
+
+def add_hardware_option(parser: argparse.ArgumentParser) -> None:
+    """``--no-hardware``."""
+    parser.add_argument(
+        "--no-hardware", action="store_true", help="leave out standard parts (screws, nuts, washers, inserts)"
+    )
 
 
 def add_json_option(parser: argparse.ArgumentParser) -> None:
@@ -65,13 +73,13 @@ def client_of(args: argparse.Namespace) -> Iterator[SiloClient]:
         yield client
 
 
-def read_assembly(top: str, assembly: str | None = None) -> Extraction:
+def read_assembly(top: str, assembly: str | None = None, *, hardware: bool = True) -> Extraction:
     """The BOM of a file, read without FreeCAD."""
     from silo.fcstd import Library
 
     with Library() as library:
         document = library.open(top)
-        found = extract(choose_assembly(document, assembly))
+        found = extract(choose_assembly(document, assembly), hardware=hardware)
         told = respelt_findings(library.notes, document.FileName)
     return replace(found, findings=(*found.findings, *told))
 

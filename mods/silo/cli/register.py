@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
     """Register what is unregistered; 1 where something was skipped or failed."""
     if not args.yes and not sys.stdin.isatty():
         raise InputError("register asks before it creates items, and there is nobody to ask here; say --yes")
-    extraction = common.read_assembly(args.top, args.assembly)
+    extraction = common.read_assembly(args.top, args.assembly, hardware=not args.no_hardware)
     with common.client_of(args) as client:
         schema = client.find_schema(args.schema)
         proposals = proposals_for(extraction, client, schema)

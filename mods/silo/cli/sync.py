@@ -27,6 +27,7 @@ def register(commands: Commands) -> None:
     )
     parser.add_argument("tops", metavar="TOP.FCStd", nargs="+", help="assembly files, or folders of them")
     parser.add_argument("--assembly", metavar="NAME", help="the assembly to read, where a file holds several")
+    common.add_hardware_option(parser)
     parser.add_argument(
         "--recursive", action="store_true", help="sub-assemblies too, children before parents"
     )
@@ -89,11 +90,11 @@ def _extractions(args: argparse.Namespace, tops: list[str]) -> Iterator[tuple[st
     if args.via == "freecad":
         from silo.freecadcmd.run import run_freecad
 
-        yield from run_freecad(tops, args.assembly)
+        yield from run_freecad(tops, args.assembly, hardware=not args.no_hardware)
         return
     for top in tops:
         try:
-            yield top, common.read_assembly(top, args.assembly)
+            yield top, common.read_assembly(top, args.assembly, hardware=not args.no_hardware)
         except SiloError as error:
             yield top, error
 

@@ -63,6 +63,7 @@ def run_freecad(
     command: str | None = None,
     timeout_s: float = TIMEOUT_S,
     env: Mapping[str, str] | None = None,
+    hardware: bool = True,
 ) -> Iterator[tuple[str, Extraction | SiloError]]:
     """Read each file in FreeCAD; results in order, as they come.
 
@@ -78,7 +79,11 @@ def run_freecad(
     rest = [os.path.abspath(top) for top in tops]
     told = dict(zip(rest, tops, strict=True))
     while rest:
-        job = {"tops": rest, **({"assembly": assembly} if assembly is not None else {})}
+        job: dict[str, Any] = {"tops": rest}
+        if assembly is not None:
+            job["assembly"] = assembly
+        if not hardware:
+            job["no_hardware"] = True
         with FreeCADRun(freecadcmd, HEADLESS, job, timeout_s, env or {}) as run:
             for line in run.lines():
                 path = rest.pop(0)

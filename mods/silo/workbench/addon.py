@@ -107,7 +107,9 @@ class AddOn:
             from silo.workbench.commit.flow import CommitFlow
             from silo.workbench.freecad.live_desk import LiveDesk
 
-            self._commits = CommitFlow(self.session, self.preferences, LiveDesk())
+            self._commits = CommitFlow(
+                self.session, self.preferences, LiveDesk(lambda: self.preferences.flag("CountHardware"))
+            )
         return self._commits
 
     @property

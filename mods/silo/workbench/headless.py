@@ -55,6 +55,7 @@ class Job:
     recursive: bool = False
     dry_run: bool = False
     allow_missing: bool = False
+    no_hardware: bool = False
 
     @classmethod
     def from_text(cls, text: str | None) -> Job:
@@ -105,13 +106,13 @@ def _tell(error: Exception, code: int) -> int:
     return code
 
 
-def _extractions(tops: list[str], assembly: str | None) -> Iterator[tuple[str, Extraction | SiloError]]:
+def _extractions(tops: list[str], job: Job) -> Iterator[tuple[str, Extraction | SiloError]]:
     from silo.workbench.freecad import host, live
 
     for top in tops:
         found: Extraction | SiloError
         try:
-            found = live.read_checked(top, assembly)
+            found = live.read_checked(top, job.assembly, hardware=not job.no_hardware)
         except SiloError as error:
             found = error
         # The next file starts from nothing: no half loaded parts of this one, and no memory held. Before the
@@ -126,7 +127,7 @@ def _write_lines(job: Job, out: TextIO) -> int:
 
     fine = True
     tops = documents_in(job.tops)
-    found = _extractions(tops, job.assembly)
+    found = _extractions(tops, job)
     for top in tops:
         _line(out, {"begun": top})
         _, result = next(found)
@@ -167,7 +168,7 @@ def _sync(job: Job) -> int:
     )
     results: list[TopResult] = []
     with client:
-        for number, (top, found) in enumerate(_extractions(tops, job.assembly), start=1):
+        for number, (top, found) in enumerate(_extractions(tops, job), start=1):
             results.append(sync_top(top, found, client, options))
             host.message(f"Silo: [{number}/{len(tops)}] {_in_words(results[-1])}")
     _write_reports(job, results)
@@ -195,7 +196,7 @@ def _without_server(job: Job, error: ImportError) -> int:
             {"top": top, "error": error_json(found)}
             if isinstance(found, SiloError)
             else {"top": top, "bom": bom_json(found)}
-            for top, found in _extractions(documents_in(job.tops), job.assembly)
+            for top, found in _extractions(documents_in(job.tops), job)
         ]
         _write_json(job.json, {"results": results})
         told = ConfigError(f"{told}. The BOMs themselves were written to {job.json}")

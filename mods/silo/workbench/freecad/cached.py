@@ -105,6 +105,11 @@ class CachedDocument:
         self._objects: list[CachedObject] | None = None
 
     @property
+    def ProgramVersion(self) -> str:
+        """The FreeCAD that saved the document, "" while it is unsaved."""
+        return self.real.getProgramVersion() or ""
+
+    @property
     def Meta(self) -> dict[str, str]:
         """The document's own notes."""
         if self._meta is None:

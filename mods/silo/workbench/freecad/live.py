@@ -39,12 +39,12 @@ _BEFORE_ROOT = 1 << 16
 ASSEMBLY_SINCE = (0, 22)
 
 
-def read(path: str, assembly: str | None = None) -> Extraction:
+def read(path: str, assembly: str | None = None, *, hardware: bool = True) -> Extraction:
     """The BOM of a file, opened in this FreeCAD (or found open). DocumentError, InputError as told there."""
-    return extract_live(saving.open_fully(path), assembly)
+    return extract_live(saving.open_fully(path), assembly, hardware=hardware)
 
 
-def read_checked(path: str, assembly: str | None = None) -> Extraction:
+def read_checked(path: str, assembly: str | None = None, *, hardware: bool = True) -> Extraction:
     """As :func:`read`, for files that nobody has looked at: what could harm FreeCAD is not opened.
 
     Where FreeCAD only says that it cannot open a file, the error has the reason that our reader finds.
@@ -53,7 +53,7 @@ def read_checked(path: str, assembly: str | None = None) -> Extraction:
 
     _refuse_entities(path)
     try:
-        return read(path, assembly)
+        return read(path, assembly, hardware=hardware)
     except DocumentError:
         Library().open(path)
         raise
@@ -72,16 +72,18 @@ def _refuse_entities(path: str) -> None:
         )
 
 
-def extract_live(document: Any, assembly: str | None = None) -> Extraction:
+def extract_live(document: Any, assembly: str | None = None, *, hardware: bool = True) -> Extraction:
     """The BOM of an open document, as it stands in this session, saved or not.
 
     assembly
         ``Name`` or ``Label`` of the assembly, where the document holds several.
+    hardware
+        False leaves standard parts out.
     """
     if lost := lost_assemblies(document):
         return _lost(document, lost)
     cached = cached_document(document)
-    return extract_object(choose_assembly(cached, assembly))
+    return extract_object(choose_assembly(cached, assembly), hardware=hardware)
 
 
 def cached_document(document: Any) -> CachedDocument:
@@ -89,9 +91,37 @@ def cached_document(document: Any) -> CachedDocument:
     return FactCache(host.is_object).document(document)
 
 
-def extract_object(assembly_obj: Any) -> Extraction:
+def extract_object(assembly_obj: Any, *, hardware: bool = True) -> Extraction:
     """The BOM of one assembly object, live or :func:`cached_document`."""
-    return extract(assembly_obj, inspect=LinkInspector(), canonical=canonical_paths())
+    return extract(
+        assembly_obj,
+        inspect=LinkInspector(),
+        canonical=canonical_paths(),
+        whole=WholeDocuments(),
+        hardware=hardware,
+    )
+
+
+class WholeDocuments:
+    """Gives a document with all its objects for one that FreeCAD loaded in part: read from its file.
+
+    A document in part cannot be saved, so its file is what there is. For one walk.
+    """
+
+    def __init__(self) -> None:
+        self._library: Any = None
+
+    def __call__(self, document: Any) -> Any:
+        real = getattr(document, "real", document)
+        if not getattr(real, "Partial", False):
+            return document
+        from silo.fcstd import Library
+
+        self._library = self._library or Library()
+        try:
+            return self._library.open(document.FileName)
+        except DocumentError:
+            return document
 
 
 def canonical_paths() -> Callable[[str], str]:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from silo.workbench.commit import snapshot
@@ -28,7 +29,8 @@ class LiveDocuments:
 class LiveDesk:
     """One per FreeCAD. Widgets are imported when a person is to see one."""
 
-    def __init__(self) -> None:
+    def __init__(self, count_hardware: Callable[[], bool] = lambda: True) -> None:
+        self._count_hardware = count_hardware
         self.documents = LiveDocuments()
 
     def snapshot(self, doc: Any) -> Snapshot:
@@ -36,7 +38,9 @@ class LiveDesk:
         cached = live.cached_document(doc)
         active = host.active_assembly() if host.has_gui() else None
         hint = cached.getObject(active.Name) if active is not None and active.Document == doc else None
-        return snapshot.take(cached, assembly=hint, walk=live.extract_object)
+        hardware = self._count_hardware()
+        walk = partial(live.extract_object, hardware=hardware)
+        return snapshot.take(cached, assembly=hint, walk=walk)
 
     find = staticmethod(host.find_document)
 

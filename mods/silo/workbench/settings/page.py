@@ -110,6 +110,7 @@ class PreferencePage:
             ("AskComment", translate("Silo", "Ask for a comment")),
             ("SyncBom", translate("Silo", "Sync the BOM of an assembly after its file is committed")),
             ("AskRegister", translate("Silo", "Then ask about components without a part number")),
+            ("CountHardware", translate("Silo", "Count standard parts (screws, nuts, washers) in the BOM")),
         ):
             self.flags[name] = QtWidgets.QCheckBox(text)
             self.flags[name].setObjectName(name)

@@ -25,6 +25,8 @@ DEFAULTS: Mapping[str, str | bool] = {
     "SyncBom": True,
     # HOLD: a BOM with a broken link waits until the link is mended. ALLOW: it is synced without it.
     "MissingLinks": HOLD,
+    # Standard parts of the Fasteners workbench are components.
+    "CountHardware": True,
     "AskComment": True,
     "AskRegister": True,
     "LiveActivity": True,

@@ -1154,6 +1154,11 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../settings/page.py" />
+            <source>Count standard parts (screws, nuts, washers) in the BOM</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../settings/page.py" />
             <source>hold the BOM back until they are mended</source>
             <translation type="unfinished" />
         </message>
