@@ -90,6 +90,16 @@ def test_a_repeated_upload_makes_one_revision(api: Api) -> None:
     assert len(api.get(f"/api/items/{number}/revisions")) == 1
 
 
+def test_a_file_that_arrives_otherwise_is_no_revision(api: Api) -> None:
+    """``sha256`` says what was sent."""
+    number = api.item()
+    wanted = hashlib.sha256(b"whole").hexdigest()
+    assert upload(api, number, b"who", sha256=wanted).status == 400
+    assert upload(api, number, b"whole", sha256="no hash").status == 400
+    assert api.get(f"/api/items/{number}/revisions") == []
+    assert upload(api, number, b"whole", sha256=wanted.upper()).status == 201
+
+
 def test_a_thumbnail_is_taken_from_an_fcstd_file(api: Api) -> None:
     """``thumbnails/Thumbnail.png`` inside the file; what is no PNG is not served."""
     number, other = api.items(2)

@@ -162,10 +162,12 @@ class SiloClient(ItemCalls, BomCalls):
         *,
         file_name: str | None = None,
         idempotency_key: str | None = None,
+        sha256: str | None = None,
         cancelled: Cancel | None = None,
     ) -> Revision:
         """Send a file as a new revision, streamed; never repeated by itself (see :mod:`silo.outbox`).
 
+        ``sha256`` is what must arrive: a server that knows the field makes no revision of anything else.
         Raises :class:`silo.bom.errors.DocumentError` for a file that cannot be read.
         """
         return files.upload(
@@ -177,6 +179,7 @@ class SiloClient(ItemCalls, BomCalls):
             on_progress,
             file_name=file_name,
             idempotency_key=idempotency_key,
+            sha256=sha256,
             cancelled=cancelled,
         )
 

@@ -30,13 +30,14 @@ def upload(
     *,
     file_name: str | None,
     idempotency_key: str | None,
+    sha256: str | None,
     cancelled: Cancel | None,
 ) -> Revision:
     """Send a file as a new revision (``POST …/file``); the server's checksum must be that of the file."""
     subject = f"{path.name} for {part_number}"
     with FileForm(
         path,
-        upload_fields(comment, properties),
+        upload_fields(comment, properties, sha256),
         file_name=file_name,
         on_progress=on_progress,
         cancelled=cancelled,

@@ -137,11 +137,15 @@ class FileForm:
         ).encode("utf-8", "replace")
 
 
-def upload_fields(comment: str, properties: Mapping[str, object] | None) -> dict[str, str]:
-    """The text parts of a file upload: the comment, and the properties as JSON."""
+def upload_fields(
+    comment: str, properties: Mapping[str, object] | None, sha256: str | None = None
+) -> dict[str, str]:
+    """The text parts of a file upload: the comment, the properties as JSON, and what must arrive."""
     fields = {"comment": comment}
     if properties:
         fields["properties"] = as_json(properties).decode()
+    if sha256:
+        fields["sha256"] = sha256
     return fields
 
 

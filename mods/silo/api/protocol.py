@@ -126,6 +126,7 @@ class FilesApi(Protocol):
         *,
         file_name: str | None = None,
         idempotency_key: str | None = None,
+        sha256: str | None = None,
         cancelled: Cancel | None = None,
     ) -> Revision: ...
 

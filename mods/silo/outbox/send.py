@@ -64,6 +64,7 @@ class SendApi(arrived.Downloads, Protocol):
         *,
         file_name: str | None = None,
         idempotency_key: str | None = None,
+        sha256: str | None = None,
         cancelled: Cancel | None = None,
     ) -> Revision: ...
 
@@ -323,6 +324,7 @@ class _Run:
                 None if progress is None else lambda done, total: progress(entry, done, total),
                 file_name=entry.file_name,
                 idempotency_key=entry.key,
+                sha256=entry.sha256,
                 cancelled=self.cancelled,
             )
         except DocumentError as error:

@@ -37,6 +37,7 @@ from silo.bom.errors import (
     ConflictError,
     DocumentError,
     NotFoundError,
+    RejectedError,
     VersionConflictError,
 )
 from silo.bom.merge import apply_merge, plan_merge, summary
@@ -320,6 +321,7 @@ class FakeSilo(FakeStore):
         *,
         file_name: str | None = None,
         idempotency_key: str | None = None,
+        sha256: str | None = None,
         cancelled: Cancel | None = None,
     ) -> Revision:
         stop_if(cancelled)
@@ -329,6 +331,8 @@ class FakeSilo(FakeStore):
             raise DocumentError(str(path), f"the file cannot be read ({error.strerror})") from error
         if on_progress is not None:
             on_progress(len(content), len(content))
+        if sha256 and hashlib.sha256(content).hexdigest() != sha256:
+            raise RejectedError(f"sha256: {part_number}: another content arrived than was sent")
         with self._changing("upload_file"):
             stored = self._stored(part_number)
             return self._revise(stored, comment, properties, content, file_name or Path(path).name)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import Annotated, Any
 
 import anyio.to_thread
@@ -53,6 +54,10 @@ UPLOAD = {
                         "file": {"type": "string", "format": "binary"},
                         "comment": {"type": "string"},
                         "properties": {"type": "string", "description": "a JSON object"},
+                        "sha256": {
+                            "type": "string",
+                            "description": "of the file; another content is refused",
+                        },
                     },
                 }
             }
@@ -99,10 +104,13 @@ async def upload_file(server: ServerDep, caller: Editor, part_number: str, reque
     """
     async with request.form(max_files=1, max_fields=20) as form:
         file, comment, raw = form.get("file"), form.get("comment"), form.get("properties")
+        sha256 = form.get("sha256")
         if not isinstance(file, UploadFile):
             raise RejectedError("file: wanted a multipart form with the file in a part named 'file'")
         if isinstance(raw, UploadFile) or not is_text(comment or "", 10_000):
             raise RejectedError("comment, properties: wanted texts of at most 10 000 characters")
+        if sha256 is not None and not (isinstance(sha256, str) and re.fullmatch("[0-9A-Fa-f]{64}", sha256)):
+            raise RejectedError("sha256: wanted 64 hexadecimal digits")
         properties = _properties(raw)
         return await anyio.to_thread.run_sync(
             _store,
@@ -113,6 +121,7 @@ async def upload_file(server: ServerDep, caller: Editor, part_number: str, reque
             str(comment or ""),
             properties,
             _idempotency_key(request),
+            (sha256 or "").lower(),
         )
 
 
@@ -157,10 +166,15 @@ def _store(
     comment: str,
     properties: dict[str, Any] | None,
     key: str | None,
+    sha256: str,
 ) -> Response:
     with server.db.read(caller) as tx:
         items.get_item(tx, part_number)  # before anything is written to the disk
     stored = server.files.keep(file.filename or "file", file.file)
+    if sha256 and stored.checksum != sha256:
+        raise RejectedError(
+            f"sha256: the file arrived as {stored.checksum}, and {sha256} was sent; no revision was made"
+        )
     with server.db.write(caller) as tx:
         item = items.get_item(tx, part_number, lock=True)
         merged = None if properties is None else {**item.properties, **properties}
