@@ -20,8 +20,13 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="kill -9 is POSIX")
 ITEMS = {"Assembly1": "A01", "Assembly2": "A01", "Bolt": "F01", "Plate": "M01", "Shaft": "M01"}
 
 
+LONG = pytest.mark.skipif(not os.environ.get("SILO_LONG"), reason="two minutes; SILO_LONG=1 runs it")
+
+
 @pytest.mark.parametrize(
-    ("rounds", "seed"), [(16, 1), pytest.param(200, 2, marks=pytest.mark.slow)], ids=["sample", "200 kills"]
+    ("rounds", "seed"),
+    [(16, 1), pytest.param(200, 2, marks=(pytest.mark.slow, LONG))],
+    ids=["sample", "200 kills"],
 )
 def test_every_commit_is_in_silo_once(tmp_path: Path, rounds: int, seed: int) -> None:
     """And every new part has one item, which its file names."""

@@ -659,6 +659,39 @@ Commits that are not copied by then may have to be committed again.</source>
             <translation type="unfinished" />
         </message>
         <message>
+            <location filename="../../preview/columns.py" />
+            <location filename="../../preview/dialog.py" />
+            <location filename="../../register/dialog.py" />
+            <source>Part number</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/columns.py" />
+            <location filename="../../preview/dialog.py" />
+            <location filename="../../register/dialog.py" />
+            <source>Name</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/columns.py" />
+            <location filename="../../preview/dialog.py" />
+            <location filename="../../register/rows.py" />
+            <source>Assembly</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/columns.py" />
+            <location filename="../../preview/dialog.py" />
+            <source>In Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/columns.py" />
+            <location filename="../../preview/dialog.py" />
+            <source>What a sync does</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
             <location filename="../../preview/dialog.py" />
             <source>BOM in Silo: {name}</source>
             <translation type="unfinished" />
@@ -666,34 +699,6 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../preview/dialog.py" />
             <source>Comparing with Silo…</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/dialog.py" />
-            <location filename="../../register/dialog.py" />
-            <source>Part number</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/dialog.py" />
-            <location filename="../../register/dialog.py" />
-            <source>Name</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/dialog.py" />
-            <location filename="../../register/rows.py" />
-            <source>Assembly</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/dialog.py" />
-            <source>In Silo</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../preview/dialog.py" />
-            <source>What a sync does</source>
             <translation type="unfinished" />
         </message>
         <message>
