@@ -12,7 +12,7 @@ import pytest
 from silo.bom.errors import DocumentError, InputError
 from silo.folders import cache_folder
 from silo.inertia.geometry import Mesh, ReadOptions, read, store
-from silo.inertia.geometry.cache import Cache, default_folder, key_of
+from silo.inertia.geometry.cache import Cache, default_folder, fingerprint, key_of, key_parts, measured_by
 from silo.inertia.model import Assembly, GeometryProblem, Instance, Prototype, SolidProps
 
 IMPOSSIBLE = 1
@@ -107,6 +107,58 @@ def test_a_sibling_that_appears_or_changes_is_noticed(box: Any, step: Any, tmp_p
     other.part(box(4, 4, 4), "cube")
     other.write(folder / "cube.stp")
     assert volume() == pytest.approx(64)
+
+
+def test_a_file_that_changes_while_it_is_read_is_read_again(box: Any, step: Any, tmp_path: Path) -> None:
+    """CAD saves over a file that is being read: neither the old numbers nor a mix of both are kept."""
+    path = tmp_path / "part.step"
+
+    def save(size: float) -> None:
+        document = step()
+        document.part(box(size, size, size), "cube")
+        document.write(path)
+
+    def options(changes: list[float]) -> ReadOptions:
+        def progress(at: Any) -> None:
+            if at.stage == "measuring" and changes:
+                save(changes.pop())
+
+        return ReadOptions(cache_dir=tmp_path / "cache", progress=progress)
+
+    for changes in ([2.0], []):
+        save(3.0)
+        (part,) = read(path, options=options(list(changes))).prototypes.values()
+        assert part.volume_m3 * 1e9 == pytest.approx(8 if changes else 27)
+    save(9.0)
+    with pytest.raises(DocumentError, match="changed while it was read"):
+        read(path, options=options([4.0, 5.0, 6.0, 7.0]))
+
+
+def test_the_cache_is_bounded(box: Any, step_part: Any, kept: Any, tmp_path: Path) -> None:
+    """What was not used for longest goes first; what was just written stays."""
+    paths = [step_part(box(1, 2, n + 1), f"part{n}") for n in range(4)]
+    for path in paths[:3]:
+        read(path, options=kept())
+    entries = {path.stat().st_size for path in files(tmp_path / "cache")}
+    assert read(paths[0], options=kept(memory_mb=IMPOSSIBLE)).instances  # used again
+    small = Cache(tmp_path / "cache", max_bytes=2 * max(entries) + 10)
+    result = tmp_path / "result.npz"
+    store.save(read(paths[3], options=ReadOptions(cache=False)), result)
+    small.put("ff" + "0" * 62, result)
+    assert len(files(tmp_path / "cache")) == 2
+    assert read(paths[0], options=kept(memory_mb=IMPOSSIBLE)).instances
+    with pytest.raises(DocumentError):
+        read(paths[1], options=kept(memory_mb=IMPOSSIBLE))
+
+
+def test_the_key_knows_the_code_that_measured(tmp_path: Path) -> None:
+    """A release with another integration must not give the old one's numbers."""
+    code = tmp_path / "quadrature.py"
+    code.write_text("MAX_SPLITS = 14")
+    before = fingerprint([code])
+    code.write_text("MAX_SPLITS = 15")
+    assert fingerprint([code]) != before
+    assert measured_by() in key_parts(code, {})
 
 
 def test_the_folder_is_the_user_s_cache_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """What was read is kept, by content: the same bytes, kernel and options give the same numbers.
 
-The key holds the file's SHA-256, the reading options, the kernel's version and ours. A split assembly also
-keeps the hashes of the files it was completed from, and the names of those it lacked: one part file changed,
-added or removed, and the assembly is read anew. Anything unexpected counts as "not there".
+The key holds the file's SHA-256, the reading options, the kernel's version and a fingerprint of our own code
+that measures. The folder is bounded: what was not used for longest goes first. A split assembly also keeps
+the hashes of the files it was completed from, and the names of those it lacked: one part file changed, added
+or removed, and the assembly is read anew. Anything unexpected counts as "not there".
 """
 
 from __future__ import annotations
@@ -11,8 +12,11 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import json
-from collections.abc import Mapping
+import os
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +30,10 @@ from silo.inertia.geometry.options import Reading, ReadOptions
 from silo.inertia.geometry.step.folder import step_files
 from silo.inertia.model import Assembly
 
-KERNELS = ("cadquery-ocp-novtk", "cadquery-ocp", "trimesh")
+KERNELS = ("cadquery-ocp-novtk", "cadquery-ocp", "trimesh", "manifold3d", "numpy")
+
+MAX_BYTES = 1_000_000_000
+"""Of all that is kept; an assembly of a thousand parts with its picture takes some 20 MB."""
 
 
 def default_folder() -> Path:
@@ -41,15 +48,35 @@ def content_hash(path: Path) -> str:
 
 
 def key_of(path: Path, options: Mapping[str, Any]) -> str:
-    """The key of one reading of one file. Its name counts: unnamed parts are called after it."""
-    parts = [
+    """The key of one reading of one file."""
+    return hashlib.sha256("\n".join(key_parts(path, options)).encode("utf-8")).hexdigest()
+
+
+def key_parts(path: Path, options: Mapping[str, Any]) -> list[str]:
+    """All that a result depends on. The file's name counts: unnamed parts are called after it."""
+    return [
         content_hash(path),
         path.name,
         str(store.FORMAT),
         _versions(),
+        measured_by(),
         json.dumps(options, sort_keys=True),
     ]
-    return hashlib.sha256("\n".join(parts).encode("utf-8")).hexdigest()
+
+
+@cache
+def measured_by() -> str:
+    """A fingerprint of the code that reads and measures: another version's numbers are not ours."""
+    package = Path(__file__).resolve().parent
+    return fingerprint([*package.rglob("*.py"), package.parent / "core.py", package.parent / "model.py"])
+
+
+def fingerprint(paths: Iterable[Path]) -> str:
+    """SHA-256 of all these files."""
+    digest = hashlib.sha256()
+    for path in sorted(paths):
+        digest.update(f"{path.name}\0{content_hash(path)}\n".encode())
+    return digest.hexdigest()
 
 
 def _versions() -> str:
@@ -64,9 +91,10 @@ def _versions() -> str:
 
 @dataclass(frozen=True)
 class Cache:
-    """One folder of stored readings."""
+    """One folder of stored readings; ``max_bytes`` in all."""
 
     folder: Path
+    max_bytes: int = MAX_BYTES
 
     def get(self, key: str, source: Path) -> Assembly | None:
         """The stored assembly of ``source`` (as given this time); None where there is none that holds."""
@@ -77,7 +105,11 @@ class Cache:
             assembly, extra = store.load(path)
         except InputError:
             return None
-        return replace(assembly, source=str(source)) if _holds(extra, source) else None
+        if not _holds(extra, source):
+            return None
+        with suppress(OSError):
+            os.utime(path)  # what is used stays
+        return replace(assembly, source=str(source))
 
     def put(self, key: str, stored: Path) -> None:
         """Take the stored file ``stored`` in, atomically. A cache that cannot be written is no error."""
@@ -86,8 +118,23 @@ class Cache:
             target.parent.mkdir(parents=True, exist_ok=True)
             with replacing(target) as stream:
                 stream.write(stored.read_bytes())
+            self._make_room()
         except OSError:
             return
+
+    def _make_room(self) -> None:
+        """Take out what was not used for longest, until the rest fits."""
+        kept = []
+        for path in self.folder.glob("*/*.npz"):
+            with suppress(OSError):
+                stat = path.stat()
+                kept.append((stat.st_mtime_ns, stat.st_size, path))
+        size = sum(one for _, one, _ in kept)
+        for _, one, path in sorted(kept):
+            if size <= self.max_bytes:
+                return
+            path.unlink(missing_ok=True)
+            size -= one
 
     def _path(self, key: str) -> Path:
         return self.folder / key[:2] / f"{key}.npz"
@@ -117,3 +164,15 @@ def _holds(extra: Mapping[str, Any], source: Path) -> bool:
     return not missing or not any(
         file_key(path.stem) in missing for path in step_files(folder, int(extra.get("depth", 0)))
     )
+
+
+def changed_since(begin_ns: int, extra: Mapping[str, Any], source: Path) -> bool:
+    """True where a file read beside ``source`` was written after ``begin_ns`` (:func:`time.time_ns`)."""
+    folder = source.resolve().parent
+    for name in extra.get("others", {}):
+        try:
+            if (folder / name).stat().st_mtime_ns > begin_ns:
+                return True
+        except OSError:
+            return True
+    return False

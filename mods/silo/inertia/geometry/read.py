@@ -4,16 +4,20 @@
 from __future__ import annotations
 
 import tempfile
+import time
 from pathlib import Path
 from typing import Any
 
-from silo.bom.errors import CancelledError
+from silo.bom.errors import CancelledError, DocumentError
 from silo.inertia.geometry import isolate, store
-from silo.inertia.geometry.cache import Cache, default_folder, key_of
+from silo.inertia.geometry.cache import Cache, changed_since, default_folder, key_of
 from silo.inertia.geometry.detect import Kind, detect
 from silo.inertia.geometry.options import Progress, Reading, ReadOptions, Report
 from silo.inertia.materials.cards import cards_fingerprint
 from silo.inertia.model import Assembly
+
+ATTEMPTS = 3
+"""Readings of a file that changes meanwhile, before that is an error."""
 
 
 def read(path: str | Path, *, options: ReadOptions | None = None) -> Assembly:
@@ -38,16 +42,24 @@ def read(path: str | Path, *, options: ReadOptions | None = None) -> Assembly:
             occt.quiet()
         return read_here(path, options, _reporter(path, options)).assembly
     cache = Cache(options.cache_dir or default_folder()) if options.cache else None
-    key = key_of(path, _content(kind, options)) if cache else ""
-    known = cache.get(key, path) if cache else None
-    if known is not None:
-        return known
-    with tempfile.TemporaryDirectory(prefix="silo-geometry-") as folder:
-        result = Path(folder) / "result.npz"
-        isolate.run(path, options, result)
-        if cache is not None:
-            cache.put(key, result)
-        return store.load(result)[0]
+    for _ in range(ATTEMPTS):
+        key = key_of(path, _content(kind, options))
+        known = cache.get(key, path) if cache else None
+        if known is not None:
+            return known
+        begin = time.time_ns()
+        with tempfile.TemporaryDirectory(prefix="silo-geometry-") as folder:
+            result = Path(folder) / "result.npz"
+            isolate.run(path, options, result)
+            assembly, extra = store.load(result)
+            if key_of(path, _content(kind, options)) != key or changed_since(begin, extra, path):
+                continue
+            if cache is not None:
+                cache.put(key, result)
+        return assembly
+    raise DocumentError(
+        str(path), f"changed while it was read, {ATTEMPTS} times; read it when nobody writes to it"
+    )
 
 
 def _content(kind: Kind, options: ReadOptions) -> dict[str, Any]:
