@@ -168,6 +168,14 @@ def test_search_and_paging(api: Api) -> None:
     assert api.get("/api/items?search=%25") == []
 
 
+@pytest.mark.parametrize("number", ["~", "+-+", "…", "½", "𦸉", "+="])
+def test_a_part_number_of_signs_alone_can_be_kept_and_found_by_its_name(api: Api, number: str) -> None:
+    """There is no word in it, so the index has none of it."""
+    name = "n" + uuid.uuid4().hex[:8]
+    api.call("POST", "/api/items", {"part_number": f"{number}{number}", "name": name})
+    assert len(api.get(f"/api/items?search={name}")) == 1
+
+
 def test_search_ranks_and_knows_what_people_type(api: Api) -> None:
     """Numbers without dashes, parts of words, accents, supplier and its number, file names; best first."""
     word = "q" + uuid.uuid4().hex[:8]

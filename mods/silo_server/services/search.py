@@ -208,7 +208,7 @@ def _joined(number: str) -> str:
 def _inner(words: Iterable[str]) -> set[str]:
     """Words and their ends, so that the beginning of an end, which is any part of a word, is found."""
     found: set[str] = set()
-    for word in list(words)[:MOST_WORDS]:
+    for word in list(filter(None, words))[:MOST_WORDS]:  # a number of signs alone has no word
         found |= _ends(word)
     return found
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -382,7 +383,8 @@ def test_the_servers_real_export_is_read() -> None:
             "Material": "PLA",
         },
     ]
-    table = BOMParser().parse_bytes(exports.to_csv(rows))
+    exports.to_csv(rows, out := io.BytesIO())
+    table = BOMParser().parse_bytes(out.getvalue())
     assert [(r.name, r.part_number, r.quantity, r.level) for r in table.rows] == [
         ("Gearbox", "A01-0002", 2, 1),
         ("=Bolt", "F01-0001", 4, 2),
