@@ -70,10 +70,10 @@ def test_flat_quantities_are_multiplied_down_the_tree() -> None:
     """Two gearboxes with four gears each are eight gears; sub-assemblies are listed as well."""
     bolt = entry("bolt", 3, level=2)
     found = extraction(entry("sub", 2, entry("gear", 4, level=2), bolt), entry("bolt", 5))
-    assert flat_json(found) == [
-        {"doc_path": "sub.FCStd", "object": "Body", "standard": None, "quantity": 2},
-        {"doc_path": "gear.FCStd", "object": "Body", "standard": None, "quantity": 8},
-        {"doc_path": "bolt.FCStd", "object": "Body", "standard": None, "quantity": 11},
+    assert [(row["doc_path"], row["object"], row["quantity"]) for row in flat_json(found)] == [
+        ("sub.FCStd", "Body", 2),
+        ("gear.FCStd", "Body", 8),
+        ("bolt.FCStd", "Body", 11),
     ]
 
 

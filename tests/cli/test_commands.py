@@ -60,7 +60,8 @@ def test_bom_prints_the_json_that_is_documented(run: Any, gearbox: Path) -> None
 def test_flat_multiplies_down_the_tree(run: Any, gearbox: Path) -> None:
     """Two gearboxes with four gears each are eight gears; sub-assemblies are listed too."""
     flat = run("bom", gearbox, "--flat", "--json").json()
-    assert all(set(row) == {"doc_path", "object", "standard", "quantity"} for row in flat)
+    columns = {"part_number", "name", "quantity", "unit", "standard", "doc_path", "object", "missing"}
+    assert all(set(row) == columns for row in flat)
     assert counts(flat) == {
         "BasePlate": 1,
         "Gearbox": 2,
@@ -234,3 +235,63 @@ def test_every_command_has_help_with_an_example(run: Any, capsys: pytest.Capture
         text = command.format_help()  # type: ignore[attr-defined]
         assert "example:" in text, name
         assert f"silo-mod {name}" in text, name
+
+
+def test_a_missing_file_is_a_line_and_exit_code_1(run: Any, gearbox: Path) -> None:
+    """In the tree, the table, the JSON and the flat list, with its quantity; and the BOM is not in order."""
+    assert run("bom", gearbox).code == 0
+    os.remove(gearbox.parent / "parts" / "Gear.FCStd")
+    shown = run("bom", gearbox)
+    assert shown.code == 1
+    assert "4 × " in next(line for line in shown.out.splitlines() if "parts/Gear.FCStd#" in line)
+    assert "missing" in shown.out
+    ran = run("bom", gearbox, "--json")
+    assert ran.code == 1
+    box = next(entry for entry in ran.json()["entries"] if entry["object"] == "Gearbox")
+    gear = next(entry for entry in box["children"] if entry["object"] == "Gear")
+    assert (gear["missing"], gear["quantity"], gear["doc_path"]) == (True, 4, "parts/Gear.FCStd")
+    assert next(f for f in ran.json()["findings"] if f["code"] == "missing_file")["file"] == gear["doc_path"]
+    flat = run("bom", gearbox, "--flat", "--json")
+    assert flat.code == 1
+    [lost] = [row for row in flat.json() if row["missing"]]
+    assert (lost["doc_path"], lost["quantity"], lost["unit"]) == ("parts/Gear.FCStd", 8, "pcs")
+    table = run("bom", gearbox, "--flat")
+    assert table.code == 1
+    row = next(line for line in table.out.splitlines() if "parts/Gear.FCStd" in line)
+    assert "8" in row
+    assert row.rstrip().endswith("missing")
+
+
+def test_resolve_shows_what_has_no_number_on_every_level(run: Any, silo: Any, gearbox: Path) -> None:
+    """A component of a sub-assembly is not lost because nobody registered it yet."""
+    plain = run("bom", gearbox, "--json").json()["entries"]
+    resolved = run("bom", gearbox, "--resolve", "--json").json()["entries"]
+    assert {e["object"]: (e["quantity"], counts(e["children"])) for e in plain} == {
+        e["object"]: (e["quantity"], counts(e["children"])) for e in resolved
+    }
+    run("register", gearbox, "--yes")
+    flat = run("bom", gearbox, "--resolve", "--flat", "--json").json()
+    assert all(row["part_number"] and row["name"] for row in flat)
+
+
+def test_a_moved_file_is_suggested_and_relinked(run: Any, gearbox: Path) -> None:
+    """The finding names the file and the command; the command mends every file of the tree."""
+    (gearbox.parent / "hardware").mkdir()
+    moved = (gearbox.parent / "parts" / "Gear.FCStd").rename(gearbox.parent / "hardware" / "Gear.FCStd")
+    before = counts(run("bom", gearbox, "--flat", "--json").json())
+    finding = next(f for f in run("bom", gearbox, "--json").json()["findings"] if f["code"] == "missing_file")
+    assert finding["did_you_mean"] == "hardware/Gear.FCStd"
+    order = ("relink", gearbox, "--from", "parts/Gear.FCStd", "--to", "hardware/Gear.FCStd")
+    assert f"--from {order[3]} --to {order[5]}" in finding["message"]
+    dry = run(*order, "--dry-run", "--json")
+    assert dry.code == 0
+    assert run("bom", gearbox).code == 1, "a dry run changes nothing"
+    done = run(*order, "--json")
+    assert {**done.json(), "dry_run": True} == dry.json()
+    assert [Path(one["file"]).name for one in done.json()["files"]] == ["Gearbox.FCStd"]
+    assert run("bom", gearbox).code == 0
+    assert counts(run("bom", gearbox, "--flat", "--json").json()) == before
+    again = run(*order)
+    assert again.code == 2
+    assert "nothing to mend" in again.err
+    assert moved.exists()

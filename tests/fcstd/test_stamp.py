@@ -18,7 +18,8 @@ from silo.bom.errors import DocumentError
 from silo.bom.identity import identity_of
 from silo.fcstd import check_stampable, open_document, stamp
 from silo.fcstd.container import FileState
-from silo.fcstd.stamp import _write
+from silo.fcstd.edit import replace_file
+from silo.fcstd.stamp import _read_back
 
 ROOT = hasattr(os, "geteuid") and os.geteuid() == 0
 
@@ -166,6 +167,11 @@ def test_read_only_folders_stay(tmp_path: Path) -> None:
         path.parent.chmod(0o755)
 
 
+def write(path: Path, state: FileState, content: bytes) -> None:
+    real = str(path)
+    replace_file(real, state, content, lambda copy: _read_back(real, copy, "SiloUUID", "u-1"))
+
+
 def test_a_file_that_changed_meanwhile_is_left_alone(tmp_path: Path) -> None:
     """Whoever saved between our reading and our writing wins."""
     path = part().save(tmp_path / "p.FCStd")
@@ -174,7 +180,7 @@ def test_a_file_that_changed_meanwhile_is_left_alone(tmp_path: Path) -> None:
     other = part("saved by FreeCAD").bytes()
     path.write_bytes(other)
     with pytest.raises(DocumentError, match="changed by somebody else"):
-        _write(str(path), state, content, "SiloUUID", "u-1")
+        write(path, state, content)
     assert path.read_bytes() == other
     assert os.listdir(tmp_path) == ["p.FCStd"]
 
@@ -185,7 +191,7 @@ def test_a_copy_without_the_identity_is_thrown_away(tmp_path: Path) -> None:
     state = FileState.of(path.stat())
     for content, words in ((part().bytes(), "does not hold"), (part().bytes()[:-9], "cannot be read")):
         with pytest.raises(DocumentError, match=words):
-            _write(str(path), state, content, "SiloUUID", "u-1")
+            write(path, state, content)
     assert path.read_bytes() == part().bytes()
     assert os.listdir(tmp_path) == ["p.FCStd"]
 

@@ -177,7 +177,7 @@ class Doc:
     def xml(self) -> str:
         """The text of Document.xml."""
         own: dict[str, Any] = {"Label": self.label, "Uid": _uuid(), "Comment": "", **self.extra}
-        own["LastModifiedDate"] = "2026-11-21T05:43:38Z"
+        own.setdefault("LastModifiedDate", "2026-11-21T05:43:38Z")
         if self.meta is not None:
             own["Meta"] = self.meta
         deps = "".join(f'        <ObjectDeps Name="{name}" Count="0"/>\n' for name in self.objects)

@@ -87,6 +87,9 @@ class Finding:
     severity: Severity
     message: str
     where: tuple[Place, ...] = ()
+    # The file that a broken link records, in full; and the file that was probably meant instead.
+    file: str = ""
+    did_you_mean: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "where", tuple(self.where))

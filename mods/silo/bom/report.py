@@ -13,6 +13,10 @@ from silo.bom.errors import InputError
 from silo.bom.findings import Finding, Place
 from silo.bom.identity import walk_entries
 from silo.bom.model import BomDiff, BomEntry, Extraction, rows_as_dicts
+from silo.bom.naming import display_name
+
+# A CAD model counts pieces.
+PIECES = "pcs"
 
 # A line takes about 1 kB of memory on its way to JSON or to a terminal.
 MOST_LINES = 500_000
@@ -54,12 +58,17 @@ def entry_json(entry: BomEntry, base: str) -> dict[str, Any]:
 
 
 def finding_json(finding: Finding, base: str) -> dict[str, Any]:
-    """One finding; places are ``file#object`` relative to the top file's folder."""
+    """One finding; places are ``file#object`` relative to the top file's folder.
+
+    A broken link also has the ``file`` that it records, and the one that was probably meant, if there is one.
+    """
+    files = {"file": finding.file, "did_you_mean": finding.did_you_mean}
     return {
         "code": finding.code.value,
         "severity": finding.severity.value,
         "message": shorten(finding.message, base),
         "where": [str(Place(relative(place.doc_path, base), place.obj)) for place in finding.where],
+        **{key: relative(path, base) for key, path in files.items() if path},
     }
 
 
@@ -139,14 +148,22 @@ def flat_lines(entries: Iterable[BomEntry]) -> list[tuple[BomEntry, int]]:
 
 
 def flat_json(extraction: Extraction) -> list[dict[str, Any]]:
-    """``[{"doc_path", "object", "standard", "quantity"}]``: quantities multiplied down the tree."""
+    """Each component once, with its total: what a purchaser orders from.
+
+    ``part_number`` and ``name`` as far as they are known, ``quantity`` multiplied down the tree, ``unit``,
+    the ``standard`` or the file (``doc_path``, ``object``), and whether it is ``missing``.
+    """
     base = base_of(extraction)
     return [
         {
+            "part_number": entry.part_number,
+            "name": entry.name or entry.standard or display_name(entry) or entry.object_name,
+            "quantity": count,
+            "unit": PIECES,
+            "standard": entry.standard,
             "doc_path": relative(entry.doc_path, base),
             "object": entry.object_name,
-            "standard": entry.standard,
-            "quantity": count,
+            "missing": entry.missing,
         }
         for entry, count in flat_lines(extraction.entries)
     ]

@@ -81,6 +81,8 @@ def _plain_finding(finding: Finding) -> dict[str, Any]:
         "severity": finding.severity.value,
         "message": finding.message,
         "where": [[place.doc_path, place.obj] for place in finding.where],
+        "file": finding.file,
+        "did_you_mean": finding.did_you_mean,
     }
 
 
@@ -90,4 +92,6 @@ def _finding(data: Mapping[str, Any]) -> Finding:
         Severity(data["severity"]),
         data["message"],
         tuple(Place(path, obj) for path, obj in data["where"]),
+        data.get("file", ""),
+        data.get("did_you_mean", ""),
     )

@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from dataclasses import replace
 
-from silo.bom.model import Extraction
+from silo.bom.model import BomEntry, Extraction
 from silo.bom.report import base_of, bom_json, flat_json
 from silo.bom.resolve import consolidation_findings
 from silo.bom_sync import resolve
@@ -33,24 +34,21 @@ def register(commands: Commands) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the BOM; 0 also with findings, which are part of the answer."""
+    """Print the BOM; 1 where an error says that it is not the whole one."""
     extraction = common.read_assembly(args.top, args.assembly, hardware=not args.no_hardware)
     if args.resolve:
         with common.client_of(args) as client:
             common.reach(client, extraction)
             resolved = resolve(extraction, client)
-        unresolved = {entry.key for entry in resolved.unresolved}
-        extraction = Extraction(
-            resolved.assembly,
-            (*resolved.entries, *(entry for entry in extraction.entries if entry.key in unresolved)),
-            resolved.findings,
-        )
+        known = {entry.key: entry for entry in resolved.unresolved}
+        head = _whole(replace(resolved.assembly, children=resolved.entries), known)
+        extraction = Extraction(resolved.assembly, head.children, resolved.findings)
     else:
         told = consolidation_findings(extraction.entries)
         extraction = replace(extraction, findings=(*extraction.findings, *told))
     if args.json:
         common.print_json(flat_json(extraction) if args.flat else bom_json(extraction))
-        return 0
+        return 1 if extraction.blocked else 0
     from silo.cli import show
 
     out = show.console()
@@ -58,4 +56,14 @@ def run(args: argparse.Namespace) -> int:
     if extraction.findings:
         out.print()
         out.print(show.findings_text(extraction.findings, base_of(extraction)))
-    return 0
+    return 1 if extraction.blocked else 0
+
+
+def _whole(entry: BomEntry, unresolved: Mapping[tuple[str, str], BomEntry]) -> BomEntry:
+    """The entry with all its children again, those without a part number too."""
+    found = (*entry.children, *(unresolved.get(child.key, child) for child in entry.unregistered))
+    children = (
+        replace(_whole(one, unresolved), quantity=child.quantity, level=child.level)
+        for one, child in zip(found, (*entry.children, *entry.unregistered), strict=True)
+    )
+    return replace(entry, children=tuple(children))

@@ -74,14 +74,15 @@ def client_of(args: argparse.Namespace) -> Iterator[SiloClient]:
 
 
 def read_assembly(top: str, assembly: str | None = None, *, hardware: bool = True) -> Extraction:
-    """The BOM of a file, read without FreeCAD."""
+    """The BOM of a file, read without FreeCAD; missing files come with the ones that were probably meant."""
     from silo.fcstd import Library
+    from silo.fcstd.suggest import with_suggestions
 
     with Library() as library:
         document = library.open(top)
         found = extract(choose_assembly(document, assembly), hardware=hardware)
         told = respelt_findings(library.notes, document.FileName)
-    return replace(found, findings=(*found.findings, *told))
+    return with_suggestions(replace(found, findings=(*found.findings, *told)))
 
 
 def reach(client: SiloClient, extraction: Extraction) -> None:

@@ -25,6 +25,7 @@ _COMMANDS = (
     "bom_diff",
     "sync",
     "register",
+    "relink",
     "serve",
     "backup",
     "watch",

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from rich.console import Console, Group, RenderableType
 from rich.panel import Panel
@@ -54,6 +55,8 @@ def entry_text(entry: BomEntry, base: str) -> Text:
         text.append(plain(display_name(entry) or entry.object_name))
     where = relative(entry.doc_path, base)
     text.append(f"  {plain(where)}#{plain(entry.object_name)}", "dim")
+    if entry.missing:
+        text.append("  missing", "bold red")
     return text
 
 
@@ -79,14 +82,20 @@ def bom_tree(extraction: Extraction) -> Tree:
     return tree
 
 
-def flat_table(rows: Sequence[dict[str, object]]) -> Table:
-    """The flat BOM."""
+def flat_table(rows: Sequence[Mapping[str, Any]]) -> Table:
+    """The flat BOM: a purchaser's table of totals."""
     table = Table(box=None, pad_edge=False)
-    for title, justify in (("Quantity", "right"), ("File", "left"), ("Object", "left")):
-        table.add_column(title, justify=justify)  # type: ignore[arg-type]
+    for title in ("Part number", "Name", "Quantity", "Unit", "Standard or file", ""):
+        table.add_column(title, justify="right" if title == "Quantity" else "left", overflow="fold")
     for row in rows:
+        file = f"{row['doc_path']}#{row['object']}"
         table.add_row(
-            str(row["quantity"]), Text(plain(str(row["doc_path"]))), Text(plain(str(row["object"])))
+            Text(plain(row["part_number"] or "–"), "cyan" if row["part_number"] else "dim"),
+            Text(plain(row["name"])),
+            str(row["quantity"]),
+            row["unit"],
+            Text(plain(row["standard"] or file)),
+            Text("missing" if row["missing"] else "", "bold red"),
         )
     return table
 
@@ -136,6 +145,8 @@ def diff_table(diff: BomDiff, names: Mapping[str, str]) -> RenderableType:
         row("⚡", "magenta", change.part_number, quantity, "manual line; a person decides")
     for line in diff.removed:
         row("⚠", "yellow", line.part_number, _quantity(line.quantity), "not referenced by the assembly; kept")
+    for line in diff.kept:
+        row("?", "red", line.part_number, _quantity(line.quantity), "its file is missing; the line is kept")
     disputed = {change.part_number for change in diff.conflicts}
     for line in diff.manual:
         if line.part_number not in disputed:

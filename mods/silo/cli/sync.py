@@ -35,7 +35,7 @@ def register(commands: Commands) -> None:
     parser.add_argument(
         "--allow-missing",
         action="store_true",
-        help="sync although links are broken (they read as unreferenced)",
+        help="sync although files are missing; their known lines stay as they are",
     )
     parser.add_argument(
         "--via",

@@ -9,7 +9,7 @@ well-formed. A document type (and so any entity) is refused: FreeCAD itself had 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
@@ -160,6 +160,18 @@ def index_properties(text: bytes, depth_limit: int) -> dict[str, Span]:
 
     _Walk(text, depth_limit, open_at, close_at).run()
     return spans
+
+
+def start_tags(text: bytes, depth_limit: int, tags: Collection[str]) -> list[tuple[int, dict[str, str]]]:
+    """Where each element of these tags begins, and its attributes, in document order. Raises Malformed."""
+    found: list[tuple[int, dict[str, str]]] = []
+
+    def open_at(depth: int, tag: str, attributes: dict[str, str], at: int) -> None:
+        if tag in tags:
+            found.append((at, dict(attributes)))
+
+    _Walk(text, depth_limit, open_at, lambda depth, tag, end: None).run()
+    return found
 
 
 @dataclass(slots=True)

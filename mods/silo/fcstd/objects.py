@@ -7,6 +7,7 @@ lists are tuples, and a link without a target says why (``LinkProblem``).
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -18,6 +19,8 @@ from silo.fcstd.values import ABSENT, LocalList, Ref, RefList, SideEntry, Style,
 
 if TYPE_CHECKING:
     from silo.fcstd.document import FcstdDocument
+
+_STAMP = re.compile(rb'<XLink\b[^<>]*?\sstamp="([0-9TZ:.+-]{1,40})"')
 
 # Equal properties of a document are written in equal bytes (1000 links have one ElementCount), so values are
 # remembered by their bytes; long ones seldom repeat.
@@ -82,6 +85,13 @@ class FcstdObject:
         if not isinstance(ref, Ref) or (name != "LinkedObject" and not ref.name):
             return None
         return self.Document.problem_of(ref)
+
+    def stamp_of(self, name: str) -> str:
+        """The date of its target that a link property recorded (UTC, seconds); "" where it has none."""
+        if name not in self.properties.numbers:
+            return ""
+        found = _STAMP.search(self.properties.piece(name))
+        return found[1].decode() if found else ""
 
     def getPropertyByName(self, name: str) -> Any:
         """The value of a property. AttributeError where there is none, or none that is plain."""

@@ -8,22 +8,17 @@ their bytes, order and times. The file is replaced in one step, so a reader sees
 
 from __future__ import annotations
 
-import contextlib
 import os
-import stat
-import tempfile
 import unicodedata
 from pathlib import Path
 
 from silo.bom.errors import DocumentError
 from silo.bom.identity import META_KEY, meta_key
-from silo.durable import replace_patiently, sync_folder
-from silo.fcstd.container import DOCUMENT_XML, ContainerFile, Entry, FileState
-from silo.fcstd.inflate import Inflater
+from silo.fcstd.container import ContainerFile, Entry, FileState
+from silo.fcstd.edit import changed, check_writable, edited_xml, replace_file
 from silo.fcstd.library import Library
 from silo.fcstd.limits import Limits
 from silo.fcstd.meta import with_meta
-from silo.fcstd.problem import FcstdError
 from silo.fcstd.rewrite import replaced_entry
 
 _LONGEST = 200
@@ -56,13 +51,9 @@ def stamp(
         state = container.state
         if _present(real, state, identity, object_name, replace, limits):
             return False
-        _check_writable(real)
-        content = replaced_entry(container, *_stamped_xml(container, key, identity))
-    # The file is closed by now: Windows lets nobody replace an open one.
-    try:
-        _write(real, state, content, key, identity)
-    except OSError as error:
-        raise DocumentError(real, f"it cannot be written: {error.strerror or error}") from error
+        check_writable(real)
+        content = replaced_entry(container, *_stamped_xml(container, key, identity, limits))
+    replace_file(real, state, content, lambda copy: _read_back(real, copy, key, identity))
     return True
 
 
@@ -77,8 +68,8 @@ def check_stampable(
     limits = limits or Limits()
     with ContainerFile(real, limits) as container:
         _present(real, container.state, "", object_name, False, limits)
-        _check_writable(real)
-        _stamped_xml(container, meta_key(object_name or ""), "0" * 36)
+        check_writable(real)
+        _stamped_xml(container, meta_key(object_name or ""), "0" * 36, limits)
 
 
 def _check_identity(path: str, identity: str) -> None:
@@ -96,7 +87,7 @@ def _present(
     with Library(limits=limits) as library:
         document = library.open(path)
         if document.state != state:
-            raise _changed(path)
+            raise changed(path)
         obj = None if object_name is None else document.getObject(object_name)
         if object_name is not None and obj is None:
             raise DocumentError(path, f"it holds no object named {object_name!r}")
@@ -119,52 +110,9 @@ def _property(owner: object, name: str) -> str:
     return value.strip() if isinstance(value, str) else ""
 
 
-def _changed(path: str) -> FcstdError:
-    return FcstdError(path, "it was changed by somebody else meanwhile; nothing was written")
-
-
-def _check_writable(path: str) -> None:
-    # Asked of the mode: an administrator may write anything, and replacing a file needs no right to it at
-    # all.
-    if not os.stat(path).st_mode & stat.S_IWUSR or not os.access(path, os.W_OK):
-        raise DocumentError(path, "it is read-only; nothing was written")
-    if not os.access(os.path.dirname(path), os.W_OK):
-        raise DocumentError(path, "its folder is read-only; nothing was written")
-
-
-def _stamped_xml(container: ContainerFile, key: str, identity: str) -> tuple[Entry, bytes]:
+def _stamped_xml(container: ContainerFile, key: str, identity: str, limits: Limits) -> tuple[Entry, bytes]:
     """The entry Document.xml, and its content as it is to become."""
-    path, limits = container.path, container.limits
-    entry = container.entry(DOCUMENT_XML)
-    if entry is None:
-        raise FcstdError(path, "it is no FreeCAD document (there is no Document.xml in it)")
-    packed = container.packed(entry, limits.packed)
-    text = Inflater(path, entry, packed, limits.document_xml, limits).whole()
-    try:
-        return entry, with_meta(text, key, identity, limits.depth)
-    except ValueError as error:
-        raise FcstdError(path, f"its Document.xml {error}; nothing was written") from error
-
-
-def _write(path: str, state: FileState, content: bytes, key: str, identity: str) -> None:
-    """Replace the file, which must still be in ``state``, in one step."""
-    folder = os.path.dirname(path)
-    descriptor, temporary = tempfile.mkstemp(prefix=".silo-", suffix=".tmp", dir=folder)
-    try:
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(content)
-            file.flush()
-            _keep_rights(path, file.fileno())
-            os.fsync(file.fileno())
-        _read_back(path, temporary, key, identity)
-        if _state(path) != state:
-            raise _changed(path)
-        replace_patiently(temporary, path)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            os.unlink(temporary)
-        raise
-    sync_folder(folder)
+    return edited_xml(container, lambda text: with_meta(text, key, identity, limits.depth), limits)
 
 
 def _read_back(path: str, temporary: str, key: str, identity: str) -> None:
@@ -176,23 +124,3 @@ def _read_back(path: str, temporary: str, key: str, identity: str) -> None:
         raise DocumentError(path, reason) from error
     if read != identity:
         raise DocumentError(path, "the stamped copy does not hold the identity; the file is unchanged")
-
-
-def _keep_rights(path: str, descriptor: int) -> None:
-    status = os.stat(path)
-    if hasattr(os, "fchown"):
-        with contextlib.suppress(OSError):  # only an administrator may give files away
-            os.fchown(descriptor, status.st_uid, status.st_gid)
-    if hasattr(os, "fchmod"):
-        os.fchmod(descriptor, stat.S_IMODE(status.st_mode))
-    if hasattr(os, "listxattr"):
-        for name in os.listxattr(path):
-            with contextlib.suppress(OSError):  # some belong to the system
-                os.setxattr(descriptor, name, os.getxattr(path, name))
-
-
-def _state(path: str) -> FileState | None:
-    try:
-        return FileState.of(os.stat(path))
-    except OSError:
-        return None

@@ -52,6 +52,7 @@ class _Note:
     severity: Severity
     message: str
     tail: str = ""
+    file: str = ""
     users: dict[Place, str] = field(default_factory=dict)
 
     def finding(self, code: FindingCode) -> Finding:
@@ -60,7 +61,7 @@ class _Note:
         if self.tail:
             names = _names(list(dict.fromkeys(self.users[place] for place in where)))
             message = f"{message}; {self.tail.format(users=names)}."
-        return Finding(code, self.severity, message, tuple(where))
+        return Finding(code, self.severity, message, tuple(where), self.file)
 
 
 class _Whole:
@@ -118,6 +119,7 @@ class Notes:
             self._add(code, about, Severity.WARNING, text, link, "not counted: {users}")
         else:
             self._add(code, about, Severity.ERROR, text, link, "used by {users}")
+            self._notes[code, about].file = problem.file
 
     def unreadable(self, obj: Any, error: DocumentError) -> None:
         """The file that ``obj`` lies in is damaged at this very place."""

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Change the Document.xml of an FCStd file, and nothing else of it.
+
+All other entries keep their bytes, order and times. The file is replaced in one step, so a reader sees the
+old one or the new one; what was written is read back first.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import stat
+import tempfile
+from collections.abc import Callable
+
+from silo.bom.errors import DocumentError
+from silo.durable import replace_patiently, sync_folder
+from silo.fcstd.container import DOCUMENT_XML, ContainerFile, Entry, FileState
+from silo.fcstd.inflate import Inflater
+from silo.fcstd.limits import Limits
+from silo.fcstd.problem import FcstdError
+
+# The text of Document.xml → as it is to become; ValueError where it cannot be edited, says why.
+Edit = Callable[[bytes], bytes]
+
+
+def changed(path: str) -> FcstdError:
+    """Somebody else wrote the file meanwhile."""
+    return FcstdError(path, "it was changed by somebody else meanwhile; nothing was written")
+
+
+def check_writable(path: str) -> None:
+    """Raise DocumentError where the file may not be replaced."""
+    # Asked of the mode: an administrator may write anything, and replacing a file needs no right to it at
+    # all.
+    if not os.stat(path).st_mode & stat.S_IWUSR or not os.access(path, os.W_OK):
+        raise DocumentError(path, "it is read-only; nothing was written")
+    if not os.access(os.path.dirname(path), os.W_OK):
+        raise DocumentError(path, "its folder is read-only; nothing was written")
+
+
+def document_xml(container: ContainerFile, limits: Limits) -> tuple[Entry, bytes]:
+    """The entry Document.xml and its text. Raises DocumentError."""
+    entry = container.entry(DOCUMENT_XML)
+    if entry is None:
+        raise FcstdError(container.path, "it is no FreeCAD document (there is no Document.xml in it)")
+    packed = container.packed(entry, limits.packed)
+    return entry, Inflater(container.path, entry, packed, limits.document_xml, limits).whole()
+
+
+def edited_xml(container: ContainerFile, edit: Edit, limits: Limits) -> tuple[Entry, bytes]:
+    """The entry Document.xml, and its text as it is to become. Raises DocumentError."""
+    entry, text = document_xml(container, limits)
+    try:
+        return entry, edit(text)
+    except ValueError as error:
+        raise FcstdError(container.path, f"its Document.xml {error}; nothing was written") from error
+
+
+def replace_file(path: str, state: FileState, content: bytes, check: Callable[[str], None]) -> None:
+    """Replace the file, which must still be in ``state``, in one step. Raises DocumentError.
+
+    check
+        looks at the copy that was written, and raises DocumentError where it is not what it should be.
+    """
+    # The file is closed by now: Windows lets nobody replace an open one.
+    try:
+        _write(path, state, content, check)
+    except OSError as error:
+        raise DocumentError(path, f"it cannot be written: {error.strerror or error}") from error
+
+
+def _write(path: str, state: FileState, content: bytes, check: Callable[[str], None]) -> None:
+    folder = os.path.dirname(path)
+    descriptor, temporary = tempfile.mkstemp(prefix=".silo-", suffix=".tmp", dir=folder)
+    try:
+        with os.fdopen(descriptor, "wb") as file:
+            file.write(content)
+            file.flush()
+            _keep_rights(path, file.fileno())
+            os.fsync(file.fileno())
+        check(temporary)
+        if _state(path) != state:
+            raise changed(path)
+        replace_patiently(temporary, path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            os.unlink(temporary)
+        raise
+    sync_folder(folder)
+
+
+def _keep_rights(path: str, descriptor: int) -> None:
+    status = os.stat(path)
+    if hasattr(os, "fchown"):
+        with contextlib.suppress(OSError):  # only an administrator may give files away
+            os.fchown(descriptor, status.st_uid, status.st_gid)
+    if hasattr(os, "fchmod"):
+        os.fchmod(descriptor, stat.S_IMODE(status.st_mode))
+    if hasattr(os, "listxattr"):
+        for name in os.listxattr(path):
+            with contextlib.suppress(OSError):  # some belong to the system
+                os.setxattr(descriptor, name, os.getxattr(path, name))
+
+
+def _state(path: str) -> FileState | None:
+    try:
+        return FileState.of(os.stat(path))
+    except OSError:
+        return None

@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Which file was meant, where one is missing: files move, and are renamed.
+
+The rules of this module, the surest first; each names a file only where exactly one fits:
+
+* it carries the Silo identity of the missing component, where the caller knows that (from the last sync);
+* it is not in use and has the date that the links recorded of it, to the second: the same file, moved;
+* it has the same name (but for case and normalisation) in another folder;
+* no other file of the project that is not in use already holds all the objects that are wanted.
+
+In every case it must hold all the objects that the links want.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from silo.bom.errors import DocumentError
+from silo.bom.findings import Finding, FindingCode
+from silo.bom.identity import identity_of, walk_entries
+from silo.bom.model import BomEntry, Extraction
+from silo.fcstd.document import FcstdDocument
+from silo.fcstd.library import Library
+from silo.spelling import folded
+
+# A project has some hundreds of files; a home folder taken for one would have many more.
+_MOST_FILES = 2000
+_MOST_FOLDERS = 5000
+_CODES = (FindingCode.MISSING_FILE, FindingCode.MISSING_OBJECT)
+
+# (file, object) → the Silo UUID that it had in the last sync.
+Identities = Mapping[tuple[str, str], str]
+
+
+@dataclass
+class _Lost:
+    file: str
+    objects: set[str] = field(default_factory=set)
+    stamps: set[str] = field(default_factory=set)
+
+
+def with_suggestions(extraction: Extraction, identities: Identities | None = None) -> Extraction:
+    """The extraction, its findings of missing files with the file that was probably meant.
+
+    Reads the project's files; costs nothing where no file is missing.
+    """
+    lost = _lost(extraction)
+    if not lost:
+        return extraction
+    with Library() as library:
+        _read_stamps(extraction, lost, library)
+        files = list(_project_files(extraction))
+        used = {entry.doc_path for entry in walk_entries((extraction.assembly, *extraction.entries))}
+        project = _Project(library, files, used, identities or {})
+        meant = {file: found for file, one in lost.items() if (found := project.meant(one))}
+    findings = tuple(_told(finding, meant, extraction) for finding in extraction.findings)
+    return replace(extraction, findings=findings)
+
+
+def _told(finding: Finding, meant: Mapping[str, tuple[str, str]], extraction: Extraction) -> Finding:
+    if finding.code not in _CODES or finding.file not in meant:
+        return finding
+    file, why = meant[finding.file]
+    top = os.path.basename(extraction.assembly.doc_path)
+    message = (
+        f"{finding.message} Did you mean {file} ({why})? "
+        f"`silo-mod relink {top} --from {finding.file} --to {file}` mends the links."
+    )
+    return replace(finding, message=message, did_you_mean=file)
+
+
+def _lost(extraction: Extraction) -> dict[str, _Lost]:
+    told = {finding.file for finding in extraction.findings if finding.code in _CODES and finding.file}
+    lost: dict[str, _Lost] = {}
+    for entry in walk_entries(extraction.entries):
+        if entry.missing and entry.doc_path in told:
+            lost.setdefault(entry.doc_path, _Lost(entry.doc_path)).objects.add(entry.object_name)
+    return lost
+
+
+def _read_stamps(extraction: Extraction, lost: Mapping[str, _Lost], library: Library) -> None:
+    """The dates that the links recorded of their targets."""
+    head = replace(extraction.assembly, children=extraction.entries)
+    for parent in walk_entries((head,)):
+        for entry in parent.children:
+            if entry.missing and entry.doc_path in lost:
+                lost[entry.doc_path].stamps |= set(_stamps(parent, entry, library))
+
+
+def _stamps(parent: BomEntry, entry: BomEntry, library: Library) -> Iterator[str]:
+    try:
+        document = library.open(parent.doc_path)
+    except DocumentError:
+        return
+    for name in entry.instances:
+        link = document.getObject(name)
+        if link is not None and (stamp := link.stamp_of("LinkedObject")):
+            yield stamp
+
+
+def _project_files(extraction: Extraction) -> Iterator[str]:
+    """The FreeCAD files of the folder that all files of the tree share."""
+    paths = [entry.doc_path for entry in walk_entries((extraction.assembly, *extraction.entries))]
+    folders = [os.path.dirname(path) for path in paths if path]
+    top = os.path.dirname(extraction.assembly.doc_path)
+    try:
+        root = os.path.commonpath(folders)
+    except ValueError:  # another Windows drive
+        root = top
+    # The root of the disk, or the home folder, is no project.
+    if root in (os.path.abspath(os.sep), os.path.expanduser("~")) or len(Path(root).parts) < 3:
+        root = top
+    left, folders_left = _MOST_FILES, _MOST_FOLDERS
+    for folder, inner, names in os.walk(root):
+        inner[:] = sorted(name for name in inner if not name.startswith("."))
+        folders_left -= 1
+        for name in sorted(names):
+            if name.lower().endswith(".fcstd") and not name.startswith(".") and left > 0:
+                left -= 1
+                yield os.path.join(folder, name)
+        if left <= 0 or folders_left <= 0:
+            return
+
+
+class _Project:
+    """The files that may have been meant."""
+
+    def __init__(
+        self, library: Library, files: Sequence[str], used: set[str], identities: Identities
+    ) -> None:
+        self._library, self._files, self._used, self._identities = library, files, used, identities
+        self._opened: dict[str, FcstdDocument | None] = {}
+
+    def meant(self, lost: _Lost) -> tuple[str, str] | None:
+        """The file, and why it is the one."""
+        holding = [path for path in self._files if path != lost.file and self._holds(path, lost.objects)]
+        unused = [path for path in holding if path not in self._used]
+        rules: list[tuple[str, list[str]]] = [
+            ("it carries the Silo identity", [path for path in holding if self._identified(path, lost)]),
+            ("the same file, moved", [path for path in unused if self._date(path) in lost.stamps]),
+            ("a file of this name", [path for path in holding if _same_name(path, lost.file)]),
+            (f"the only other file with {_names(lost.objects)}", unused),
+        ]
+        for why, fitting in rules:
+            # Copies of one file share its date; their names may still tell them apart.
+            exact = [path for path in fitting if _same_name(path, lost.file)] or fitting
+            if len(exact) == 1:
+                return exact[0], why
+        return None
+
+    def _document(self, path: str) -> FcstdDocument | None:
+        if path not in self._opened:
+            try:
+                self._opened[path] = self._library.open(path)
+            except DocumentError:
+                self._opened[path] = None
+        return self._opened[path]
+
+    def _holds(self, path: str, objects: Iterable[str]) -> bool:
+        document = self._document(path)
+        return document is not None and all(document.getObject(name) is not None for name in objects if name)
+
+    def _date(self, path: str) -> str:
+        document = self._document(path)
+        return document.LastModifiedDate if document is not None else ""
+
+    def _identified(self, path: str, lost: _Lost) -> bool:
+        document = self._document(path)
+        wanted = {name: self._identities.get((lost.file, name)) for name in lost.objects}
+        if document is None or not all(wanted.values()):
+            return False
+        return all(
+            (identity_of(document.getObject(name)) or "").lower() == (uuid or "").lower()
+            for name, uuid in wanted.items()
+        )
+
+
+def _same_name(one: str, other: str) -> bool:
+    return folded(os.path.basename(one)) == folded(os.path.basename(other.replace("\\", "/")))
+
+
+def _names(objects: Iterable[str]) -> str:
+    names = sorted(filter(None, objects))
+    return ", ".join(names[:3]) + (" …" if len(names) > 3 else "")
