@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from silo.addon_install import CHECKOUT, Place, ask_freecad, install_folder
+from silo.addon_install import CHECKOUT, Place, ask_freecad, install_folder, install_packages
 from silo.bom.errors import ConfigError, InputError
 
 STAND_IN = """#!{python}
@@ -81,3 +81,28 @@ def test_a_strangers_folder_is_left_alone(tmp_path: Path) -> None:
         with pytest.raises(InputError, match="move it away"):
             install_folder(place(tmp_path), copy=copy)
     assert (place(tmp_path).mod / "notes.txt").read_text(encoding="utf-8") == "mine"
+
+
+class Linkless(type(Path())):  # type: ignore[misc]
+    """A folder of Windows without developer mode: it takes files, and refuses links."""
+
+    def symlink_to(self, *_: object, **__: object) -> None:
+        raise OSError("a required privilege is not held by the client")
+
+
+def test_where_no_links_can_be_made_the_addon_is_copied(tmp_path: Path) -> None:
+    told = install_folder(Place(Linkless(tmp_path / "data"), (1, 0), (3, 13)))
+    assert "copied" in told
+    assert (place(tmp_path).mod / "mods" / "silo" / "workbench" / "freecad" / "host.py").is_file()
+
+
+def test_packages_are_installed_by_freecads_own_python(tmp_path: Path) -> None:
+    """It knows its processor and version; any other Python would have to be told."""
+    log = tmp_path / "log"
+    own = program(tmp_path / "python3", f'#!/bin/sh\necho "$*" >> {log}\n')
+    found = Place(tmp_path / "data", (1, 1), (3, 11), (str(tmp_path / "none"), own))
+    assert install_packages(found) == str(found.packages)
+    asked, installed = log.read_text().splitlines()
+    assert asked == "-m pip --version"
+    assert f"--target {found.packages}" in installed
+    assert "--python-version" not in installed

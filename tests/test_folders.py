@@ -57,3 +57,13 @@ def test_nothing_is_created(tmp_path: Path) -> None:
     for folder, _, _ in FOLDERS:
         folder({"HOME": str(tmp_path)})
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("platform", ["linux", "darwin", "win32"])
+def test_one_folder_can_stand_for_all(platform: str) -> None:
+    """The demo and a portable installation keep everything in one place, on every platform."""
+    env = {"SILO_HOME": "/stick/silo", "XDG_DATA_HOME": "/data", "APPDATA": "/roaming", "HOME": "/home/d"}
+    found = [folder(env, platform) for folder in (config_folder, data_folder, cache_folder)]
+    assert found == [Path("/stick/silo/config"), Path("/stick/silo/data"), Path("/stick/silo/cache")]
+    usual = config_folder({**env, "SILO_HOME": ""}, platform)
+    assert config_folder({**env, "SILO_HOME": "relative"}, platform) == usual

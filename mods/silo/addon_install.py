@@ -14,11 +14,12 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from silo.bom.errors import ConfigError, InputError
 from silo.freecadcmd.run import find_freecadcmd
+from silo.platform import child_options, python_beside
 
 # As package.xml declares them to the Addon Manager.
 PACKAGES = ("requests>=2.31", "sseclient-py>=1.8", "pydantic>=2.7")
@@ -31,7 +32,7 @@ import json, os, sys
 import FreeCAD
 with open(os.environ["SILO_ASK_OUT"], "w", encoding="utf-8") as out:
     json.dump({"data": FreeCAD.getUserAppDataDir(), "freecad": FreeCAD.Version()[:2],
-               "python": list(sys.version_info[:2])}, out)
+               "python": list(sys.version_info[:2]), "prefix": sys.base_exec_prefix}, out)
 """
 _ASK_SECONDS = 60.0
 _PIP_SECONDS = 600.0
@@ -39,11 +40,12 @@ _PIP_SECONDS = 600.0
 
 @dataclass(frozen=True)
 class Place:
-    """A FreeCAD: its data folder, its version and its Python's."""
+    """A FreeCAD: its data folder, its version and its Python's, and where that Python may be started."""
 
     data: Path
     freecad: tuple[int, int]
     python: tuple[int, int]
+    pythons: tuple[str, ...] = field(default=(), compare=False)
 
     @property
     def mod(self) -> Path:
@@ -68,7 +70,8 @@ def ask_freecad(freecadcmd: str | None = None, data: Path | None = None) -> Plac
                 env={**os.environ, "SILO_ASK_OUT": str(out)},
                 stdin=subprocess.DEVNULL,
                 capture_output=True,
-                text=True,
+                encoding="utf-8",
+                errors="replace",
                 timeout=_ASK_SECONDS,
                 cwd=folder,
                 check=False,
@@ -80,7 +83,31 @@ def ask_freecad(freecadcmd: str | None = None, data: Path | None = None) -> Plac
             raise ConfigError(f"{command} did not tell where its folders are: {last[0]}")
         told = json.loads(out.read_text(encoding="utf-8"))
     major, minor = (int(part) for part in told["freecad"])
-    return Place(data or Path(told["data"]), (major, minor), (told["python"][0], told["python"][1]))
+    pythons = (*python_beside(told["prefix"]), *python_beside(os.path.dirname(os.path.realpath(command))))
+    python = (told["python"][0], told["python"][1])
+    return Place(data or Path(told["data"]), (major, minor), python, pythons)
+
+
+def _run(command: list[str], seconds: float) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        command,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        encoding="utf-8",
+        errors="replace",
+        timeout=seconds,
+        check=False,
+        **child_options(),
+    )
+
+
+def _has_pip(python: str) -> bool:
+    try:
+        return (
+            os.path.isfile(python) and _run([python, "-m", "pip", "--version"], _ASK_SECONDS).returncode == 0
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return False
 
 
 def install_folder(place: Place, source: Path = CHECKOUT, *, copy: bool = False) -> str:
@@ -107,7 +134,10 @@ def install_folder(place: Place, source: Path = CHECKOUT, *, copy: bool = False)
             source / "mods" / "silo", target / "mods" / "silo", ignore=shutil.ignore_patterns("__pycache__")
         )
         return f"copied to {target}"
-    target.symlink_to(source, target_is_directory=True)
+    try:
+        target.symlink_to(source, target_is_directory=True)
+    except OSError:  # Windows lets only administrators and developers make links
+        return f"{install_folder(place, source, copy=True)} (this system makes no links)"
     return f"{target} now leads to this checkout"
 
 
@@ -116,13 +146,14 @@ def install_packages(place: Place) -> str:
     version = "{}.{}".format(*place.python)
     if place.python < (3, 11):
         raise ConfigError(f"this FreeCAD has Python {version}; the add-on needs 3.11 or newer")
-    command = [
-        *(sys.executable, "-m", "pip", "install", "--quiet", "--upgrade", "--target", str(place.packages)),
-        *("--python-version", version, "--only-binary=:all:", *PACKAGES),
-    ]
-    run = subprocess.run(
-        command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=_PIP_SECONDS, check=False
-    )
+    install = ["install", "--quiet", "--upgrade", "--target", str(place.packages), *PACKAGES]
+    own = next((python for python in place.pythons if _has_pip(python)), None)
+    if own is not None:  # FreeCAD's own knows which packages fit it, and which processor it is made for
+        command = [own, "-m", "pip", *install]
+    else:
+        command = [sys.executable, "-m", "pip", *install]
+        command += ["--python-version", version, "--only-binary=:all:"]
+    run = _run(command, _PIP_SECONDS)
     if run.returncode:
         last = (run.stderr or run.stdout).strip().splitlines()[-1:] or ["it said nothing"]
         raise ConfigError(f"pip could not install {', '.join(PACKAGES)} for Python {version}: {last[0]}")

@@ -3,24 +3,35 @@
 
 from __future__ import annotations
 
+import glob
 import hashlib
 import os
 from collections.abc import Iterable, Mapping
+from itertools import chain
 from pathlib import Path
 
 from silo.bom.errors import DocumentError, InputError
 
 
 def documents_in(tops: Iterable[str]) -> list[str]:
-    """The files that are meant: a folder stands for all FCStd files below it, backups left out."""
+    """The files that are meant: a folder stands for all FCStd files below it, backups left out.
+
+    A pattern (``*.FCStd``) stands for what fits it: the shells of Windows hand patterns over as they are.
+    """
     found: list[str] = []
-    for top in tops:
+    for top in chain.from_iterable(map(_meant, tops)):
         path = Path(top)
         if path.is_dir():
             found += sorted(str(p) for p in path.rglob("*") if p.suffix.lower() == ".fcstd" and p.is_file())
         else:
             found.append(top)
     return list(dict.fromkeys(found))
+
+
+def _meant(top: str) -> list[str]:
+    if glob.has_magic(top) and not os.path.lexists(top):
+        return sorted(glob.glob(top)) or [top]
+    return [top]
 
 
 def job_text(env: Mapping[str, str]) -> str | None:

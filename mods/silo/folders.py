@@ -3,7 +3,8 @@
 
 Client and server ask here, so that what one wrote the other finds. The add-on inside FreeCAD may only need
 three packages, so the few lines of ``platformdirs`` that matter are here: the XDG base directories,
-``~/Library`` on macOS, ``%APPDATA%`` and ``%LOCALAPPDATA%`` on Windows. Standard library only.
+``~/Library`` on macOS, ``%APPDATA%`` and ``%LOCALAPPDATA%`` on Windows. ``SILO_HOME`` names one folder for
+all of them, on every platform. Standard library only.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ _LOCAL, _ROAMING = ("LOCALAPPDATA", "AppData/Local"), ("APPDATA", "AppData/Roami
 def _folder(
     env: Mapping[str, str], platform: str, xdg: str, unix: str, mac: str, windows: tuple[str, str]
 ) -> Path:
+    if os.path.isabs(whole := env.get("SILO_HOME", "")):
+        return Path(whole) / xdg[len("XDG_") : -len("_HOME")].lower()
     home = Path(env.get("HOME") or Path.home())
     if platform == "win32":
         variable, default = windows

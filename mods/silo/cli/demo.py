@@ -78,15 +78,15 @@ def run(args: argparse.Namespace) -> int:
 @contextmanager
 def _private_data(folder: Path) -> Iterator[None]:
     """The journal of registrations of the demo is not the user's."""
-    before = os.environ.get("XDG_DATA_HOME")
-    os.environ["XDG_DATA_HOME"] = str(folder)
+    before = os.environ.get("SILO_HOME")
+    os.environ["SILO_HOME"] = str(folder)
     try:
         yield
     finally:
         if before is None:
-            del os.environ["XDG_DATA_HOME"]
+            del os.environ["SILO_HOME"]
         else:
-            os.environ["XDG_DATA_HOME"] = before
+            os.environ["SILO_HOME"] = before
 
 
 @contextmanager

@@ -24,15 +24,9 @@ from silo import platform
 from silo.bom.errors import CancelledError, ConfigError, DocumentError, InputError, SiloError
 from silo.bom.model import Extraction
 from silo.bom.snapshot import from_plain
+from silo.freecads import commands, exchange_folder
 
 HEADLESS = Path(__file__).resolve().parents[1] / "workbench" / "headless.py"
-_NAMES = ("freecadcmd", "FreeCADCmd", "freecadcmd-daily", "freecad.cmd")
-_ELSEWHERE = (
-    "/Applications/FreeCAD.app/Contents/Resources/bin/freecadcmd",
-    "/snap/bin/freecad.cmd",
-    r"C:\Program Files\FreeCAD 1.1\bin\freecadcmd.exe",
-    r"C:\Program Files\FreeCAD 1.0\bin\freecadcmd.exe",
-)
 # FreeCAD opens large assemblies in minutes; this is per file.
 TIMEOUT_S = 900.0
 _POLL_S = 0.05
@@ -47,13 +41,14 @@ def find_freecadcmd(given: str | None = None, env: Mapping[str, str] = os.enviro
         if found is None:
             raise ConfigError(f"{wanted} cannot be run; SILO_FREECADCMD must name FreeCAD's freecadcmd")
         return found
-    for name in (*_NAMES, *_ELSEWHERE):
-        if (found := shutil.which(name)) is not None:
-            return found
-    raise ConfigError(
-        "no FreeCAD found: neither freecadcmd nor FreeCADCmd is on the PATH. Install FreeCAD, or set "
-        "SILO_FREECADCMD to its freecadcmd"
-    )
+    found = next(commands(env), None)
+    if found is None:
+        raise ConfigError(
+            "no FreeCAD found: freecadcmd is not on the PATH, nor where FreeCAD is usually installed. "
+            "Install FreeCAD, or set SILO_FREECADCMD to its freecadcmd (for an AppImage or Flatpak to a "
+            "script that starts it)"
+        )
+    return found
 
 
 def run_freecad(
@@ -124,10 +119,14 @@ class FreeCADRun:
     cancelled: Callable[[], bool] | None = None
     begun: bool = False
     timed_out: bool = False
-    _folder: tempfile.TemporaryDirectory[str] = field(
-        default_factory=lambda: tempfile.TemporaryDirectory(prefix="silo-freecad-")
-    )
+    _folder: tempfile.TemporaryDirectory[str] = field(init=False)
     _process: subprocess.Popen[bytes] | None = None
+
+    def __post_init__(self) -> None:
+        shared = exchange_folder(self.freecadcmd)
+        if shared is not None:
+            os.makedirs(shared, exist_ok=True)
+        self._folder = tempfile.TemporaryDirectory(prefix="silo-freecad-", dir=shared)
 
     @property
     def _results(self) -> Path:

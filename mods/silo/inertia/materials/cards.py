@@ -15,9 +15,9 @@ from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
+from silo.freecads import material_folders
 from silo.inertia.materials.density import parse_density
 from silo.inertia.materials.table import Material
-from silo.platform import WINDOWS
 
 MAX_CARD_BYTES = 1_000_000
 
@@ -36,7 +36,7 @@ def installed_cards() -> tuple[Material, ...]:
 def card_folders() -> tuple[Path, ...]:
     """Folders that hold material cards here: FREECAD_MATERIALS first, then the usual places."""
     given = [Path(p) for p in os.environ.get("FREECAD_MATERIALS", "").split(os.pathsep) if p]
-    return tuple(folder for folder in (*given, *_usual()) if folder.is_dir())
+    return tuple(folder for folder in (*given, *material_folders()) if folder.is_dir())
 
 
 def cards_fingerprint() -> str:
@@ -50,28 +50,6 @@ def cards_fingerprint() -> str:
                 continue
             seen.update(f"{path}\0{stat.st_size}\0{stat.st_mtime_ns}\n".encode())
     return seen.hexdigest()
-
-
-def _usual() -> Iterator[Path]:
-    home = Path.home()
-    if WINDOWS:
-        for base in (os.environ.get("PROGRAMFILES", ""), os.environ.get("LOCALAPPDATA", "")):
-            if base:
-                yield from sorted(Path(base).glob("FreeCAD*/Mod/Material"), reverse=True)
-                yield from sorted(Path(base).glob("Programs/FreeCAD*/Mod/Material"), reverse=True)
-        yield Path(os.environ.get("APPDATA", home)) / "FreeCAD" / "Material"
-        return
-    yield Path("/Applications/FreeCAD.app/Contents/Resources/Mod/Material")
-    yield home / "Library/Application Support/FreeCAD/Material"
-    for base in (
-        "/usr/share/freecad",
-        "/usr/lib/freecad",
-        "/usr/local/share/freecad",
-        "/usr/lib/freecad-daily",
-    ):
-        yield Path(base) / "Mod" / "Material"
-    yield home / ".local/share/FreeCAD/Material"
-    yield from sorted(home.glob(".local/share/FreeCAD/v*/Material"), reverse=True)
 
 
 def read_cards(folders: Iterable[Path]) -> list[Material]:

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Where FreeCADs lie on Windows, macOS and Linux: the command, the material cards, a folder they can read.
+
+Gathered from FreeCAD's installers and packages (the Windows installer for all users or for one, the bundle
+for macOS, Debian, conda, Snap, Flatpak). Of several versions the newest comes first. Standard library only.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from silo.platform import NAME
+
+_COMMANDS = ("freecadcmd", "FreeCADCmd", "freecadcmd-daily", "freecad.cmd")
+_FLATPAK = "org.freecad.FreeCAD"
+_ROOT = Path("/")
+_BUNDLES = ("/Applications", "~/Applications")
+
+
+def commands(env: Mapping[str, str] = os.environ, platform: str = NAME, root: Path = _ROOT) -> Iterator[str]:
+    """Every ``freecadcmd`` that can be started here, those on the PATH first. ``root``: of the disk."""
+    for name in _COMMANDS:
+        if (found := shutil.which(name, path=env.get("PATH"))) is not None:
+            yield found
+    for path in _matching(env, root, *_command_places(env, platform)):
+        if os.access(path, os.X_OK):
+            yield str(path)
+
+
+def _command_places(env: Mapping[str, str], platform: str) -> tuple[str, ...]:
+    if platform == "win32":
+        return tuple(f"{base}/bin/{name}.exe" for base in _windows(env) for name in _COMMANDS[:2])
+    if platform == "darwin":
+        return tuple(f"{base}/FreeCAD*.app/Contents/Resources/bin/freecadcmd" for base in _BUNDLES)
+    return ("/snap/bin/freecad.cmd", "/usr/local/bin/freecadcmd", "~/.local/bin/freecadcmd")
+
+
+def material_folders(
+    env: Mapping[str, str] = os.environ, platform: str = NAME, root: Path = _ROOT
+) -> Iterator[Path]:
+    """Folders with FreeCAD's material cards: its own ones, then the user's. ``root``: of the disk."""
+    if platform == "win32":
+        shipped = [f"{base}/{data}Mod/Material" for base in _windows(env) for data in ("data/", "")]
+        own = ["{APPDATA}/FreeCAD"]
+    elif platform == "darwin":
+        inside = ("share/Mod", "data/Mod", "Mod")
+        shipped = [f"{b}/FreeCAD*.app/Contents/Resources/{m}/Material" for b in _BUNDLES for m in inside]
+        own = ["~/Library/Application Support/FreeCAD", "~/Library/Preferences/FreeCAD"]
+    else:
+        bases = (
+            "/usr/share/freecad",
+            "/usr/lib/freecad",
+            "/usr/local/share/freecad",
+            "/usr/lib/freecad-daily",
+        )
+        packed = (
+            "/snap/freecad/current/usr/share/freecad",
+            *(f"{base}/app/{_FLATPAK}/current/active/files" for base in _flatpak_bases()),
+            *(f"{base}/app/{_FLATPAK}/current/active/files/share/freecad" for base in _flatpak_bases()),
+        )
+        shipped = [f"{base}/Mod/Material" for base in (*bases, *packed)]
+        own = ["~/.local/share/FreeCAD", f"~/.var/app/{_FLATPAK}/data/FreeCAD", "~/snap/freecad/common"]
+    yield from _matching(env, root, *shipped)
+    # FreeCAD 1.1 keeps a folder of the user for each version.
+    yield from _matching(env, root, *(f"{folder}/{part}Material" for folder in own for part in ("", "v*/")))
+
+
+def exchange_folder(command: str, env: Mapping[str, str] = os.environ) -> str | None:
+    """Where files for a FreeCAD must lie so that it sees them; None where any temporary folder will do.
+
+    Snap and Flatpak give a program a ``/tmp`` of its own, and a part of the user's home.
+    """
+    real = os.path.realpath(command)
+    home = Path(env.get("HOME") or Path.home())
+    if command.startswith(("/snap/", "/var/lib/snapd/")) or os.path.basename(real) == "snap":
+        return str(home / "snap" / "freecad" / "common")
+    if "flatpak" in command or "flatpak" in real:
+        return str(home / ".var" / "app" / _FLATPAK / "cache")
+    return None
+
+
+def _windows(env: Mapping[str, str]) -> list[str]:
+    """Installed for all users, or for one."""
+    known = [name for name in ("PROGRAMFILES", "PROGRAMW6432", "LOCALAPPDATA") if env.get(name)]
+    places = [f"{{{name}}}" for name in known]
+    places += ["{LOCALAPPDATA}/Programs"] if "LOCALAPPDATA" in known else []
+    return [f"{place}/FreeCAD*" for place in places]
+
+
+def _flatpak_bases() -> tuple[str, str]:
+    return "/var/lib/flatpak", "~/.local/share/flatpak"
+
+
+def _matching(env: Mapping[str, str], root: Path, *patterns: str) -> Iterator[Path]:
+    """What is there, each once; within a pattern the newest version first."""
+    seen = set()
+    for pattern in patterns:
+        for path in sorted(_glob(env, root, pattern), key=_version, reverse=True):
+            if path not in seen:
+                seen.add(path)
+                yield path
+
+
+def _glob(env: Mapping[str, str], root: Path, pattern: str) -> Iterator[Path]:
+    first, *rest = pattern.split("/")
+    if first == "~":
+        base = Path(env.get("HOME") or Path.home())
+    elif first.startswith("{"):
+        base = Path(env.get(first.strip("{}")) or os.devnull)
+    else:
+        base = root
+    return base.glob("/".join(rest))
+
+
+def _version(path: Path) -> list[tuple[int, ...]]:
+    return [tuple(map(int, re.findall(r"\d+", part))) for part in path.parts]
