@@ -18,7 +18,9 @@ from silo.bom.snapshot import to_plain
 
 
 def component(entry: BomEntry, base: str) -> str:
-    """``file#object``; a missing one is marked."""
+    """``file#object``, or the designation of a standard part; a missing one is marked."""
+    if entry.is_standard:
+        return entry.standard or ""
     place = str(Place(os.path.relpath(entry.doc_path, base), entry.object_name))
     return f"{place} (missing)" if entry.missing else place
 
@@ -47,7 +49,9 @@ def consolidated(entries: Iterable[BomEntry], base: str) -> frozenset[str]:
 
 
 def uuids_of(entries: Iterable[BomEntry], base: str) -> dict[str, str]:
-    return {component(e, base): e.silo_uuid for e in walk_entries(entries) if e.silo_uuid}
+    return {
+        component(e, base): e.silo_uuid for e in walk_entries(entries) if e.silo_uuid and not e.is_standard
+    }
 
 
 def _all(entries: Iterable[BomEntry]) -> Iterator[BomEntry]:

@@ -20,22 +20,25 @@ VERSION = tuple(int(part) for part in App.Version()[:2])
 
 @dataclass(frozen=True)
 class Case:
-    """A case: what builds it, in which container styles, since which FreeCAD."""
+    """A case: what builds it, in which container styles, since which FreeCAD, and before which."""
 
     name: str
     build: Callable[[Bench], None]
     styles: tuple[str, ...]
     since: tuple[int, int]
+    before: tuple[int, int] = (99, 0)
 
 
 CASES: list[Case] = []
 
 
-def case(*styles: str, since: tuple[int, int] = (0, 20)) -> Callable[[Callable[[Bench], None]], Any]:
+def case(
+    *styles: str, since: tuple[int, int] = (0, 20), before: tuple[int, int] = (99, 0)
+) -> Callable[[Callable[[Bench], None]], Any]:
     """Register a case; its name is the function's. Without styles: FreeCAD's own and Assembly4's."""
 
     def register(build: Callable[[Bench], None]) -> Callable[[Bench], None]:
-        CASES.append(Case(build.__name__, build, styles or (ASSEMBLY, ASM4), since))
+        CASES.append(Case(build.__name__, build, styles or (ASSEMBLY, ASM4), since, before))
         return build
 
     return register
@@ -146,7 +149,7 @@ def build(out: Path, wanted: Iterable[str] = ()) -> list[str]:
     names = set(wanted)
     built = []
     for one in CASES:
-        if one.since > VERSION or (names and one.name not in names):
+        if one.since > VERSION or one.before <= VERSION or (names and one.name not in names):
             continue
         for style in one.styles:
             if style == ASSEMBLY and VERSION < (1, 0):

@@ -16,10 +16,10 @@ from pathlib import Path
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from freecad_cases import bench, control, counting, files, further, identities  # noqa: E402
+from freecad_cases import bench, control, counting, files, further, hardware, identities  # noqa: E402
 
 # Imported for the cases that they register.
-MODULES = (control, counting, files, further, identities)
+MODULES = (control, counting, files, further, hardware, identities)
 
 out = Path(os.environ["SILO_CASES_OUT"])
 built = bench.build(out, filter(None, os.environ.get("SILO_CASES", "").split(",")))

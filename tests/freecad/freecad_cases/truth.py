@@ -21,6 +21,7 @@ UUID_3 = "33333333-4444-4555-8666-777777777777"
 
 BOLT, PLATE, WASHER = "bolt.FCStd#Bolt", "plate.FCStd#Plate", "washer.FCStd#Washer"
 SUB = "sub.FCStd#Sub"
+SCREW = "ISO 4762 M4×16"
 LOST = "bad.FCStd#Bad (missing)"
 SUB_CONTENT = {BOLT: 2, PLATE: 1}
 
@@ -164,6 +165,55 @@ TRUTH: dict[str, Truth] = {
     "a2plus_part": _is({BOLT: 1}, foreign_component=("top.FCStd#Imported",)),
     "assembly3_container": _is({BOLT: 2}, consolidated=(BOLT,)),
     "two_models_in_one_file": Truth({}, error="holds 2 assemblies: Top (Top), Second (Second)"),
+    # --- standard parts, declared parts, repetition -----------------------------------------------------
+    "hardware_in_the_assembly": _is({BOLT: 1, SCREW: 3, f"{SCREW} LH": 1, "ISO 7089 M3": 1}),
+    "hardware_in_both_spellings": _is({SCREW: 2, "ISO 7380-1 M5×8": 2}),
+    "hardware_in_groups_and_parts": _is({SCREW: 3}),
+    "hardware_linked_in_the_file": _is({SCREW: 10}),
+    "hardware_source_outside": _is({BOLT: 1, SCREW: 3}),
+    "hardware_in_draft_arrays": _is(
+        {SCREW: 6, "ISO 4762 M4×20": 4}, draft_array=("top.FCStd#Array", "top.FCStd#Array001")
+    ),
+    "hardware_cloned": _is({SCREW: 2}),
+    "hardware_in_a_fasteners_file": _is({SCREW: 5, "ISO 4032 M4": 1}),
+    "hardware_in_a_part_file": _is(
+        {"frame.FCStd#Frame": (3, {"IUT heat insert M3×4 ⌀4.55": 2})},
+        local_geometry=("frame.FCStd#Frame",),
+    ),
+    "hardware_beside_the_assembly": _is(
+        {BOLT: 1, SCREW: 2}, counted_beside=("top.FCStd#Loose", "top.FCStd#Sorted")
+    ),
+    "hardware_copied_as_geometry": _is({BOLT: 1}, local_geometry=("top.FCStd#Top",)),
+    "hardware_used_up": _is(
+        {SCREW: 2},
+        consumed=("top.FCStd#Cutters", "top.FCStd#Operand", "top.FCStd#Tool"),
+        local_geometry=("top.FCStd#Top",),
+    ),
+    "hardware_tools": _is({BOLT: 1}),
+    "hardware_excluded": _is({SCREW: 1}, excluded=("top.FCStd#Drawn",)),
+    "declared_part": _is(
+        {"top.FCStd#Motor": 4}, uuids={"top.FCStd#Motor": UUID_1}, local_geometry=("top.FCStd#Top",)
+    ),
+    "declared_container": _is(
+        {"top.FCStd#Module": (1, {BOLT: 2, SCREW: 1})}, uuids={"top.FCStd#Module": UUID_2}
+    ),
+    "array_over_an_inline_part": _is({BOLT: 15}, draft_array=("top.FCStd#Array",)),
+    "draft_arrays_without_links": _is(
+        {BOLT: 6, PLATE: 5, WASHER: 16},
+        draft_array=("top.FCStd#Array", "top.FCStd#Array001", "top.FCStd#Array002"),
+    ),
+    "link_to_a_draft_array_elsewhere": _is(
+        {"kit.FCStd#Array": (2, {BOLT: 6})}, draft_array=("kit.FCStd#Array",)
+    ),
+    "link_in_two_link_groups": _is({BOLT: 2}),
+    "array_elements_in_a_link_group": _is({BOLT: 3}, beside_assembly=("top.FCStd#Row",)),
+    "container_beside_the_assembly": _is({BOLT: 1}, beside_assembly=("top.FCStd#Spare",)),
+    "loose_parts_beside_a_part_of_references": _is(
+        {BOLT: 4}, consolidated=(BOLT,), no_container=("top.FCStd",)
+    ),
+    "mirrored_element_shown": _is({BOLT: 3}, mirrored=("top.FCStd#Row",)),
+    "excluded_element": _is({BOLT: 3}, excluded=("top.FCStd#Row_i2",)),
+    "own_part_in_a_flexible_assembly_link": _is({SUB: (1, SUB_CONTENT), WASHER: 1}, consolidated=(BOLT,)),
     # --- files ------------------------------------------------------------------------------------------
     "missing_file": _is(
         {BOLT: 1, "gone.FCStd#Gone (missing)": 2}, missing_file=("top.FCStd#Lost1", "top.FCStd#Lost2")
