@@ -85,9 +85,8 @@ def _by_urdf(assembly: Assembly, urdf_links: Mapping[str, Sequence[str]], root: 
         owner = _owner(instance, owner_of)
         named += owner is not None
         members[owner or root].append(index)
-    how = (
-        f"{named} of {counted(len(assembly.instances), 'part')} by names of the URDF's links and meshes; "
-        f"the others are in {root}"
+    how = f"{named} of {counted(len(assembly.instances), 'part')} by names of the URDF's links and meshes" + (
+        f"; the others are in {root}" if named < len(assembly.instances) else ""
     )
     empty = tuple(name for name, ids in members.items() if not ids)
     return StartingMap({name: tuple(ids) for name, ids in members.items() if ids}, how, empty)
