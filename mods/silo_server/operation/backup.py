@@ -32,6 +32,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from silo.bom.errors import ConfigError
 from silo.durable import replacing, sync_folder
 from silo_server.clock import stamp, utc_now
+from silo_server.db.bulk import insert_rows
 from silo_server.db.engine import EVENT_CHANNEL, MIGRATION_LOCK, Database, Tx, mode_of
 from silo_server.db.migrate import check_revision, upgrade
 from silo_server.db.state import put_state
@@ -197,6 +198,7 @@ def _save_tables(settings: Settings, path: Path, report: Report) -> tuple[str, d
         check_revision(schema)
         upgrade(new, schema)
         with new.engine.execution_options(silo_write=True).connect() as writer, writer.begin():
+            into = Tx(writer, SYSTEM, utc_now(), new.settings)
             tables = MetaData()
             tables.reflect(writer, only=lambda name, _: name in metadata.tables)
             for target in reversed(tables.sorted_tables):
@@ -204,7 +206,7 @@ def _save_tables(settings: Settings, path: Path, report: Report) -> tuple[str, d
             for target in tables.sorted_tables:
                 names = [c.name for c in target.columns]
                 origin = table(target.name, *[column(name) for name in names])
-                rows[target.name] = _copy_rows(tx.conn, select(*origin.columns), writer, target)
+                rows[target.name] = _copy_rows(tx.conn, select(*origin.columns), into, target)
                 report(f"{target.name}: {rows[target.name]} rows")
             _set_highest_ids(writer, _highest_ids(tx.conn, tables.tables.values()))
     with closing(sqlite3.connect(path)) as saved:
@@ -221,7 +223,7 @@ def _replace_rows(reader: Connection, tx: Tx, made: Manifest, report: Report) ->
     for target in reversed(metadata.sorted_tables):
         tx.conn.execute(target.delete())
     for target in metadata.sorted_tables:
-        count = _copy_rows(reader, select(target), tx.conn, target)
+        count = _copy_rows(reader, select(target), tx, target)
         report(f"{target.name}: {count} rows")
     for name, value in _highest_ids(reader, metadata.sorted_tables).items():
         highest[name] = max(highest.get(name, 0), value)
@@ -240,12 +242,12 @@ def _replace_rows(reader: Connection, tx: Tx, made: Manifest, report: Report) ->
         tx.conn.execute(select(func.pg_notify(EVENT_CHANNEL, "")))
 
 
-def _copy_rows(reader: Connection, query: Select[Any], writer: Connection, target: Table) -> int:
+def _copy_rows(reader: Connection, query: Select[Any], writer: Tx, target: Table) -> int:
     count = 0
     names = [c.name for c in target.columns]
     with reader.execute(query, execution_options={"yield_per": PAGE}) as found:
         for page in found.partitions(PAGE):
-            writer.execute(insert(target), [dict(zip(names, row, strict=True)) for row in page])
+            insert_rows(writer, target, [dict(zip(names, row, strict=True)) for row in page])
             count += len(page)
     return count
 
