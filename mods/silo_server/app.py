@@ -21,6 +21,8 @@ from silo_server.events.hub import Hub
 from silo_server.files import FileStore
 from silo_server.middleware import BodyLimit, SecurityHeaders
 from silo_server.operation.housekeeping import keep_tidy
+from silo_server.operation.metrics import Metrics
+from silo_server.operation.requests import Observed
 from silo_server.routes import auth, bom, items, review, revisions, system, transfer
 from silo_server.routes.context import Server
 from silo_server.settings import Settings, settings_from_environment
@@ -65,6 +67,7 @@ def create_app(settings: Settings, clock: Clock = utc_now) -> FastAPI:
         db.close()
 
     # The interactive pages of FastAPI load scripts from elsewhere, which our CSP forbids; the document stays.
+    metrics = Metrics()
     app = FastAPI(
         title="silo-mod server",
         version=VERSION,
@@ -79,13 +82,20 @@ def create_app(settings: Settings, clock: Clock = utc_now) -> FastAPI:
     pages.install(app)
     app.add_middleware(BodyLimit, settings=settings)
     app.add_middleware(SecurityHeaders)
+    app.state.metrics = metrics
     app.openapi = lambda: _openapi(app)  # type: ignore[method-assign]
     return app
 
 
-def app_from_environment() -> FastAPI:
+def app_from_environment() -> Observed:
     """For other ASGI servers: ``uvicorn --factory silo_server.app:app_from_environment``."""
-    return create_app(settings_from_environment())
+    settings = settings_from_environment()
+    return observed(create_app(settings), settings)
+
+
+def observed(app: FastAPI, settings: Settings) -> Observed:
+    """The application as it is served: with request ids, log, metrics, below its sub-path."""
+    return Observed(app, settings, app.state.metrics)
 
 
 def _openapi(app: FastAPI) -> dict[str, Any]:

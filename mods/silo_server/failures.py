@@ -12,10 +12,12 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from sqlalchemy.exc import DataError, DBAPIError, IntegrityError, OperationalError, TimeoutError
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 from starlette.responses import JSONResponse, Response
 
 from silo.bom.errors import BusyError, CycleError, ReadOnlyError, RejectedError, RouteMissingError, SiloError
 from silo_server.errors import TooManyAttemptsError
+from silo_server.operation.requests import info_of
 
 logger = logging.getLogger("silo_server")
 RETRY_SECONDS = "5"
@@ -29,6 +31,7 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(DBAPIError, _database_error)
     app.add_exception_handler(TimeoutError, _database_error)
     app.add_exception_handler(UnicodeEncodeError, _unicode_error)
+    app.add_exception_handler(ClientDisconnect, _disconnected)
     app.add_exception_handler(Exception, _fault)
 
 
@@ -107,5 +110,14 @@ async def _unicode_error(request: Request, error: Exception) -> Response:
 
 
 async def _fault(request: Request, error: Exception) -> Response:
-    logger.error("%s %s failed", request.method, request.url.path, exc_info=error)
-    return error_answer(500, "server_fault", "the server made a mistake; its log says more")
+    number = info_of(request.scope).id
+    logger.error("request %s: %s %s failed", number, request.method, request.url.path, exc_info=error)
+    return error_answer(
+        500, "server_fault", f"the server made a mistake; its log says more about the request {number}"
+    )
+
+
+async def _disconnected(request: Request, error: Exception) -> Response:
+    # Nobody reads this answer; the request was never whole, so nothing was done.
+    logger.info("request %s: the client went away in the middle of its body", info_of(request.scope).id)
+    return error_answer(400, "rejected", "the request's body ended too soon")

@@ -108,6 +108,13 @@ class FileStore:
             return "unwritable"
         return "ok" if free >= wanted else "full"
 
+    def free(self) -> float:
+        """Free bytes on its disk; NaN where nobody can say."""
+        try:
+            return float(shutil.disk_usage(self.root).free)
+        except OSError:
+            return float("nan")
+
     def _place(self, checksum: str) -> Path:
         return self.root / checksum[:2] / checksum[2:4] / checksum
 

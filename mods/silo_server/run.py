@@ -11,6 +11,7 @@ import multiprocessing.connection
 import os
 import signal
 import socket
+import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -27,9 +28,11 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from silo.bom.errors import ConfigError
 from silo.platform import WORKERS_CAN_SHARE_A_SOCKET, allow_many_files, own_the_port
-from silo_server.app import create_app
+from silo_server.app import create_app, observed
 from silo_server.bootstrap import Welcome, prepare
 from silo_server.db.engine import Database
+from silo_server.operation.metrics import SHARED
+from silo_server.operation.requests import log_to_stderr
 from silo_server.settings import Settings, settings_from_environment
 
 START_SECONDS = 60
@@ -173,7 +176,9 @@ def serve(
             _work(settings, sock, lambda: tell(greeting))
         else:
             tell(greeting)
-            _run_workers(settings, workers, sock)
+            with tempfile.TemporaryDirectory(prefix="silo-metrics-") as shared:
+                os.environ[SHARED] = shared
+                _run_workers(settings, workers, sock)
 
 
 @contextmanager
@@ -226,11 +231,12 @@ def _prepare(settings: Settings, token: str | None) -> Welcome:
 
 def _config(app: FastAPI, settings: Settings) -> uvicorn.Config:
     return uvicorn.Config(
-        app,
+        observed(app, settings),
         http=type("Protocol", (_Protocol,), {"head_seconds": settings.request_head_seconds}),
         log_level="warning",
         # uvicorn's access log writes whole URLs; a login link must not end up there.
         access_log=False,
+        forwarded_allow_ips=settings.trusted_proxies,
         timeout_graceful_shutdown=SHUTDOWN_SECONDS,
         # Longer than a proxy keeps its connections, so that it is never the server who hangs up first.
         timeout_keep_alive=75,
@@ -265,6 +271,7 @@ def _work(settings: Settings, sock: socket.socket, on_up: Callable[[], None] | N
     gc.freeze()
     gc.set_threshold(50_000, 20, 100)
     allow_many_files()
+    log_to_stderr(settings)
     server = SiloServer(_config(create_app(settings), settings), on_up or (lambda: None))
     parent = multiprocessing.parent_process()
     if parent is not None:

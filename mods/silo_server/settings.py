@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -33,6 +34,12 @@ class Settings:
         notification, and how SQLite's changes by another process are seen.
     request_head_seconds, request_body_seconds
         how long a client may take to send a request; a body gets a second more for each 8 KiB of it.
+    request_log
+        write a line of JSON for each request to standard error.
+    root_path
+        the sub-path at which a proxy shows the server (``/silo``); links and redirects begin with it.
+    trusted_proxies
+        addresses and networks whose ``X-Forwarded-For`` and ``X-Forwarded-Proto`` are believed.
     event_log_size, event_log_bytes
         events kept for replay; a client that was away longer gets ``reset``.
     sync_days, sync_bytes
@@ -64,8 +71,16 @@ class Settings:
     login_failures: int = 5
     login_window_seconds: float = 300.0
     secure_cookies: bool = False
+    request_log: bool = False
+    root_path: str = ""
+    trusted_proxies: str = "127.0.0.1,::1"
     admin_username: str = "admin"
     admin_password: str | None = None
+
+    def __post_init__(self) -> None:
+        path = self.root_path
+        if path and (not re.fullmatch(r"(/[\w.~-]+)+", path, re.ASCII)):
+            raise ConfigError(f"root path: wanted a path such as /silo, without / at its end, got {path!r}")
 
     @property
     def sqlalchemy_url(self) -> str:
@@ -123,6 +138,9 @@ _ENVIRONMENT = {
     "max_file_bytes": "SILO_MAX_FILE_BYTES",
     "max_merge_entries": "SILO_MAX_MERGE_ENTRIES",
     "secure_cookies": "SILO_SECURE_COOKIES",
+    "request_log": "SILO_REQUEST_LOG",
+    "root_path": "SILO_ROOT_PATH",
+    "trusted_proxies": "SILO_TRUSTED_PROXIES",
     "admin_username": "SILO_ADMIN_USERNAME",
     "admin_password": "SILO_ADMIN_PASSWORD",
 }

@@ -32,6 +32,7 @@ TABLE: dict[tuple[str, str], str] = {
     ("GET", "/api/auth/tokens"): VIEWER,
     ("POST", "/api/auth/tokens"): VIEWER,
     ("DELETE", "/api/auth/tokens/{token_id}"): VIEWER,
+    ("GET", "/metrics"): VIEWER,
     ("GET", "/api/admin/housekeeping"): ADMIN,
     ("GET", "/api/admin/mode"): ADMIN,
     ("PUT", "/api/admin/mode"): ADMIN,

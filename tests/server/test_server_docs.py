@@ -23,7 +23,7 @@ def text() -> str:
 def test_every_route_is_named(text: str, tmp_path: Path) -> None:
     """And no route that there is not."""
     document = create_app(Settings(database_url=f"sqlite:///{tmp_path / 'x.db'}")).openapi()
-    named = set(re.findall(r"`(/(?:api/[^`?]*|health|ready))`", text)) - {"/api/openapi.json"}
+    named = set(re.findall(r"`(/(?:api/[^`?]*|health|ready|metrics))`", text)) - {"/api/openapi.json"}
     assert named == set(document["paths"])
 
 

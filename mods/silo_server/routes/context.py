@@ -20,6 +20,7 @@ from silo_server.background import Probe
 from silo_server.db.engine import Database
 from silo_server.events.hub import Hub
 from silo_server.files import FileStore
+from silo_server.operation.requests import info_of
 from silo_server.services.credentials import actor_by_token
 from silo_server.services.logins import actor_by_session
 from silo_server.settings import Settings
@@ -73,6 +74,7 @@ class Guard:
 
     async def __call__(self, request: Request) -> Actor:
         actor = await anyio.to_thread.run_sync(find_actor, request)
+        info_of(request.scope).user = actor.username if actor else None
         if actor is None:
             raise AuthError("a valid token is needed: send it as 'Authorization: Bearer silo_…'")
         if not actor.role.covers(self.role):

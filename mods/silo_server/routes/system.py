@@ -18,6 +18,7 @@ from silo_server.db.engine import mode_of
 from silo_server.db.state import put_state
 from silo_server.events.stream import EventStream
 from silo_server.operation.housekeeping import last_run
+from silo_server.operation.metrics import CONTENT_TYPE
 from silo_server.routes.context import (
     READ_ERRORS,
     Admin,
@@ -71,6 +72,17 @@ async def ready(server: ServerDep) -> Response:
         "sse_clients": server.hub.listeners,
     }
     return json_answer(body, 200 if state.ready else 503)
+
+
+@router.get(
+    "/metrics",
+    response_class=Response,
+    responses={**READ_ERRORS, 200: {"content": {"text/plain": {}}, "description": "The numbers"}},
+)
+def metrics(request: Request, server: ServerDep, caller: Viewer) -> Response:
+    """For Prometheus, with a viewer's token."""
+    rendered = request.app.state.metrics.render(server.db, server.hub, server.files)
+    return Response(rendered, headers={"Content-Type": CONTENT_TYPE})
 
 
 @router.get(

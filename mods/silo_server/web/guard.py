@@ -10,7 +10,7 @@ from fastapi import Depends, FastAPI, Request
 from starlette.responses import RedirectResponse, Response
 
 from silo.bom.errors import AuthError, ForbiddenError
-from silo_server.routes.context import SAFE_METHODS, Guard
+from silo_server.routes.context import SAFE_METHODS, Guard, server_of
 from silo_server.values import Actor, Role
 
 
@@ -65,7 +65,8 @@ def _here(request: Request) -> str:
         return request.url.path + query
     # A form cannot be sent again by a link; the page before it is the best that is left.
     referer = urlsplit(request.headers.get("referer", ""))
-    return referer.path if referer.netloc == request.headers.get("host") and referer.path else "/"
+    path = referer.path.removeprefix(server_of(request).settings.root_path)
+    return path if referer.netloc == request.headers.get("host") and path else "/"
 
 
 async def _to_login(_request: Request, error: Exception) -> Response:

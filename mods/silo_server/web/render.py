@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 from urllib.parse import quote, unquote
 
@@ -71,6 +72,7 @@ def _environment() -> Environment:
 
 
 _TEMPLATES = _environment()
+_LINK = re.compile(r'(\s(?:href|src|action|formaction|data-events)=")/(?!/)')
 
 
 def _closed(request: Request) -> bool:
@@ -102,7 +104,9 @@ def page(
         notice=notice,
         **values,
     )
-    response = HTMLResponse(html, status)
+    # The one place that puts links below the sub-path. What people typed has no bare quote, so is no link.
+    root = server_of(request).settings.root_path
+    response = HTMLResponse(_LINK.sub(rf"\g<1>{root}/", html) if root else html, status)
     if notice:
         response.delete_cookie(NOTICE_COOKIE)
     return response

@@ -2,6 +2,7 @@
 // The activity page, live: an event says that there is news, the server's own page brings it.
 
 import { listen } from "./live.js";
+import { root } from "./root.js";
 
 const MOST = 300;
 const list = document.getElementById("entries");
@@ -15,7 +16,7 @@ async function refresh() {
   if (busy) return;
   busy = true;
   try {
-    const answer = await fetch(`/activity?after=${parseInt(list.dataset.last, 10)}`);
+    const answer = await fetch(`${root}/activity?after=${parseInt(list.dataset.last, 10)}`);
     const page = new DOMParser().parseFromString(await answer.text(), "text/html");
     const fresh = page.getElementById("entries");
     if (!fresh) return location.reload(); // logged out meanwhile
@@ -32,7 +33,7 @@ async function refresh() {
   }
 }
 
-listen("/api/events", list.dataset.last, names, refresh, (live) => {
+listen(`${root}/api/events`, list.dataset.last, names, refresh, (live) => {
   state.textContent = live ? "Live: new entries appear by themselves." : "Not connected; trying again.";
   state.classList.toggle("on", live);
 });

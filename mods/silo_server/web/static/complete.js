@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Offers the part numbers that fit what is typed, in the input's own list.
 
+import { root } from "./root.js";
 import { afterTyping } from "./typing.js";
 
 export function complete(input) {
@@ -12,7 +13,7 @@ export function complete(input) {
     const query = encodeURIComponent(input.value.trim());
     if (!query) return;
     try {
-      const answer = await fetch(`/api/items/search?q=${query}&limit=12`, { signal: request.signal });
+      const answer = await fetch(`${root}/api/items/search?q=${query}&limit=12`, { signal: request.signal });
       if (!answer.ok) return;
       const items = await answer.json();
       list.replaceChildren(

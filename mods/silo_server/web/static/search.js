@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
 // Search as you type: the server's own page for the words, of which only the results are shown.
 
+import { root } from "./root.js";
 import { afterTyping } from "./typing.js";
 
 const form = document.getElementById("search");
@@ -10,7 +11,7 @@ async function search() {
   if (request) request.abort();
   request = new AbortController();
   const query = new URLSearchParams(new FormData(form));
-  const url = `/items?${query}`;
+  const url = `${root}/items?${query}`;
   try {
     const answer = await fetch(url, { signal: request.signal });
     const found = new DOMParser().parseFromString(await answer.text(), "text/html");
