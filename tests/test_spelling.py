@@ -23,7 +23,14 @@ NFD = unicodedata.normalize("NFD", "Büchse")
 
 @pytest.fixture
 def disk(tmp_path: Path) -> Iterator[Path]:
-    """A folder on a disk that finds a name in any case and normal form."""
+    """A folder on a disk that finds a name in any case and normal form: the machine's own, or a mounted one."""
+    names = ("Büchse", NFD.upper())
+    (tmp_path / names[0]).touch()
+    native = (tmp_path / names[1]).exists()
+    (tmp_path / names[0]).unlink()
+    if native:
+        yield Path(os.path.realpath(tmp_path))
+        return
     with other_disk(tmp_path) as mounted:
         yield mounted
 
