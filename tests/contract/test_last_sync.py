@@ -117,3 +117,49 @@ def test_a_malformed_list_is_refused_and_named(api: Api, given: dict[str, Any], 
     (parent,) = api.items(1)
     answer = api.bad(400, "POST", bom(parent, "merge"), {"entries": [], **given})
     assert where in str(answer)
+
+
+def export(api: Api, item: str, view: str) -> Any:
+    return api.get(bom(item, f"export.json?view={view}"))["lines"]
+
+
+def test_an_assembly_that_was_never_synced_is_no_leaf(api: Api) -> None:
+    """In the flat list and in every export; a part is one, and an assembly with lines made by hand is not."""
+    top, part = api.items(2)
+    never, empty, manual = (api.item(item_type="assembly") for _ in range(3))
+    merge(api, empty, [])
+    api.good("POST", bom(manual), {"child_part_number": part, "quantity": 1})
+    merge(api, top, entries((part, 1, []), (never, 2, []), (empty, 1, []), (manual, 1, [])))
+    for view in ("single", "indented", "flat"):
+        told = {row["part_number"]: row["incomplete"] for row in export(api, top, view)}
+        assert told[never] == "never synced", view
+        assert set(told.values()) == {None, "never synced"}, view
+    assert api.get(bom(top, "flat"))["incomplete"] == {never: "never synced"}
+
+
+def test_what_is_missing_is_a_line_of_every_export(api: Api) -> None:
+    """At the end, without a part number; and the assembly that it is missing from is marked."""
+    top, part = api.items(2)
+    sub = api.item(item_type="assembly")
+    merge(api, sub, entries((part, 1, [])), left_out=[MISSING])
+    merge(
+        api, top, entries((sub, 2, [])), left_out=[{"reason": "unregistered", "name": "Pin", "quantity": 3}]
+    )
+    rows = export(api, top, "indented")
+    assert rows[0]["incomplete"] == "incomplete: 1 missing"
+    gaps = {row["name"]: (row["quantity"], row["incomplete"]) for row in rows if not row["part_number"]}
+    assert set(gaps) == {"Cover", "Pin"}
+    assert gaps["Pin"] == (3, f"{top}: 3 × Pin: no part number yet")
+    assert gaps["Cover"][1].startswith(f"{sub}: 2 × Cover (parts/Cover.FCStd): the file is missing")
+    assert {row["name"] for row in export(api, top, "single") if not row["part_number"]} == {"Pin"}
+
+
+def test_an_export_with_gaps_can_be_imported_again(api: Api) -> None:
+    """Rows that say what is missing are no lines of the BOM."""
+    top, part = api.items(2)
+    merge(api, top, entries((part, 4, [])), left_out=[MISSING])
+    text = api.call("GET", bom(top, "export.csv")).body.decode()
+    assert "Cover" in text
+    from silo_server.services.imports import read_csv
+
+    assert [record["part_number"] for _, record in read_csv(text.encode(), 100)] == [part]

@@ -27,7 +27,7 @@ from silo_server.routes.models import BomLineOut, ExpandedLineOut, LineChangeBod
 from silo_server.routes.render import render_expanded
 from silo_server.services import edits, rollup, tree
 from silo_server.services.items import get_item
-from silo_server.services.last_sync import last_sync, remember_refusal
+from silo_server.services.last_sync import last_sync, marks, remember_refusal
 from silo_server.services.lines import line_to_wire, lines_of
 from silo_server.services.merge import MergeOutcome, merge_bom, preview_merge
 from silo_server.services.merge_request import MergeOrder, read_merge_order
@@ -136,8 +136,10 @@ def get_flat(server: ServerDep, caller: Viewer, part_number: str) -> dict[str, A
     """The leaf parts, quantities multiplied down the tree and summed; 409 where it never ends."""
     with server.db.read(caller) as tx:
         graph = tree.load_graph(tx, get_item(tx, part_number))
+        found = marks(tx, graph)
     return {
         "part_number": graph.root.part_number,
+        "incomplete": {graph.names()[one]: words for one, words in found.items()},
         "flat_bom": [
             {
                 "part_number": row.line.child_part_number,

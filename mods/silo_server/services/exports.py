@@ -11,13 +11,15 @@ import csv
 import io
 from collections.abc import Iterable, Iterator, Sequence
 from enum import StrEnum
+from itertools import chain
 from typing import IO, Any
 
 from silo_server.clock import wire
 from silo_server.db.engine import Tx
 from silo_server.services.items import by_ids, get_item
+from silo_server.services.last_sync import in_sentences, last_syncs, marks
 from silo_server.services.rollup import positive_number
-from silo_server.services.tree import MAX_DEPTH, expand, flatten, load_graph
+from silo_server.services.tree import MAX_DEPTH, Graph, expand, flatten, load_graph
 from silo_server.values import Item, Line, number
 
 
@@ -47,6 +49,7 @@ COLUMNS = (
     "Unreferenced since",
     "Material",
     "Mass",
+    "Incomplete",
 )
 # What Excel, LibreOffice and Google Sheets take for the beginning of a formula (OWASP, CSV injection).
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
@@ -58,20 +61,44 @@ def export_rows(tx: Tx, part_number: str, view: View) -> tuple[Item, Iterator[Ro
     """The item, and its BOM's rows by column name, made one by one."""
     root = get_item(tx, part_number)
     graph = load_graph(tx, root, 1 if view is View.SINGLE else None)
+    found, gaps = marks(tx, graph), _gap_rows(tx, graph, view)
     if view is View.FLAT:
         flat = flatten(graph)
         children = by_ids(tx, {row.line.child_id for row in flat})
-        return root, (
-            _row(row.line, children, str(n), 1, number(row.total), number(row.total), flat=True)
-            for n, row in enumerate(flat, start=1)
+        return root, chain(
+            (
+                _row(row.line, children, str(n), 1, number(row.total), number(row.total), flat=True)
+                | {"Incomplete": found.get(row.line.child_id)}
+                for n, row in enumerate(flat, start=1)
+            ),
+            gaps,
         )
     occurrences = expand(graph, 1 if view is View.SINGLE else MAX_DEPTH, tx.settings.max_expanded_rows)
     children = by_ids(tx, {o.line.child_id for o in occurrences})
     numbers = _item_numbers([o.depth for o in occurrences])
-    return root, (
-        _row(o.line, children, item, o.depth, number(o.line.state.quantity), number(o.total))
-        for o, item in zip(occurrences, numbers, strict=True)
+    return root, chain(
+        (
+            _row(o.line, children, item, o.depth, number(o.line.state.quantity), number(o.total))
+            | {"Incomplete": found.get(o.line.child_id)}
+            for o, item in zip(occurrences, numbers, strict=True)
+        ),
+        gaps,
     )
+
+
+def _gap_rows(tx: Tx, graph: Graph, view: View) -> list[Row]:
+    """What the last syncs left out: rows without a part number, after all others; missing is a line too."""
+    names = graph.names()
+    ids = [graph.root.id] if view is View.SINGLE else list(names)
+    return [
+        {
+            "Name": gap.get("name") or gap.get("object"),
+            "Quantity": gap.get("quantity"),
+            "Incomplete": f"{names[one]}: {sentence}",
+        }
+        for one, last in last_syncs(tx, ids).items()
+        for gap, sentence in zip(last.gaps, in_sentences(last.gaps), strict=True)
+    ]
 
 
 def to_csv(rows: Iterable[Row], out: IO[bytes]) -> None:

@@ -43,6 +43,7 @@ ROLES = (
     *(Role.PART_NUMBER, Role.QUANTITY, Role.UNIT, Role.REFERENCE_DESIGNATORS, Role.FIND_NUMBER, Role.NOTES),
     *(Role.TYPE, Role.REVISION, Role.LEVEL),
 )
+INCOMPLETE = "Incomplete"  # of silo_server.services.exports
 NEEDED = (Role.PART_NUMBER, Role.QUANTITY)
 HEADER_WITHIN = 40
 """The header must be among this many first lines (title blocks are a few lines long)."""
@@ -143,10 +144,13 @@ def read_csv(data: bytes, max_rows: int) -> list[Record]:
     """
     table, start, delimiter = _table(_decode(data), max_rows)
     at = find_roles(table[start], ROLES)
+    gap_column = next((i for i, cell in enumerate(table[start]) if cell.strip() == INCOMPLETE), None)
     records = []
     for number, cells in enumerate(table[start + 1 :], start=start + 2):
         record = {role.value: plain_cell(cells[i].strip()) for role, i in at.items() if i < len(cells)}
-        if any(record.values()):
+        # Our own exports end with what a sync left out: rows that say so, and have no part number.
+        told = cells[gap_column].strip() if gap_column is not None and gap_column < len(cells) else ""
+        if any(record.values()) and (record.get("part_number") or not told):
             records.append((number, record))
     return _with_exact_quantities(records, points_are_decimal=delimiter == ",")
 

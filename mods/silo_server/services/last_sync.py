@@ -18,9 +18,10 @@ from silo.bom.left_out import Reason, in_words, remembered
 from silo_server.clock import wire
 from silo_server.db.bulk import insert_rows, one_of
 from silo_server.db.engine import Tx
-from silo_server.db.tables import bom_last_syncs, items
+from silo_server.db.tables import bom_last_syncs, bom_lines
 from silo_server.json_values import dumps
 from silo_server.services.merge_request import MergeOrder
+from silo_server.services.tree import Graph
 from silo_server.values import Item
 
 
@@ -134,10 +135,41 @@ def remember_refusal(tx: Tx, parent: Item, message: str) -> None:
         insert_rows(tx, bom_last_syncs, [row])
 
 
-def never_synced(tx: Tx, item_ids: Collection[int]) -> set[int]:
-    """Those of these items that are assemblies by type, and whose BOM never came from one."""
-    assemblies = tx.conn.scalars(
-        select(items.c.id).where(one_of(tx, items.c.id, item_ids), items.c.item_type == "assembly")
-    ).all()
-    known = last_syncs(tx, assemblies)
-    return {one for one in assemblies if known.get(one, NEVER).at is None}
+def in_sentences(gaps: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What was left out, each in a sentence."""
+    return [_sentence(gap) for gap in gaps]
+
+
+def _sentence(gap: Mapping[str, Any]) -> str:
+    name, count = gap.get("name") or gap.get("object") or "", gap.get("quantity")
+    who = f"{count} × {name}" if count else str(name)
+    where = f" ({gap['file']})" if gap.get("file") else ""
+    known = {
+        Reason.MISSING: f"{who}{where}: the file is missing or cannot be read",
+        Reason.UNREGISTERED: f"{who}{where}: no part number yet",
+        Reason.BROKEN: str(gap.get("message", "")),
+        Reason.REFUSED: f"a later sync was refused: {gap.get('message', '')}",
+    }
+    return known.get(gap["reason"], f"{gap['reason']}: {who}{where} {gap.get('message', '')}").rstrip()
+
+
+def marks(tx: Tx, graph: Graph) -> dict[int, str]:
+    """Item id → ``incomplete: 2 missing`` or ``never synced``, for all assemblies of a tree that need it."""
+    ids = {graph.root.id} if graph.root.item_type == "assembly" else set()
+    ids |= graph.lines.keys()
+    for lines in graph.lines.values():
+        ids |= {line.child_id for line in lines if line.child_item_type == "assembly"}
+    known = last_syncs(tx, ids)
+    never = [one for one in ids if known.get(one, NEVER).at is None]
+    # Not all of the tree may be loaded, so the lines are asked for.
+    made_by_hand = set(
+        tx.conn.scalars(select(bom_lines.c.parent_id).where(one_of(tx, bom_lines.c.parent_id, never)))
+    )
+    found: dict[int, str] = {}
+    for one in ids:
+        last = known.get(one, NEVER)
+        if last.gaps:
+            found[one] = f"incomplete: {last.words}"
+        elif last.at is None and one not in made_by_hand:
+            found[one] = "never synced"
+    return found

@@ -38,6 +38,11 @@ class Graph:
     root: Item
     lines: Mapping[int, Sequence[Line]]
 
+    def names(self) -> dict[int, str]:
+        """Internal id → part number, of the root and of all below it."""
+        below = {line.child_id: line.child_part_number for lines in self.lines.values() for line in lines}
+        return below | {self.root.id: self.root.part_number}
+
     def components(self, item_id: int) -> list[Line]:
         """The lines that are followed."""
         return [line for line in self.lines.get(item_id, ()) if line.state.rel_type == "component"]
@@ -211,8 +216,7 @@ def _uses(tx: Tx, of_level: ColumnElement[bool], depth: int, limit: int, offset:
 
 def order_of(graph: Graph) -> list[int]:
     """The assemblies (internal ids), parents before their children; CycleError where there is a ring."""
-    names = {line.child_id: line.child_part_number for below in graph.lines.values() for line in below}
-    names[graph.root.id] = graph.root.part_number
+    names = graph.names()
     done: list[int] = []
     state: dict[int, bool] = {graph.root.id: False}  # False = being walked, True = done
     stack = [(graph.root.id, iter(graph.components(graph.root.id)))]

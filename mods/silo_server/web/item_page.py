@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any
 
@@ -16,6 +16,8 @@ from silo_server.errors import TooLargeError
 from silo_server.routes.context import ServerDep
 from silo_server.services import revisions, rollup, tree
 from silo_server.services.items import get_item
+from silo_server.services.last_sync import in_sentences, last_sync
+from silo_server.services.last_sync import marks as marks_of
 from silo_server.values import Item, Line
 from silo_server.web.guard import Reader
 from silo_server.web.render import page
@@ -34,6 +36,7 @@ class Node:
 
     line: Line
     total: tree.Exact
+    mark: str = ""
     below: list[Node] = field(default_factory=list)
 
 
@@ -72,7 +75,9 @@ def item_page(
 
 def _structure(tx: Tx, item: Item, *, flat: bool) -> dict[str, Any]:
     graph = tree.load_graph(tx, item)
-    values: dict[str, Any] = {"problem": "", "nodes": [], "levels": 0, "rows": [], "cost": None, "mass": None}
+    last, marks = last_sync(tx, item), marks_of(tx, graph)
+    values: dict[str, Any] = {"last": last, "gaps": in_sentences(last.gaps), "marks": marks}
+    values |= {"problem": "", "nodes": [], "levels": 0, "rows": [], "cost": None, "mass": None}
     if item.id not in graph.lines:
         return values
     try:
@@ -83,7 +88,7 @@ def _structure(tx: Tx, item: Item, *, flat: bool) -> dict[str, Any]:
     if flat:
         return values | {"rows": _flat_rows(graph, cost, mass)}
     rows, levels = _deepest(graph)
-    return values | {"nodes": nested(rows), "levels": levels}
+    return values | {"nodes": nested(rows, marks), "levels": levels}
 
 
 def _deepest(graph: tree.Graph) -> tuple[Sequence[tree.Occurrence], int]:
@@ -108,13 +113,13 @@ def _flat_rows(
     ]
 
 
-def nested(rows: Sequence[tree.Occurrence]) -> list[Node]:
-    """The rows of an expanded BOM (parents before children) as a tree."""
+def nested(rows: Sequence[tree.Occurrence], marks: Mapping[int, str] | None = None) -> list[Node]:
+    """The rows of an expanded BOM (parents before children) as a tree; ``marks`` by item id."""
     top: list[Node] = []
     stack: list[list[Node]] = [top]
     for row in rows:
         del stack[row.depth :]
-        node = Node(row.line, row.total)
+        node = Node(row.line, row.total, (marks or {}).get(row.line.child_id, ""))
         stack[-1].append(node)
         stack.append(node.below)
     return top

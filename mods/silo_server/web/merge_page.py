@@ -17,6 +17,7 @@ from silo_server.routes.context import Server, ServerDep
 from silo_server.services import edits, events, history
 from silo_server.services import review as service
 from silo_server.services.items import get_item
+from silo_server.services.last_sync import in_sentences, last_sync
 from silo_server.services.lines import line_of, lines_of
 from silo_server.services.review import Action, Decision
 from silo_server.values import Actor, Line
@@ -184,6 +185,7 @@ def _show(
         item = get_item(tx, part_number)
         found = service.review(tx, item.part_number)
         lines = lines_of(tx, item)
+        last = last_sync(tx, item)
         merge = found.last_merge
         merged = history.get_change(tx, item, merge.id)[1] if merge else []
         recent = history.list_changes(tx, item, LATER_CHANGES)
@@ -199,6 +201,8 @@ def _show(
         editing=_editing(lines, asked, item),
         typed=asked.typed,
         problem=asked.problem,
+        last=last,
+        gaps=in_sentences(last.gaps),
         unreferenced=found.unreferenced,
         conflicts=found.conflicts,
         merge=merge,
