@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""An incomplete BOM never looks like a complete one, and an assembly that was never synced not like a part."""
+"""An incomplete BOM never looks complete, and an assembly that was never synced never like a part."""
 
 from __future__ import annotations
 
