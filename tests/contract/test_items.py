@@ -204,6 +204,9 @@ def test_search_ranks_and_knows_what_people_type(api: Api) -> None:
     assert found(f"{word} schraubli") == [numbers[4] + "-S"]
     assert found(f"91290A{word}") == found(f"91290-a{word}") == [numbers[4] + "-S"]
     assert found(f"halter {word}") == [numbers[1]]
+    # One letter is the beginning of a number.
+    letters = {item["part_number"][0].lower() for item in api.get("/api/items/search?q=A&limit=1000")}
+    assert letters == {"a"}
     # What was changed is found by the new words, and by the old ones no more.
     api.good("PUT", f"/api/items/{numbers[0]}", {"name": "Mutter"})
     assert found(f"{word} mutter") == [numbers[0]]

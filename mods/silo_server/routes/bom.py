@@ -160,7 +160,7 @@ def get_cost(server: ServerDep, caller: Viewer, part_number: str) -> dict[str, A
     """Flat BOM × ``standard_cost``, per currency; ``missing`` names what has no cost."""
     with server.db.read(caller) as tx:
         graph = tree.load_graph(tx, get_item(tx, part_number))
-        cost = rollup.roll_up_cost(tx, graph)
+        cost = rollup.roll_up_cost(graph, rollup.parts_of(tx, graph))
     only = next(iter(cost.totals.values())) if len(cost.totals) == 1 else None
     return {
         "part_number": graph.root.part_number,
@@ -188,7 +188,7 @@ def get_mass(server: ServerDep, caller: Viewer, part_number: str) -> dict[str, A
     """The mass of one piece [kg] from its parts' ``mass_kg``; ``missing`` names what has none."""
     with server.db.read(caller) as tx:
         graph = tree.load_graph(tx, get_item(tx, part_number))
-        mass = rollup.roll_up_mass(tx, graph)
+        mass = rollup.roll_up_mass(graph, rollup.parts_of(tx, graph))
     return {
         "part_number": graph.root.part_number,
         "total_mass_kg": mass.total,

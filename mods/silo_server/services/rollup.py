@@ -11,13 +11,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
-from typing import Any
+from typing import Any, NamedTuple
+
+from sqlalchemy import select
 
 from silo.bom.numbers import exact_product, exact_sum, read_number
+from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
-from silo_server.services.items import by_ids
+from silo_server.db.tables import items
+from silo_server.json_values import loads
 from silo_server.services.tree import Exact, Graph, added, flatten, multiplied, order_of
-from silo_server.values import Item, Line
+from silo_server.values import Line
 
 DEFAULT_CURRENCY = "EUR"
 
@@ -66,13 +70,32 @@ class MassRollup:
     stated: float | None
 
 
-def roll_up_cost(tx: Tx, graph: Graph) -> CostRollup:
+class Part(NamedTuple):
+    """What a roll-up reads of an item."""
+
+    part_number: str
+    name: str
+    properties: Mapping[str, Any]
+
+
+def parts_of(tx: Tx, graph: Graph) -> dict[int, Part]:
+    """Everything in the graph, by internal id, read once for both roll-ups."""
+    children = {line.child_id for below in graph.lines.values() for line in below}
+    rows = tx.conn.execute(
+        select(items.c.id, items.c.part_number, items.c.name, items.c.properties).where(
+            one_of(tx, items.c.id, children)
+        )
+    )
+    parts = {row[0]: Part(row[1], row[2], loads(row[3])) for row in rows}
+    return {**parts, graph.root.id: Part(graph.root.part_number, graph.root.name, graph.root.properties)}
+
+
+def roll_up_cost(graph: Graph, parts: Mapping[int, Part]) -> CostRollup:
     """Flat BOM times standard cost."""
     flat = flatten(graph)
-    items = by_ids(tx, {row.line.child_id for row in flat})
     rows, totals, missing = [], dict[str, Decimal](), []
     for row in flat:
-        item = items[row.line.child_id]
+        item = parts[row.line.child_id]
         cost = positive_number(item.properties, "standard_cost")
         currency = str(item.properties.get("currency") or DEFAULT_CURRENCY) if cost is not None else None
         total = exact_product((cost, row.total)) if cost is not None else None
@@ -85,12 +108,10 @@ def roll_up_cost(tx: Tx, graph: Graph) -> CostRollup:
     return CostRollup(rows, {name: float(total) for name, total in totals.items()}, missing)
 
 
-def roll_up_mass(tx: Tx, graph: Graph) -> MassRollup:
+def roll_up_mass(graph: Graph, parts: Mapping[int, Part]) -> MassRollup:
     """Masses from the leaves up; a sub-assembly's own mass where its parts do not have all of theirs."""
     order = order_of(graph)
-    children = {line.child_id for below in graph.lines.values() for line in below}
-    items = {**by_ids(tx, children), graph.root.id: graph.root}
-    stands_for_itself = _stated_assemblies(graph, order, items)
+    stands_for_itself = _stated_assemblies(graph, order, parts)
     factors: dict[int, Exact] = {graph.root.id: 1}
     amounts: dict[int, Exact] = {}
     lines: dict[int, Line] = {}
@@ -104,7 +125,7 @@ def roll_up_mass(tx: Tx, graph: Graph) -> MassRollup:
             else:
                 amounts[line.child_id] = added(amounts.get(line.child_id, 0), amount, line)
                 lines.setdefault(line.child_id, line)
-    rows = [_mass_row(items[i], amounts[i], i in stands_for_itself) for i in lines]
+    rows = [_mass_row(parts[i], amounts[i], i in stands_for_itself) for i in lines]
     return MassRollup(
         rows,
         float(exact_sum(row.total for row in rows if row.total is not None)),
@@ -123,8 +144,8 @@ def positive_number(properties: Mapping[str, Any], name: str) -> float | None:
     return float(value) if 0 <= value < 1e15 else None
 
 
-def _stated_assemblies(graph: Graph, order: Sequence[int], items: Mapping[int, Item]) -> set[int]:
-    def has_mass(item: Item) -> bool:
+def _stated_assemblies(graph: Graph, order: Sequence[int], parts: Mapping[int, Part]) -> set[int]:
+    def has_mass(item: Part) -> bool:
         return positive_number(item.properties, "mass_kg") is not None
 
     # Children before parents: an assembly is complete when everything it contains is.
@@ -132,8 +153,8 @@ def _stated_assemblies(graph: Graph, order: Sequence[int], items: Mapping[int, I
     stated: set[int] = set()
     for item_id in reversed(order):
         below = graph.components(item_id)
-        whole = all(complete.get(line.child_id, has_mass(items[line.child_id])) for line in below)
-        if below and not whole and item_id != graph.root.id and has_mass(items[item_id]):
+        whole = all(complete.get(line.child_id, has_mass(parts[line.child_id])) for line in below)
+        if below and not whole and item_id != graph.root.id and has_mass(parts[item_id]):
             stated.add(item_id)
             whole = True
         if below:
@@ -141,7 +162,7 @@ def _stated_assemblies(graph: Graph, order: Sequence[int], items: Mapping[int, I
     return stated
 
 
-def _mass_row(item: Item, amount: Exact, is_assembly: bool) -> MassRow:
+def _mass_row(item: Part, amount: Exact, is_assembly: bool) -> MassRow:
     mass = positive_number(item.properties, "mass_kg")
     total = float(exact_product((mass, amount))) if mass is not None else None
     return MassRow(item.part_number, item.name, amount, mass, total, is_assembly)

@@ -59,8 +59,9 @@ def words_of(written: str) -> list[str]:
 def search_for(tx: Tx, written: str) -> Found | None:
     """What finds the items with all words of ``written``; None where it says nothing to search for.
 
-    A SHA-256 finds the items that have, or had, the file with this content, or were registered from it. Best
-    first: the very number, then the words in the number, then in number and name, then anywhere.
+    A single letter or digit finds the numbers that begin with it. A SHA-256 finds the items that have, or
+    had, the file with this content, or were registered from it. Best first: the very number, then the words
+    in the number, then in number and name, then anywhere.
     """
     parts = written.split()
     if not parts:
@@ -73,11 +74,15 @@ def search_for(tx: Tx, written: str) -> Found | None:
             conditions.append(or_(items.c.id.in_(with_file), _matches(tx, [digest[1].lower()], "")))
         else:
             words += words_of(part)
+    key = written.strip().casefold()
+    if len(key) == 1 and key.isascii() and words:
+        # Nearly every item has a word that begins so; of these only numbers are worth their time.
+        begins = (items.c.part_number_key >= key) & (items.c.part_number_key < chr(ord(key) + 1))
+        return Found(begins, literal(0))
     if words:
         conditions.append(_matches(tx, words, ""))
     elif not conditions:
         conditions.append(literal(False))
-    key = written.strip().casefold()
     number = or_(
         items.c.part_number_key == key,
         func.replace(items.c.part_number_key, "-", "") == key.replace("-", ""),

@@ -81,7 +81,8 @@ def _structure(tx: Tx, item: Item, *, flat: bool) -> dict[str, Any]:
     if item.id not in graph.lines:
         return values
     try:
-        cost, mass = rollup.roll_up_cost(tx, graph), rollup.roll_up_mass(tx, graph)
+        parts = rollup.parts_of(tx, graph)
+        cost, mass = rollup.roll_up_cost(graph, parts), rollup.roll_up_mass(graph, parts)
     except ConflictError as error:
         return {**values, "problem": str(error)}
     values |= {"cost": cost, "mass": mass}
