@@ -20,7 +20,7 @@ from silo.bom.errors import RemoteError, SiloError
 from silo.bom.findings import Finding
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.report import base_of, diff_json, entry_json, finding_json, relative
-from silo.bom_sync import Outcome, Resolved, Status, SyncApi, blocking, resolve, sync, sync_tree
+from silo.bom_sync import Outcome, Resolved, Status, SyncApi, blocking, resolve, sync_tree
 from silo.files import sha256_of
 
 _FINE = (Status.MERGED, Status.UNCHANGED, Status.DRY_RUN)
@@ -98,25 +98,24 @@ def sync_top(top: str, found: Extraction | SiloError, api: SyncApi, options: Opt
     return TopResult(top, base, whole, outcomes)
 
 
+def stopped_by(result: TopResult, api: object = None) -> SiloError | None:
+    """The error that makes it useless to try the next file: no right, no server, a server that is busy."""
+    from silo.api.policy import ends_run  # loads the network's packages
+
+    errors = (result.error, *(outcome.error for outcome in result.outcomes))
+    return next((error for error in errors if error is not None and ends_run(error, api)), None)
+
+
 def _outcomes(whole: Resolved, api: SyncApi, options: Options) -> Iterable[Outcome]:
-    if options.recursive:
-        return sync_tree(
-            whole,
-            api,
-            sync_id=_new_id,
-            describe=source_document,
-            allow_missing=options.allow_missing,
-            dry_run=options.dry_run,
-        )
-    one = sync(
+    return sync_tree(
         whole,
         api,
-        sync_id=_new_id(),
-        document=source_document(whole.assembly),
+        sync_id=_new_id,
+        describe=source_document,
         allow_missing=options.allow_missing,
         dry_run=options.dry_run,
+        recursive=options.recursive,
     )
-    return (one,)
 
 
 def _new_id() -> str:

@@ -308,14 +308,31 @@ def sync_tree(
     allow_missing: bool = False,
     dry_run: bool = False,
     describe: Callable[[BomEntry], SourceDocument | None] = lambda _entry: None,
+    recursive: bool = True,
 ) -> Iterator[Outcome]:
-    """Sync an assembly with all its sub-assemblies, leaves first; one failure does not stop the others."""
-    for one in assemblies(resolved):
-        yield sync(
+    """Sync an assembly with all its sub-assemblies, leaves first; one failure does not stop the others.
+
+    One that concerns all of them does (:func:`silo.api.policy.ends_run`): the others have it as their error.
+    """
+    from silo.api.policy import ends_run  # loads the network's packages
+
+    stopped: SiloError | None = None
+    for one in assemblies(resolved) if recursive else (resolved,):
+        if stopped is not None:
+            yield Outcome(Status.FAILED, one, error=stopped)
+            continue
+        try:
+            document = describe(one.assembly)
+        except SiloError as error:
+            yield Outcome(Status.FAILED, one, error=error)
+            continue
+        outcome = sync(
             one,
             api,
             sync_id=sync_id(),
             allow_missing=allow_missing,
             dry_run=dry_run,
-            document=describe(one.assembly),
+            document=document,
         )
+        stopped = outcome.error if outcome.error is not None and ends_run(outcome.error, api) else None
+        yield outcome

@@ -14,7 +14,7 @@ from silo.bom.errors import DocumentError, InputError
 
 
 def documents_in(tops: Iterable[str]) -> list[str]:
-    """The files that are meant: a folder stands for all FCStd files below it, backups left out.
+    """The files that are meant, each once: a folder stands for all FCStd files below it, backups left out.
 
     A pattern (``*.FCStd``) stands for what fits it: the shells of Windows hand patterns over as they are.
     """
@@ -25,7 +25,10 @@ def documents_in(tops: Iterable[str]) -> list[str]:
             found += sorted(str(p) for p in path.rglob("*") if p.suffix.lower() == ".fcstd" and p.is_file())
         else:
             found.append(top)
-    return list(dict.fromkeys(found))
+    once: dict[str, str] = {}
+    for path_given in found:
+        once.setdefault(os.path.normcase(os.path.abspath(path_given)), path_given)
+    return list(once.values())
 
 
 def _meant(top: str) -> list[str]:

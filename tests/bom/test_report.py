@@ -10,7 +10,7 @@ import pytest
 
 from silo.bom import BomEntry, Extraction, Finding, FindingCode, Place, Severity, diff_bom
 from silo.bom.errors import InputError
-from silo.bom.report import bom_json, diff_json, flat_counts, flat_json, relative, tree_size
+from silo.bom.report import bom_json, diff_json, flat_counts, flat_json, relative, shorten, tree_size
 
 
 def entry(name: str, quantity: int = 1, *children: BomEntry, level: int = 1) -> BomEntry:
@@ -114,3 +114,9 @@ def test_a_diff_as_json() -> None:
     told: dict[str, Any] = diff_json(diff_bom([{"child_part_number": "P", "quantity": 2}], []))
     assert set(told) == {"added", "quantity_changed", "removed", "unchanged", "manual", "conflicts", "kept"}
     assert json.loads(json.dumps(told))["added"] == [{"part_number": "P", "quantity": 2}]
+
+
+def test_the_root_of_the_disk_is_no_folder_to_leave_out() -> None:
+    """Its separators would all go."""
+    assert shorten("/a/b.FCStd: broken", "/") == "/a/b.FCStd: broken"
+    assert shorten("/a/b.FCStd: broken", "/a") == "b.FCStd: broken"

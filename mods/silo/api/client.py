@@ -19,6 +19,7 @@ import requests
 from silo.api import files
 from silo.api.address import ServerAddress
 from silo.api.boms import BomCalls
+from silo.api.caller import LISTS
 from silo.api.items import ItemCalls
 from silo.api.multipart import Progress
 from silo.api.policy import Retries
@@ -124,7 +125,7 @@ class SiloClient(ItemCalls, BomCalls):
     def revisions(self, part_number: str, /) -> list[Revision]:
         """The revisions of an item, newest first."""
         reply = self._get(f"the revisions of {part_number}", "items", part_number, "revisions")
-        found = reply.models(Revision, "revisions", "items", "data")
+        found = reply.models(Revision, "revisions", *LISTS)
         return sorted(found, key=lambda revision: revision.revision_number, reverse=True)
 
     def get_properties(self, part_number: str, /) -> dict[str, Any]:

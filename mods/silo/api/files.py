@@ -9,12 +9,19 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, BinaryIO
+from urllib.parse import urljoin
 
-from silo.api.multipart import FileForm, Progress, upload_fields
+from silo.api.multipart import FileBody, FileForm, Progress, as_json, upload_fields
 from silo.api.replies import error_of
 from silo.api.transport import MAX_ERROR, Call, Cancel, Transport
 from silo.api.wire import Revision
-from silo.bom.errors import ConflictError, DocumentError
+from silo.bom.errors import (
+    ConflictError,
+    DocumentError,
+    RejectedError,
+    RouteMissingError,
+    ServerFaultError,
+)
 from silo.durable import replacing
 
 MAX_DOWNLOAD = 4 << 30
@@ -33,15 +40,14 @@ def upload(
     sha256: str | None,
     cancelled: Cancel | None,
 ) -> Revision:
-    """Send a file as a new revision (``POST …/file``); the server's checksum must be that of the file."""
-    subject = f"{path.name} for {part_number}"
-    with FileForm(
-        path,
-        upload_fields(comment, properties, sha256),
-        file_name=file_name,
-        on_progress=on_progress,
-        cancelled=cancelled,
-    ) as form:
+    """Send a file as a new revision (``POST …/file``); the server's checksum must be that of the file.
+
+    A server that takes no form gets the file in two steps.
+    """
+    name = file_name or path.name
+    subject = f"{name} for {part_number}"
+    fields = upload_fields(comment, properties, sha256)
+    with FileForm(path, fields, file_name=name, on_progress=on_progress, cancelled=cancelled) as form:
         headers = {"Content-Type": form.content_type, "Accept": "application/json"}
         if idempotency_key:
             headers["Idempotency-Key"] = idempotency_key
@@ -53,15 +59,68 @@ def upload(
             headers=headers,
             cancelled=cancelled,
         )
-        revision = transport.send(call).model(Revision)
-        stored = (revision.file_checksum or form.sha256).lower().removeprefix("sha256:")
-        if stored != form.sha256:
-            # Sending it again by itself would make a revision each time.
-            raise ConflictError(
-                f"{transport.address.host} stored another content than was sent for {subject} "
-                f"(revision {revision.revision_number}); look at that revision, then send the file again"
-            )
+        try:
+            revision, sent = transport.send(call).model(Revision), form.sha256
+        except RouteMissingError:
+            revision, sent = _in_two_steps(transport, call, path, name, comment, properties, on_progress)
+        except RejectedError as error:
+            if error.status != 415:
+                raise
+            revision, sent = _in_two_steps(transport, call, path, name, comment, properties, on_progress)
+    stored = (revision.file_checksum or sent).lower().removeprefix("sha256:")
+    if stored != sent:
+        # Sending it again by itself would make a revision each time.
+        raise ConflictError(
+            f"{transport.address.host} stored another content than was sent for {subject} "
+            f"(revision {revision.revision_number}); look at that revision, then send the file again"
+        )
     return revision
+
+
+def _in_two_steps(
+    transport: Transport,
+    call: Call,
+    path: Path,
+    name: str,
+    comment: str,
+    properties: Mapping[str, Any] | None,
+    on_progress: Progress | None,
+) -> tuple[Revision, str]:
+    """First the bytes to the server's store, then the revision (silo-contract §1.4, "presign").
+
+    For a server that takes no forms. The store may be another host: it gets no token.
+    """
+    size = path.stat().st_size
+    about = {"filename": name, "content_type": "application/octet-stream", "size": size}
+    headers = {**call.headers, "Content-Type": "application/json"}
+    asked = as_json(about)
+    place = transport.send(
+        replace(
+            call,
+            url=transport.address.api("uploads", "presign"),
+            body=lambda: asked,
+            headers=headers,
+            repeatable=True,
+        )
+    ).mapping()
+    key, url = place.get("object_key"), place.get("upload_url")
+    if not isinstance(key, str) or not isinstance(url, str):
+        raise ServerFaultError(f"{call.subject}: the server names no place to upload the file to")
+    content = FileBody(path, on_progress=on_progress, cancelled=call.cancelled)
+    with content:
+        put = replace(
+            call,
+            method="PUT",
+            url=urljoin(transport.address.web_root + "/", url),
+            body=content.rewound,
+            headers={"Content-Type": "application/octet-stream"},
+            repeatable=True,
+        )
+        transport.send(put)
+        sha256 = content.sha256
+    said = {**about, "object_key": key, "comment": comment, "file_checksum": sha256}
+    final = as_json({**said, "properties": dict(properties)} if properties else said)
+    return transport.send(replace(call, body=lambda: final, headers=headers)).model(Revision), sha256
 
 
 def download(

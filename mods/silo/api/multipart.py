@@ -137,6 +137,18 @@ class FileForm:
         ).encode("utf-8", "replace")
 
 
+class FileBody(FileForm):
+    """The bare bytes of a file as the body of a request."""
+
+    def __init__(
+        self, path: Path, *, on_progress: Progress | None = None, cancelled: Cancel | None = None
+    ) -> None:
+        super().__init__(path, {}, on_progress=on_progress, cancelled=cancelled)
+        self._begin = self._end = b""
+        self.len = self.file_size
+        self.rewound()
+
+
 def upload_fields(
     comment: str, properties: Mapping[str, object] | None, sha256: str | None = None
 ) -> dict[str, str]:

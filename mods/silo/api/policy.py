@@ -106,9 +106,13 @@ def _scope(error: SiloError, alive: Callable[[], object] | None) -> Scope:
     return Scope.ENTRY
 
 
-def ends_run(error: SiloError) -> bool:
-    """True where a run over many items that sends one kind of request must not try the next one."""
-    return judge(error).scope is not Scope.ENTRY
+def ends_run(error: SiloError, api: object = None) -> bool:
+    """True where a run over many items that sends one kind of request must not try the next one.
+
+    api
+        the server's client; its ``ready`` says whether only this item had trouble.
+    """
+    return judge(error, getattr(api, "ready", None)).scope is not Scope.ENTRY
 
 
 def told_wait(error: SiloError) -> float | None:

@@ -193,7 +193,9 @@ def error_of(reply: Reply, *, writing: bool = False) -> SiloError:
         return _put_off(gone, later)
     if 400 <= status < 500:
         what = "; ".join(said.problems[:10]) or said.text or "no reason given"
-        return RejectedError(f"{asked}: not accepted ({status}): {what}", said.problems)
+        rejected = RejectedError(f"{asked}: not accepted ({status}): {what}", said.problems)
+        rejected.status = status
+        return rejected
     return ServerFaultError(f"{asked}: the server failed ({status}){told}")
 
 

@@ -121,6 +121,8 @@ class RouteMissingError(NotFoundError):
 class RejectedError(RemoteError):
     """400, 413, 422: the server does not accept what was sent. ``problems`` lists all of it at once."""
 
+    status: int | None = None  # as the server answered
+
     status_hint = 400
     code = "rejected"
 

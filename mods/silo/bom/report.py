@@ -74,7 +74,9 @@ def finding_json(finding: Finding, base: str) -> dict[str, Any]:
 
 def shorten(message: str, base: str) -> str:
     """A message without the long folder that all its paths share."""
-    return message.replace(base.rstrip("/\\") + os.sep, "") if base else message
+    folder = base.rstrip("/\\")
+    # The root of the disk is no folder that could be left out: all separators would go.
+    return message.replace(folder + os.sep, "") if folder else message
 
 
 def tree_size(entries: Iterable[BomEntry]) -> int:

@@ -112,7 +112,7 @@ def register_all(
             done.append(Registration(proposal, error=stopped))
             continue
         result = register_component(proposal, client, journal, write, schema=schema, check=check, ask=ask)
-        stopped = result.error if result.error is not None and ends_run(result.error) else None
+        stopped = result.error if result.error is not None and ends_run(result.error, client) else None
         done.append(result)
     return done
 

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from silo.batch import Options, TopResult, exit_code, result_json, sync_top
+from silo.batch import Options, TopResult, exit_code, result_json, stopped_by, sync_top
 from silo.bom.errors import InputError, SiloError
 from silo.bom.model import Extraction
 from silo.bom_sync import Status
@@ -62,16 +62,21 @@ def run(args: argparse.Namespace) -> int:
         skip_parts=any(Path(top).is_dir() for top in args.tops),
     )
     results: list[TopResult] = []
+    stopped: SiloError | None = None
     with common.client_of(args) as client:
         extractions = _extractions(args, tops)
         for number, top in enumerate(tops, start=1):
             # Before the file is read: a person wants to know which one takes so long.
             if (len(tops) > 1 or args.via == "freecad") and sys.stderr.isatty():
                 print(f"[{number}/{len(tops)}] {top}", file=sys.stderr)
-            _, found = next(extractions)
-            if number == 1 and isinstance(found, Extraction):
-                common.reach(client, found)
-            results.append(sync_top(top, found, client, options))
+            if stopped is not None:
+                results.append(TopResult(top, error=stopped))
+            else:
+                _, found = next(extractions)
+                if number == 1 and isinstance(found, Extraction):
+                    common.reach(client, found)
+                results.append(sync_top(top, found, client, options))
+                stopped = stopped_by(results[-1], client)
             if not args.json:
                 _show(results[-1])
     if args.report:

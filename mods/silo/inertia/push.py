@@ -146,7 +146,7 @@ def push(items: Items, plan: PushPlan, told: Callable[[str], None] = lambda part
             unknown.append(wanted.part_number)
         except SiloError as error:
             failed.append((wanted.part_number, error))
-            stopped = error if ends_run(error) else None
+            stopped = error if ends_run(error, items) else None
     return Pushed(tuple(written), tuple(unchanged), tuple(unknown), tuple(failed), plan)
 
 

@@ -39,6 +39,7 @@ from silo.files import check_writable, documents_in, job_text
 if TYPE_CHECKING:
     from silo.batch import TopResult
     from silo.bom.model import Extraction
+    from silo.bom_sync import Outcome
 
 OK, UNDONE, BAD_INPUT, REMOTE = 0, 1, 2, 3
 
@@ -156,7 +157,7 @@ def _sync(job: Job) -> int:
         client = _client()
     except ImportError as error:
         return _without_server(job, error)
-    from silo.batch import Options, exit_code, sync_top
+    from silo.batch import Options, TopResult, exit_code, stopped_by, sync_top
     from silo.workbench.freecad import host
 
     tops = documents_in(job.tops)
@@ -171,6 +172,11 @@ def _sync(job: Job) -> int:
         for number, (top, found) in enumerate(_extractions(tops, job), start=1):
             results.append(sync_top(top, found, client, options))
             host.message(f"Silo: [{number}/{len(tops)}] {_in_words(results[-1])}")
+            if (stopped := stopped_by(results[-1], client)) is not None:
+                results += [TopResult(left, error=stopped) for left in tops[number:]]
+                if tops[number:]:
+                    host.message(f"Silo: {len(tops) - number} more not tried: {stopped}")
+                break
     _write_reports(job, results)
     return exit_code(results)
 
@@ -210,11 +216,18 @@ def _write_json(path: str, data: Any) -> None:
 def _in_words(result: TopResult) -> str:
     if result.error is not None:
         return f"{result.top}: {result.error}"
-    words = ", ".join(
-        f"{outcome.assembly.part_number or outcome.assembly.label} {outcome.status.value}"
-        for outcome in result.outcomes
-    )
+    words = ", ".join(_outcome_words(outcome) for outcome in result.outcomes)
     return f"{result.top}: {result.skipped or words}"
+
+
+def _outcome_words(outcome: Outcome) -> str:
+    from silo.bom_sync import blocking
+
+    text = f"{outcome.assembly.part_number or outcome.assembly.label} {outcome.status.value}"
+    reasons = [str(outcome.error)] if outcome.error is not None else []
+    if outcome.status.value == "blocked":
+        reasons += [finding.message for finding in blocking(outcome.resolved)]
+    return f"{text} ({'; '.join(reasons)})" if reasons else text
 
 
 def _write_reports(job: Job, results: list[TopResult]) -> None:

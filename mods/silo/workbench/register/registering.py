@@ -341,7 +341,7 @@ def carry_out(
             done(order, Registration(order.proposal, error=gone))
             continue
         result = _carry_out(order, api, journal, write, schema)
-        gone = result.error if result.error is not None and ends_run(result.error) else None
+        gone = result.error if result.error is not None and ends_run(result.error, api) else None
         done(order, result)
 
 

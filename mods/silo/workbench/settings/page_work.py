@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from silo.bom.errors import ConfigError
 from silo.workbench.settings.server import Known, Origin, Server, choose_server
@@ -25,7 +25,7 @@ class Wanted:
     """What is entered on the page, saved or not."""
 
     url: str
-    token: str
+    token: str = field(repr=False)
     verify: bool | str
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any, Protocol
 
@@ -57,7 +57,7 @@ class Known:
     """The preferences that choosing a server needs, read once in the GUI thread."""
 
     url: str = ""
-    token: str = ""
+    token: str = field(default="", repr=False)
     verify: bool | str = True
 
 

@@ -1,0 +1,387 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Our commands against a Silo as its documents describe it: in each mood, in mixed moods, with each fault.
+
+Whatever happens, and however often a plain user repeats a command, the server holds each thing once.
+"""
+
+from __future__ import annotations
+
+import os
+import queue
+import random
+import shutil
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from real_silo import FAULTS, TOKEN, Moods, RealSilo, real_silo
+
+from silo.api.client import SiloClient
+from silo.api.events import EventListener
+from silo.api.policy import Retries
+from silo.api.sse import ServerEvent
+from silo.batch import Options, TopResult, sync_top
+from silo.bom.errors import InputError, SiloError
+from silo.bom_sync import Status, compare, resolve
+from silo.cli.common import read_assembly
+from silo.cli.register import proposals_for, register_all
+from silo.inertia.push import PushItem, PushPlan, push
+from silo.outbox.entry import Commit
+from silo.outbox.send import send_all
+from silo.outbox.store import Store
+
+EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "gearbox"
+NAMES = 9
+"""Components of the example, its two assemblies included."""
+
+
+@pytest.fixture(autouse=True)
+def _home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_CACHE_HOME"):
+        monkeypatch.setenv(name, str(tmp_path / name.lower()))
+
+
+class Desk:
+    """A designer's files and the commands; each command may be repeated like a plain user would."""
+
+    def __init__(self, folder: Path, silo: RealSilo) -> None:
+        self.silo, self.folder = silo, folder
+        self.top = folder / "gearbox" / "TopAssembly.FCStd"
+        shutil.copytree(
+            EXAMPLE, self.top.parent, ignore=shutil.ignore_patterns("*.py", "__pycache__", "*.md")
+        )
+        self.outbox = Store(folder / "outbox.sqlite3")
+
+    def client(self) -> SiloClient:
+        """A new one, as each run of a command has it."""
+        retries = Retries(tries=2, sleep=lambda _s: None)
+        return SiloClient(self.silo.url, TOKEN, timeout=(5, 0.25), retries=retries)
+
+    def register(self, ask: Any = None) -> list[SiloError]:
+        extraction = read_assembly(str(self.top))
+        with self.client() as client:
+            schema = client.find_schema("kindred-rd")
+            proposals = proposals_for(extraction, client, schema)
+            options = {"ask": ask} if ask else {}
+            done = register_all(proposals, extraction, client, schema=schema, **options)
+        return [result.error for result in done if result.error is not None]
+
+    def take(self) -> list[SiloError]:
+        """``register --unclear take``: the person looked, and the one item that fits is it."""
+
+        def one(_proposal: object, found: Any) -> Any:
+            assert len(found) == 1
+            return found[0]
+
+        return self.register(one)
+
+    def diff(self) -> list[SiloError]:
+        with self.client() as client:
+            resolved = resolve(read_assembly(str(self.top)), client)
+            if resolved.assembly.part_number:
+                compare(resolved, client)
+        return []
+
+    def sync(self) -> list[SiloError]:
+        result = self.synced()
+        return [error for error in (result.error, *(o.error for o in result.outcomes)) if error is not None]
+
+    def synced(self) -> TopResult:
+        with self.client() as client:
+            return sync_top(str(self.top), read_assembly(str(self.top)), client, Options(recursive=True))
+
+    def push(self) -> list[SiloError]:
+        item = self.silo.named("Housing")
+        plan = PushPlan((PushItem(item.part_number, "Housing", {"mass_kg": 1.5}),), comment="masses")
+        with self.client() as client:
+            return [error for _, error in push(client, plan).failed]
+
+    def queue(self) -> list[SiloError]:
+        """Send one file by the queue; added once, sent as often as it takes."""
+        if not self.outbox.entries() and not any(item.files for item in self.silo.items.values()):
+            path = next(self.top.parent.rglob("Housing.FCStd"))
+            number = self.silo.named("Housing").part_number
+            self.outbox.add(Commit(str(path), 0.0, part_number=number, comment="c", file=path), self.silo.url)
+        with self.client() as client:
+            report = send_all(self.outbox, client, force=True)
+        for entry in report.held:
+            self.outbox.retry(entry.id)
+        return [InputError(entry.reason) for entry in (*report.held, *report.failed)]
+
+
+def until_done(command: Callable[[], list[SiloError]], times: int = 4) -> list[SiloError]:
+    """Repeat a command until it reports nothing; what it reports at last."""
+    left: list[SiloError] = []
+    for _ in range(times):
+        try:
+            left = command()
+        except SiloError as error:
+            left = [error]
+        if not left:
+            break
+    return left
+
+
+def assembled(desk: Desk) -> dict[str, float]:
+    """The top assembly's lines as the server holds them."""
+    top = desk.silo.named("Top Assembly")
+    return {line["child_part_number"]: line["quantity"] for line in top.lines}
+
+
+def registered(folder: Path, silo: RealSilo) -> Desk:
+    """A desk whose components have their items, made in a good mood."""
+    desk = Desk(folder, silo)
+    moods, silo.moods = silo.moods, Moods(schemas=silo.moods.schemas)
+    assert desk.register() == []
+    silo.moods = moods
+    silo.seen.clear()
+    return desk
+
+
+def check_held_once(desk: Desk) -> None:
+    """No item twice, no line twice, every line once."""
+    assert all(count == 1 for count in desk.silo.holds().values()), desk.silo.holds()
+    for item in desk.silo.items.values():
+        children = [line["child_part_number"] for line in item.lines]
+        assert len(children) == len(set(children))
+
+
+# -- each mood -------------------------------------------------------------------------------------
+
+MOODS = {
+    "null lists": Moods(null_lists=True),
+    "wrapped lists": Moods(list_key="items"),
+    "lists under results": Moods(list_key="results"),
+    "wrapped items": Moods(wrapped=True),
+    "odd answer to a new item": Moods(odd_created=True),
+    "odd answer, properties nowhere": Moods(odd_created=True, properties="nowhere"),
+    "properties on the item": Moods(properties="item"),
+    "unknown properties dropped": Moods(drops_unknown_properties=True),
+    "takes our ids": Moods(own_ids=False),
+    "batch look-up": Moods(batch=200),
+    "batch refused by role": Moods(batch=403),
+    "batch refused by mode": Moods(batch=503),
+    "a late index": Moods(search="nothing"),
+    "no search": Moods(search="missing"),
+    "no creation time": Moods(created_at=False),
+    "no merge": Moods(merge="missing"),
+    "no merge, strict": Moods(merge="missing", strict=True),
+    "merge answers {}": Moods(merge="empty"),
+    "merge answers null": Moods(merge="null"),
+    "409 for manual lines": Moods(manual_409=True),
+    "strict": Moods(strict=True),
+    "no checksums": Moods(checksums=False),
+    "no checksums, no sizes": Moods(checksums=False, sizes=False),
+    "uploads in two steps": Moods(upload="presigned"),
+    "another schema": Moods(schemas=("acme",)),
+    "errors as text": Moods(errors="text"),
+    "errors bare": Moods(errors="bare"),
+    "the other dialect": Moods(event="bom_merge"),
+    "no auth/me": Moods(auth_me=False),
+    "no revisions": Moods(revisions_route=False, properties="item"),
+    "no numbers": Moods(numbers=False),
+}
+
+
+@pytest.mark.parametrize("moods", [Moods(), *MOODS.values()], ids=["default", *MOODS])
+def test_the_whole_story_in_each_mood(tmp_path: Path, moods: Moods) -> None:
+    """Register, sync, push, queue; then all of it again, which changes nothing."""
+    with real_silo(moods) as silo:
+        desk = Desk(tmp_path, silo)
+        story(desk)
+
+
+def story(desk: Desk) -> None:
+    """What a team does, twice; what the server holds in the end."""
+    silo = desk.silo
+    until_done(desk.register, 2)
+    # Where nothing on the server shows for which part an item was made, a person looked.
+    assert until_done(desk.take) == []
+    assert len(silo.items) == NAMES
+    check_held_once(desk)
+    assert desk.diff() == []
+    assert until_done(desk.sync) == []
+    lines = assembled(desk)
+    assert len(lines) == 5
+    housing = silo.named("Housing")
+    housing.revisions[-1]["properties"]["finish"] = "painted"
+    held = silo.moods.properties != "nowhere"
+    assert (until_done(desk.push) == []) == held
+    newest = housing.revisions[-1]["properties"]
+    assert newest["finish"] == "painted"
+    assert ("mass_kg" in newest) == held
+    assert until_done(desk.queue) == []
+    assert len(housing.files) == 1
+    counts = [len(item.revisions) for item in silo.items.values()]
+    for command in (desk.register, desk.sync, desk.push):
+        until_done(command, 1)
+    assert (len(silo.items), assembled(desk)) == (NAMES, lines)
+    assert [len(item.revisions) for item in silo.items.values()] == counts
+    check_held_once(desk)
+
+
+@settings(
+    max_examples=6,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+    derandomize=True,
+)
+@given(data=st.data())
+def test_the_whole_story_in_mixed_moods(tmp_path_factory: pytest.TempPathFactory, data: Any) -> None:
+    """Any three switches at once."""
+    chosen = data.draw(st.lists(st.sampled_from(sorted(MOODS)), min_size=2, max_size=3, unique=True))
+    mixed = Moods()
+    for name in chosen:
+        mood = MOODS[name]
+        differing = {
+            f.name: getattr(mood, f.name) for f in fields(Moods) if getattr(mood, f.name) != f.default
+        }
+        mixed = replace(mixed, **differing)
+    if not mixed.revisions_route:
+        mixed = replace(mixed, properties="item")
+    with real_silo(mixed) as silo:
+        story(Desk(tmp_path_factory.mktemp("desk"), silo))
+
+
+def test_a_manual_line_is_reported_and_stays(tmp_path: Path) -> None:
+    """Whether the server refuses the merge for it or not."""
+    for moods in (Moods(), Moods(manual_409=True), Moods(merge="missing"), Moods(merge="empty")):
+        with real_silo(moods) as silo:
+            desk = registered(tmp_path / str(silo.server_address[1]), silo)
+            number = silo.named("Cover").part_number
+            line = {"child_part_number": number, "quantity": 7, "source": "manual", "rel_type": "component"}
+            silo.named("Top Assembly").lines.append(line)
+            assert desk.sync() == []
+            assert (assembled(desk)[number], len(assembled(desk))) == (7, 5)
+
+
+def test_a_merge_that_reports_failure_is_no_success(tmp_path: Path) -> None:
+    """200 with an error inside."""
+    with real_silo(Moods(merge="fails")) as silo:
+        desk = registered(tmp_path, silo)
+        statuses = {outcome.status for outcome in desk.synced().outcomes}
+        assert statuses == {Status.FAILED}
+
+
+@pytest.mark.parametrize(
+    ("moods", "word"),
+    [
+        (Moods(role="viewer"), "editor"),
+        (Moods(mode="read-only"), "no changes now"),
+        (Moods(expired=True), "wants a login"),
+    ],
+    ids=["viewer", "read-only", "expired session"],
+)
+def test_a_server_that_takes_no_changes_is_asked_once(tmp_path: Path, moods: Moods, word: str) -> None:
+    """Reading works where it may; the first refusal ends the run; the words say why."""
+    with real_silo(moods) as silo:
+        desk = registered(tmp_path / "a", silo)
+        if not moods.expired:
+            assert desk.diff() == []
+        silo.seen.clear()
+        [*errors] = desk.sync() if not moods.expired else until_done(desk.sync, 1)
+        assert errors
+        assert all(word in str(error) for error in errors)
+        assert sum("merge" in seen for seen in silo.seen) <= 1
+        fresh = Desk(tmp_path / "b", silo)
+        errors = until_done(fresh.register, 1)
+        assert all(word in str(error) for error in errors)
+        assert sum(seen == "POST /api/items" for seen in silo.seen) <= 1
+        assert len(silo.items) == NAMES
+
+
+def test_the_live_connection_reads_both_dialects(tmp_path: Path) -> None:
+    """As one event."""
+    for dialect in ("bom.merged", "bom_merge"):
+        with real_silo(Moods(event=dialect)) as silo:
+            desk = registered(tmp_path / dialect, silo)
+            heard: queue.Queue[ServerEvent] = queue.Queue()
+            with desk.client() as client:
+                listener = EventListener(client, heard.put, last_event_id=str(len(silo.events)))
+                listener.start()
+                try:
+                    desk.sync()
+                    event = heard.get(timeout=20)
+                finally:
+                    listener.stop()
+            assert (event.type, event.merge.item) == ("bom_merge", event.item)
+
+
+# -- each fault of each request --------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Case:
+    """A fault of one request of a command."""
+
+    command: str
+    number: int
+    fault: str
+
+
+LENGTHS = {"register": 11, "sync": 14, "diff": 11, "push": 3, "queue": 3}
+"""Requests of each command in the default mood, at most."""
+
+
+def cases() -> Iterator[Case]:
+    for command, length in LENGTHS.items():
+        for number in range(length):
+            for fault in FAULTS:
+                yield Case(command, number, fault)
+
+
+LONG = bool(os.environ.get("SILO_LONG"))
+ALL = list(cases())
+SAMPLE = random.Random(15).sample(ALL, 24)
+
+
+def after_a_fault(folder: Path, case: Case, moods: Moods) -> None:
+    """The command with the fault, repeated by a plain user: the server holds each thing once."""
+    with real_silo(moods) as silo:
+        desk = Desk(folder, silo) if case.command == "register" else registered(folder, silo)
+        if case.command == "push":
+            silo.named("Housing").revisions[-1]["properties"]["finish"] = "painted"
+        silo.faults[case.number] = case.fault
+        command = getattr(desk, case.command)
+        left = until_done(command)
+        if left and case.command == "register":
+            # Only where nothing on the server shows for which part the item was made.
+            assert moods.properties == "nowhere"
+            left = until_done(desk.take)
+        assert left == [], case
+        check_held_once(desk)
+        assert len(silo.items) == NAMES
+        housing = silo.named("Housing")
+        if case.command == "sync":
+            assert len(assembled(desk)) == 5
+        if case.command == "push":
+            assert {k: housing.revisions[-1]["properties"].get(k) for k in ("finish", "mass_kg")} == {
+                "finish": "painted",
+                "mass_kg": 1.5,
+            }
+        if case.command == "queue":
+            assert len(housing.files) == 1
+
+
+@pytest.mark.parametrize("case", SAMPLE, ids=str)
+def test_each_thing_is_held_once_after_a_fault(tmp_path: Path, case: Case) -> None:
+    """A seeded sample of the table below."""
+    after_a_fault(tmp_path, case, Moods())
+
+
+@pytest.mark.skipif(not LONG, reason="half an hour; SILO_LONG=1 runs it")
+@pytest.mark.parametrize(
+    "moods",
+    [Moods(), Moods(checksums=False, search="nothing"), Moods(properties="nowhere"), Moods(merge="missing")],
+    ids=["default", "no checksums, late index", "properties nowhere", "no merge"],
+)
+@pytest.mark.parametrize("case", ALL if LONG else [], ids=str)
+def test_the_whole_fault_table(tmp_path: Path, case: Case, moods: Moods) -> None:
+    """Every request of every command with every fault."""
+    if case.command == "push" and moods.properties == "nowhere":
+        pytest.skip("nothing is written where the properties cannot be read")
+    after_a_fault(tmp_path, case, moods)
