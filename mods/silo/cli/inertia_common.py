@@ -118,7 +118,7 @@ def add_push_options(parser: argparse.ArgumentParser) -> None:
 
 def need_inertia_extra(via: str = "files") -> None:
     """One plain sentence where the extra is not installed; FreeCAD brings a geometry kernel of its own."""
-    wanted = ("numpy", "rapidfuzz") if via == "freecad" else ("numpy", "OCP", "trimesh", "rapidfuzz", "yaml")
+    wanted = ("numpy", "PIL") if via == "freecad" else ("numpy", "OCP", "trimesh", "PIL", "yaml")
     missing = [name for name in wanted if find_spec(name) is None]
     if missing:
         raise ConfigError(

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """When two names mean the same part. Equal, equal but for writing, equal but for lost characters. Pure.
 
-A name inside another never counts ("arm" in "forearm"), nor does likeness: M3x10 and M3x12 score 80 of 100,
-bracket_2 and bracket_3 score 89. Likeness only proposes, and only where all digits agree.
+A name inside another never counts ("arm" in "forearm"), nor does likeness: M3x10 and M3x12 are alike to 0.8,
+bracket_2 and bracket_3 to 0.89. Likeness only proposes, and only where all digits agree.
 """
 
 from __future__ import annotations
@@ -10,10 +10,11 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Iterable
+from difflib import SequenceMatcher
 from functools import lru_cache
 
-SUGGEST_FROM = 90.0
-"""rapidfuzz WRatio (0 to 100) from which a name is proposed to the person."""
+SUGGEST_FROM = 0.84
+"""difflib's ratio from which a name is proposed to the person; docs/decisions has what it was chosen by."""
 
 LOST = "\ufffd"
 """What stands for an unreadable character; a plain question mark may as well."""
@@ -81,13 +82,13 @@ def digits(name: str) -> tuple[str, ...]:
 
 
 class Suggester:
-    """Names a person may have meant: alike by rapidfuzz, all digits equal. For messages only.
+    """Names a person may have meant: alike by difflib, all digits equal. For messages only.
 
     ``budget``: comparisons before it falls silent; proposals are a courtesy, and must not take minutes for a
     BOM of thousands that fits nothing.
     """
 
-    def __init__(self, candidates: Iterable[str], budget: int = 1_000_000) -> None:
+    def __init__(self, candidates: Iterable[str], budget: int = 100_000) -> None:
         self._by_digits: dict[tuple[str, ...], dict[str, str]] = {}
         for name in candidates:
             self._by_digits.setdefault(digits(name), {}).setdefault(plain(name), name)
@@ -99,9 +100,19 @@ class Suggester:
         self._budget -= len(fitting)
         if not fitting or self._budget < 0:
             return ()
-        from rapidfuzz import fuzz, process
+        wanted = plain(name)
+        turned = " ".join(sorted(wanted.split()))
+        found = []
+        for candidate in fitting:
+            ratio = max(_alike(wanted, candidate), _alike(turned, " ".join(sorted(candidate.split()))))
+            if ratio >= SUGGEST_FROM:
+                found.append((-ratio, candidate))
+        return tuple(fitting[candidate] for _, candidate in sorted(found)[:limit])
 
-        found = process.extract(
-            plain(name), fitting.keys(), scorer=fuzz.WRatio, limit=limit, score_cutoff=SUGGEST_FROM
-        )
-        return tuple(fitting[choice] for choice, _, _ in found)
+
+def _alike(left: str, right: str) -> float:
+    """0 to 1; 0 at once where it cannot reach the limit."""
+    matcher = SequenceMatcher(None, left, right, autojunk=False)
+    if matcher.real_quick_ratio() < SUGGEST_FROM or matcher.quick_ratio() < SUGGEST_FROM:
+        return 0.0
+    return matcher.ratio()

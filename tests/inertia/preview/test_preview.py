@@ -6,7 +6,6 @@ from __future__ import annotations
 import io
 import json
 import struct
-import zlib
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from PIL import Image, ImageDraw
 
 from silo.bom.errors import InputError
 from silo.inertia.core import MassProps
@@ -24,9 +24,8 @@ from silo.inertia.geometry.mesh import mesh_volume
 from silo.inertia.model import Assembly, Instance, Prototype
 from silo.inertia.preview.glb import quaternion, write_glb
 from silo.inertia.preview.legend import mass_words
-from silo.inertia.preview.lettering import fitted, text_mask
+from silo.inertia.preview.lettering import fitted, width_of, write
 from silo.inertia.preview.picture import write_picture
-from silo.inertia.preview.png import write_png
 from silo.inertia.preview.raster import Canvas
 from silo.inertia.preview.scene import colour_of, inertia_ellipsoid, views_of
 from silo.inertia.preview.shading import ellipsoid, shaded
@@ -143,26 +142,10 @@ def test_quaternions_turn_like_their_matrices(angle: float, axis: Any) -> None:
 
 
 def pixels(data: bytes) -> NDArray[np.uint8]:
-    """The pixels of a PNG that was written here, by the format's own rules."""
-    assert data.startswith(b"\x89PNG\r\n\x1a\n")
-    chunks, position = {}, 8
-    while position < len(data):
-        size, kind = struct.unpack_from(">I4s", data, position)
-        body = data[position + 8 : position + 8 + size]
-        assert struct.unpack_from(">I", data, position + 8 + size)[0] == zlib.crc32(kind + body)
-        chunks[kind] = body
-        position += 12 + size
-    width, height, depth, colour = struct.unpack_from(">IIBB", chunks[b"IHDR"])
-    assert (depth, colour) == (8, 2)
-    rows = np.frombuffer(zlib.decompress(chunks[b"IDAT"]), np.uint8).reshape(height, 1 + 3 * width)
-    assert set(rows[:, 0]) == {2}
-    return np.cumsum(rows[:, 1:], axis=0, dtype=np.uint8).reshape(height, width, 3)
-
-
-def test_a_png_keeps_its_pixels() -> None:
-    """Written and read back."""
-    image = np.random.default_rng(1).integers(0, 256, (7, 5, 3), dtype=np.uint8)
-    np.testing.assert_array_equal(pixels(write_png(image)), image)
+    """(height, width, 3) of a PNG."""
+    with Image.open(io.BytesIO(data)) as image:
+        assert (image.format, image.mode) == ("PNG", "RGB")
+        return np.array(image)
 
 
 def hue_count(image: NDArray[np.uint8], colour: tuple[float, float, float]) -> int:
@@ -249,11 +232,34 @@ def test_normals_are_smooth_over_a_ball_and_sharp_on_a_cube() -> None:
 
 
 def test_text_takes_room_and_is_cut_to_fit() -> None:
-    """Longer text is wider; what does not fit ends in an ellipsis; accents lose their mark only."""
-    assert text_mask("bb", 10).shape[1] > text_mask("b", 10).shape[1]
+    """Longer text is wider; what does not fit ends in an ellipsis."""
+    assert width_of("bb", 10) > width_of("b", 10)
     assert fitted("a link with a long name", 10, 80).endswith("…")
+    assert width_of(fitted("a link with a long name", 10, 80), 10) <= 80
     assert fitted("short", 10, 800) == "short"
-    np.testing.assert_array_equal(text_mask("é", 10), text_mask("e", 10))
+    assert fitted("W" * 5000, 10, 80).endswith("W…")
+
+
+def inked(text: str) -> bytes:
+    page = Image.new("RGB", (80, 40), "white")
+    write(ImageDraw.Draw(page), text, 5, 30, 18, (0, 0, 0))
+    return page.tobytes()
+
+
+def test_letters_of_the_world_are_no_boxes() -> None:
+    """Each has a picture of its own, and none the one of a letter that no font has."""
+    box = inked("□")
+    drawn = {letter: inked(letter) for letter in "ßØøłŁДжΩμア漢中éñçžİ€²±×°–…"}
+    assert box not in drawn.values()
+    assert inked(" ") not in drawn.values()
+    assert len(set(drawn.values())) == len(drawn)
+
+
+def test_text_that_no_font_has_is_drawn_all_the_same() -> None:
+    """Control characters go, the rest is a box; nothing fails."""
+    assert inked("a\x00\x1b[31mb") == inked("a[31mb")
+    assert inked("\U00012345") == inked("\U00012346") == inked("□") != inked("")
+    assert width_of("line\nbreak", 10) == width_of("line break", 10)
 
 
 @pytest.mark.parametrize(

@@ -8,15 +8,16 @@ lie inside; the mark of a centre of mass is the usual quartered disc, and always
 from __future__ import annotations
 
 from collections.abc import Sequence
+from io import BytesIO
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image, ImageDraw
 
 from silo.inertia.geometry.mesh import Floats, simplified
 from silo.inertia.model import Assembly
 from silo.inertia.preview.camera import SMOOTH, Camera, camera_for
 from silo.inertia.preview.legend import draw_axes, draw_legend, draw_ruler
-from silo.inertia.preview.png import write_png
 from silo.inertia.preview.raster import Canvas
 from silo.inertia.preview.scene import (
     UNCLAIMED,
@@ -51,10 +52,14 @@ def write_picture(
     page[:, stage:] = (0.965, 0.97, 0.975)
     for view in views:
         _mark_centre(page, camera, view)
-    draw_axes(page, camera, height)
-    draw_ruler(page, camera, stage, height)
-    draw_legend(page, assembly, views, colours, stage)
-    return write_png((np.clip(page, 0, 1) * 255 + 0.5).astype(np.uint8))
+    picture = Image.fromarray((np.clip(page, 0, 1) * 255 + 0.5).astype(np.uint8))
+    draw = ImageDraw.Draw(picture)
+    draw_axes(draw, camera, height)
+    draw_ruler(draw, camera, stage, height)
+    draw_legend(draw, assembly, views, colours, stage)
+    data = BytesIO()
+    picture.save(data, "PNG")
+    return data.getvalue()
 
 
 def _bodies(
