@@ -23,7 +23,7 @@ NFD = unicodedata.normalize("NFD", "Büchse")
 
 @pytest.fixture
 def disk(tmp_path: Path) -> Iterator[Path]:
-    """A folder on a disk that finds a name in any case and normal form: the machine's own, or a mounted one."""
+    """A folder on a disk that finds a name in any case and normal form: the machine's own, or a mount."""
     names = ("Büchse", NFD.upper())
     (tmp_path / names[0]).touch()
     native = (tmp_path / names[1]).exists()

@@ -12,6 +12,8 @@ from typing import Any
 
 from server_testing import Answer, Api, form_body
 
+from silo.api.client import SiloClient
+
 PNG = b"\x89PNG\r\n\x1a\n" + b"picture"
 
 
@@ -144,3 +146,24 @@ def test_a_file_is_found_by_its_content(api: Api) -> None:
         found = api.get(f"/api/items/search?q={query}")
         assert {item["part_number"] for item in found} == {older, newer}
     assert api.get(f"/api/items/search?q={'0' * 64}") == []
+
+
+def test_revisions_come_in_pages(api: Api) -> None:
+    """The newest first, so many at a time; the client gets all of them, or the newest without the others."""
+    number = api.item()
+    for count in range(1, 8):
+        api.good("POST", f"/api/items/{number}/revisions", {"properties": {"n": count}})
+
+    def numbers(query: str) -> list[int]:
+        answer = api.call("GET", f"/api/items/{number}/revisions?{query}")
+        assert answer.headers["x-total-count"] == ("2" if "after" in query else "7")
+        return [revision["revision_number"] for revision in answer.json()]
+
+    assert numbers("limit=3") == [7, 6, 5]
+    assert numbers("limit=3&before=5") == [4, 3, 2]
+    assert numbers("after=5") == [7, 6]
+    api.bad(400, "GET", f"/api/items/{number}/revisions?limit=0")
+    with SiloClient(api.base_url, api.token) as client:
+        assert [r.revision_number for r in client.revisions(number)] == [7, 6, 5, 4, 3, 2, 1]
+        assert [r.revision_number for r in client.revisions(number, newest=2)] == [7, 6]
+        assert [r.revision_number for r in client.revisions(number, after=4)] == [7, 6, 5]

@@ -29,6 +29,8 @@ from silo.api.transport import Call, Cancel, Timeouts, Transport, stop_if
 from silo.api.wire import Revision, ServerState, User
 from silo.bom.errors import RouteMissingError, ServerFaultError
 
+_PAGE = 1000  # revisions in one answer
+
 
 class SiloClient(ItemCalls, BomCalls):
     """A Silo server.
@@ -122,11 +124,25 @@ class SiloClient(ItemCalls, BomCalls):
         # A server that is not ready says so with 503, and why in the same form.
         return reply.mapping(accept=(503,))
 
-    def revisions(self, part_number: str, /) -> list[Revision]:
-        """The revisions of an item, newest first."""
-        reply = self._get(f"the revisions of {part_number}", "items", part_number, "revisions")
-        found = reply.models(Revision, "revisions", *LISTS)
-        return sorted(found, key=lambda revision: revision.revision_number, reverse=True)
+    def revisions(self, part_number: str, /, *, newest: int | None = None, after: int = 0) -> list[Revision]:
+        """The revisions of an item, newest first; those above the number ``after``.
+
+        ``newest``: only so many. A server that knows neither sends all, and gets no further question.
+        """
+        found: list[Revision] = []
+        params: dict[str, int] = {"limit": newest or _PAGE, **({"after": after} if after else {})}
+        while True:
+            subject = f"the revisions of {part_number}"
+            reply = self._get(subject, "items", part_number, "revisions", params=params)
+            page = reply.models(Revision, "revisions", *LISTS)
+            lowest = found[-1].revision_number if found else None
+            fresh = [r for r in page if r.revision_number > after]
+            fresh = [r for r in fresh if lowest is None or r.revision_number < lowest]
+            found += sorted(fresh, key=lambda revision: revision.revision_number, reverse=True)
+            total = reply.headers.get("X-Total-Count", "")
+            if newest is not None or not fresh or not total.isdecimal() or len(found) >= int(total):
+                return found[:newest]
+            params["before"] = found[-1].revision_number
 
     def get_properties(self, part_number: str, /) -> dict[str, Any]:
         """All properties of an item, from its newest revision where the item's own answer carries none.
@@ -137,7 +153,7 @@ class SiloClient(ItemCalls, BomCalls):
         if item.properties:
             return dict(item.properties)
         try:
-            newest = next(iter(self.revisions(part_number)), None)
+            newest = next(iter(self.revisions(part_number, newest=1)), None)
         except RouteMissingError:
             newest = None
         if newest is None and ("properties" in item.model_fields_set or not item.current_revision):

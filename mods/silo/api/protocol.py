@@ -114,7 +114,9 @@ class BomApi(Protocol):
 class FilesApi(Protocol):
     """Revisions and their files."""
 
-    def revisions(self, part_number: str, /) -> list[Revision]: ...
+    def revisions(
+        self, part_number: str, /, *, newest: int | None = None, after: int = 0
+    ) -> list[Revision]: ...
 
     def upload_file(
         self,

@@ -52,7 +52,9 @@ class SendApi(arrived.Downloads, Protocol):
 
     def get_bom(self, part_number: str, /) -> Sequence[Any]: ...
 
-    def revisions(self, part_number: str, /) -> list[Revision]: ...
+    def revisions(
+        self, part_number: str, /, *, newest: int | None = None, after: int = 0
+    ) -> list[Revision]: ...
 
     def upload_file(
         self,
@@ -285,17 +287,19 @@ class _Run:
 
     def _send_file(self, sent: Sent) -> Sent:
         entry = sent.entry
-        known = self._revisions(sent.part_number)
         mine: Revision | None = None
         if entry.base_revision is None:
-            if is_newest(entry.sha256, known):
+            # The newest one decides it nearly always; an item may have hundreds.
+            if is_newest(entry.sha256, self._revisions(sent.part_number, newest=1)):
                 self.store.arrived(entry, "file")
                 return sent
+            known = self._revisions(sent.part_number)
             self._check_name(entry, known)
             # What the server had before us. Without this note, a file that equals an older revision could
             # not be told from our own that had already arrived.
             self.store.update(entry.id, base_revision=newest_number(known))
         else:
+            known = self._revisions(sent.part_number, after=entry.base_revision)
             mine = arrived.find_arrived(
                 self.client,
                 sent.part_number,
@@ -331,9 +335,11 @@ class _Run:
             # The copy was whole a moment ago, so this is the disk, and not damage.
             raise _PassingError(str(error)) from error
 
-    def _revisions(self, part_number: str) -> Sequence[Revision]:
+    def _revisions(
+        self, part_number: str, *, newest: int | None = None, after: int = 0
+    ) -> Sequence[Revision]:
         try:
-            return self.client.revisions(part_number)
+            return self.client.revisions(part_number, newest=newest, after=after)
         except RouteMissingError:
             return ()
 

@@ -307,9 +307,10 @@ class FakeSilo(FakeStore):
 
     # -- files ------------------------------------------------------------------------------------------
 
-    def revisions(self, part_number: str, /) -> list[Revision]:
+    def revisions(self, part_number: str, /, *, newest: int | None = None, after: int = 0) -> list[Revision]:
         self.before("revisions")
-        return list(reversed(self._stored(part_number).revisions))
+        known = reversed(self._stored(part_number).revisions)
+        return [revision for revision in known if revision.revision_number > after][:newest]
 
     def upload_file(
         self,

@@ -8,7 +8,7 @@ import re
 from typing import Annotated, Any
 
 import anyio.to_thread
-from fastapi import APIRouter, Path, Request
+from fastapi import APIRouter, Path, Query, Request
 from starlette.datastructures import UploadFile
 from starlette.responses import FileResponse, Response
 
@@ -67,12 +67,23 @@ UPLOAD = {
 
 
 @router.get("/revisions", response_model=list[RevisionOut], responses=READ_ERRORS)
-def list_revisions(server: ServerDep, caller: Viewer, part_number: str) -> Response:
-    """All revisions, newest first."""
+def list_revisions(
+    server: ServerDep,
+    caller: Viewer,
+    part_number: str,
+    limit: Annotated[int, Query(ge=1, le=1000)] = 100,
+    before: Annotated[int | None, Query(ge=1, le=2**31 - 1)] = None,
+    after: Annotated[int, Query(ge=0, le=2**31 - 1)] = 0,
+) -> Response:
+    """Revisions, newest first; those below the number ``before`` and above ``after``.
+
+    ``X-Total-Count`` says how many there are above ``after``.
+    """
     with server.db.read(caller) as tx:
         item = items.get_item(tx, part_number)
-        found = revisions.list_revisions(tx, item)
-    return json_answer([revision_to_wire(item.part_number, revision) for revision in found])
+        found, total = revisions.list_revisions(tx, item, limit, before=before, after=after)
+    told = [revision_to_wire(item.part_number, revision) for revision in found]
+    return json_answer(told, headers={"X-Total-Count": str(total)})
 
 
 @router.get("/revisions/{number}", response_model=RevisionOut, responses=READ_ERRORS)

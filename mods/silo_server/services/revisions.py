@@ -82,12 +82,21 @@ def add_revision(
     return revision
 
 
-def list_revisions(tx: Tx, item: Item) -> list[Revision]:
-    """All revisions of the item, newest first."""
+def list_revisions(
+    tx: Tx, item: Item, limit: int = 100, *, before: int | None = None, after: int = 0
+) -> tuple[list[Revision], int]:
+    """The newest ``limit`` of the item's revisions below ``before`` and above ``after``, newest first.
+
+    And how many revisions above ``after`` there are in all.
+    """
+    wanted = (revisions.c.item_id == item.id) & (revisions.c.revision_number > after)
+    total = tx.conn.scalar(select(func.count()).select_from(revisions).where(wanted)) or 0
+    if before is not None:
+        wanted &= revisions.c.revision_number < before
     rows = tx.conn.execute(
-        select(revisions).where(revisions.c.item_id == item.id).order_by(revisions.c.revision_number.desc())
+        select(revisions).where(wanted).order_by(revisions.c.revision_number.desc()).limit(limit)
     ).all()
-    return [_to_revision(row) for row in rows]
+    return [_to_revision(row) for row in rows], total
 
 
 def get_revision(tx: Tx, item: Item, number: int) -> Revision:

@@ -48,15 +48,16 @@ def item_page(
     part_number: str,
     view: Annotated[str, Query(max_length=10)] = "tree",
     used_from: Annotated[int, Query(ge=0, le=10_000_000)] = 0,
+    revisions_before: Annotated[int, Query(ge=1, le=2**31 - 1)] = 2**31 - 1,
 ) -> Response:
     """The item and everything around it; ``view=flat`` shows the leaf parts with their totals.
 
-    ``used_from`` pages through where it is used.
+    ``used_from`` pages through where it is used, ``revisions_before`` through its revisions.
     """
     with server.db.read(caller) as tx:
         item = get_item(tx, part_number, include_archived=True)
         shown = _structure(tx, item, flat=view == "flat")
-        history = revisions.list_revisions(tx, item)
+        history, revision_count = revisions.list_revisions(tx, item, before=revisions_before)
         used, uses = tree.where_used(tx, item, indirect=True, limit=MOST_USES, offset=used_from)
     return page(
         request,
@@ -65,6 +66,7 @@ def item_page(
         item=item,
         view="flat" if view == "flat" else "tree",
         revisions=history,
+        revision_count=revision_count,
         used=used,
         uses=uses,
         used_from=used_from,
