@@ -91,7 +91,9 @@ def _play(story: GearboxStory) -> str:
 
 def _log_in(browser: Browser, server: RunningServer, state: Path) -> Path:
     context = browser.new_context()
-    context.new_page().goto(server.login_url)
+    page = context.new_page()
+    page.goto(server.login_url)
+    page.get_by_role("button", name="Log in").click()
     context.storage_state(path=state)
     context.close()
     return state

@@ -19,9 +19,12 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--port", type=int, default=8080, help="port; 0 takes a free one (default: 8080)")
     parser.add_argument("--database", metavar="URL", help="sqlite:///FILE or postgresql://…")
     parser.add_argument("--workers", type=int, default=1, metavar="N", help="server processes")
+    parser.add_argument(
+        "--reset-admin", metavar="NAME", help="make this user an active admin, and print a login link"
+    )
     args = parser.parse_args(argv)
     try:
-        serve(args.host, args.port, args.database, workers=args.workers)
+        serve(args.host, args.port, args.database, workers=args.workers, reset_admin=args.reset_admin)
     except SiloError as error:
         print(error, file=sys.stderr)
         return 2

@@ -4,10 +4,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from datetime import timedelta
 
 from sqlalchemy import func, select
 
 from silo.bom.errors import ConfigError
+from silo_server.clock import stamp
 from silo_server.db.engine import Database, Tx
 from silo_server.db.migrate import upgrade
 from silo_server.db.tables import users
@@ -21,19 +23,25 @@ START_TOKEN_DAYS = 30.0
 
 @dataclass(frozen=True, slots=True)
 class Welcome:
-    """What the person who starts the server is told. ``login_secret`` belongs behind ``/login/link/``."""
+    """What the person who starts the server is told. ``login_secret`` belongs behind ``/login/link/``.
 
-    username: str
-    token: str
-    login_secret: str
+    Without an active admin there is no user, no token and no link.
+    """
+
+    username: str | None
+    token: str | None
+    login_secret: str | None
     first_start: bool
 
 
-def prepare(db: Database, token: str | None = None) -> Welcome:
+def prepare(db: Database, token: str | None = None, *, reset_admin: str | None = None) -> Welcome:
     """Bring the database up to date and let the first admin in.
 
     token
         ``SILO_API_TOKEN``, made a token of the first admin; a new one is made where None.
+    reset_admin
+        the user with this name becomes an active admin, is made where there is none, and is let in: the way
+        back for those who locked themselves out.
     """
     upgrade(db)
     with db.write(even_when_read_only=True) as tx:
@@ -41,24 +49,27 @@ def prepare(db: Database, token: str | None = None) -> Welcome:
         if first:
             settings = tx.settings
             accounts.create_user(tx, settings.admin_username, Role.ADMIN, password=settings.admin_password)
-        admin = _first_admin(tx)
-        secret = _give_token(tx, admin, token)
-        link = logins.create_login_link(tx, admin.username)
+        if reset_admin is not None:
+            accounts.make_admin(tx, reset_admin)
+        admin = accounts.get_user(tx, reset_admin) if reset_admin else _first_admin(tx)
+        secret = _give_token(tx, admin, token) if admin else None
+        link = logins.create_login_link(tx, admin.username) if admin else None
         search.ensure_index(tx)
     tidy(db, FileStore(db.settings.storage))
-    return Welcome(admin.username, secret, link, first)
+    return Welcome(admin.username if admin else None, secret, link, first)
 
 
-def _first_admin(tx: Tx) -> accounts.User:
+def _first_admin(tx: Tx) -> accounts.User | None:
     row = tx.conn.execute(
         select(users).where(users.c.role == Role.ADMIN.value, users.c.active).order_by(users.c.id).limit(1)
-    ).one()
-    return accounts.to_user(row)
+    ).one_or_none()
+    return accounts.to_user(row) if row is not None else None
 
 
 def _give_token(tx: Tx, admin: accounts.User, token: str | None) -> str:
     if token is None:
-        return credentials.create_token(tx, admin.id, START_TOKEN, days=START_TOKEN_DAYS)[1]
+        expires = stamp(tx.at + timedelta(days=START_TOKEN_DAYS))
+        return credentials.create_token(tx, admin.id, START_TOKEN, expires=expires)[1]
     if not token or not token.isascii() or not token.isprintable() or " " in token:
         raise ConfigError("SILO_API_TOKEN: wanted visible ASCII characters without spaces")
     if not credentials.has_secret(tx, token):

@@ -20,5 +20,13 @@ def stamp(when: datetime) -> str:
 
 
 def wire(stored: str | None) -> str | None:
-    """As told to clients: whole seconds, the spec's form (``2026-02-08T22:15:00Z``)."""
-    return None if stored is None else stored[:19] + "Z"
+    """As sent to clients, to the microsecond, so that a time that came from here means the same moment again.
+
+    Without the fraction where there is none, as in the spec (``2026-02-08T22:15:00Z``).
+    """
+    return None if stored is None else stored.replace(".000000Z", "Z")
+
+
+def spec_time(stored: str) -> str:
+    """As the spec's events have it: whole seconds (``2026-02-08T22:15:00Z``)."""
+    return stored[:19] + "Z"

@@ -33,6 +33,7 @@ from silo_server.bootstrap import Welcome, prepare
 from silo_server.db.engine import Database
 from silo_server.operation.metrics import SHARED
 from silo_server.operation.requests import log_to_stderr
+from silo_server.services import credentials
 from silo_server.settings import Settings, settings_from_environment
 
 START_SECONDS = 60
@@ -52,11 +53,14 @@ class RunningServer:
 
 @dataclass(frozen=True, slots=True)
 class Greeting:
-    """What a server says of itself when it starts. ``public``: other machines reach it."""
+    """What a server says of itself when it starts. ``public``: other machines reach it.
+
+    A token that was given to it is not shown whole: logs are read by many.
+    """
 
     url: str
-    token: str
-    login_url: str
+    token: str | None
+    login_url: str | None
     database: str
     public: bool
 
@@ -64,10 +68,12 @@ class Greeting:
         """For people, and for scripts that look for the first address and the token."""
         lines = [
             f"Silo server: {self.url}",
-            f"Token:       {self.token}",
-            f"Log in:      {self.login_url}",
+            *([f"Token:       {self.token}"] if self.token else []),
+            *([f"Log in:      {self.login_url}"] if self.login_url else []),
             f"Database:    {self.database}",
         ]
+        if self.login_url is None:
+            lines.append("There is no active admin. Start again with --reset-admin NAME to make one.")
         if self.public:
             warning = "This server can be reached from other machines. Put TLS before it (docs/server.md)."
             lines.append(warning)
@@ -147,12 +153,15 @@ def serve(
     *,
     workers: int = 1,
     token: str | None = None,
+    reset_admin: str | None = None,
     tell: Callable[[Greeting], None] = _tell,
 ) -> None:
     """Serve until interrupted; tells the address, a token and a login link through ``tell`` first.
 
     token
         the first token; ``SILO_API_TOKEN`` where None, a new one where that is not set either.
+    reset_admin
+        the name of the user who becomes an active admin, and is let in.
     port
         0 takes a free one.
     """
@@ -164,12 +173,16 @@ def serve(
             f"workers: {workers} processes cannot share one address on Windows. Serve with one "
             "(--workers 1); it answers several requests at once."
         )
-    welcome = _prepare(settings, token or os.environ.get("SILO_API_TOKEN") or None)
+    given = token or os.environ.get("SILO_API_TOKEN") or None
+    welcome = _prepare(settings, given, reset_admin)
     sock = _bind(host, port)
     base_url = _base_url(host, sock.getsockname()[1])
-    login_url = f"{base_url}/login/link/{welcome.login_secret}"
-    database = _without_password(settings)
-    greeting = Greeting(base_url, welcome.token, login_url, database, not is_loopback(host))
+    settings = replace(settings, public_url=settings.public_url or base_url)
+    database, login_url = _without_password(settings), _login_url(settings, welcome)
+    shown = welcome.token
+    if shown and given:
+        shown = f"{credentials.shown_prefix(given)}… (the one you gave)"
+    greeting = Greeting(base_url, shown, login_url, database, not is_loopback(host))
     # uvicorn passes Ctrl-C on when it has ended in good order; to the person that is no error.
     with sock, suppress(KeyboardInterrupt):
         if workers == 1:
@@ -199,8 +212,10 @@ def running_server(
     base = settings or Settings(database_url=database_url)
     given = replace(base, database_url=database_url, files_dir=files_dir or base.files_dir)
     welcome = _prepare(given, token)
-    app = create_app(given)
     sock = _bind(host, port)
+    base_url = _base_url(host, sock.getsockname()[1])
+    given = replace(given, public_url=given.public_url or base_url)
+    app = create_app(given)
     up = threading.Event()
     server = SiloServer(_config(app, given), up.set)
     thread = threading.Thread(target=server.run, kwargs={"sockets": [sock]}, name="silo-server", daemon=True)
@@ -208,20 +223,22 @@ def running_server(
     try:
         if not up.wait(START_SECONDS):
             raise ConfigError(f"the embedded server did not come up within {START_SECONDS} seconds")
-        base_url = _base_url(host, sock.getsockname()[1])
-        login_url = f"{base_url}/login/link/{welcome.login_secret}"
-        yield RunningServer(base_url, welcome.token, login_url, given, app)
+        yield RunningServer(base_url, welcome.token or "", _login_url(given, welcome) or "", given, app)
     finally:
         server.should_exit = True
         thread.join(SHUTDOWN_SECONDS + 5)
         sock.close()
 
 
-def _prepare(settings: Settings, token: str | None) -> Welcome:
+def _login_url(settings: Settings, welcome: Welcome) -> str | None:
+    return f"{settings.public_url}/login/link/{welcome.login_secret}" if welcome.login_secret else None
+
+
+def _prepare(settings: Settings, token: str | None, reset_admin: str | None = None) -> Welcome:
     try:
         db = Database(settings)
         try:
-            return prepare(db, token)
+            return prepare(db, token, reset_admin=reset_admin)
         finally:
             db.close()
     except (SQLAlchemyError, OSError) as error:

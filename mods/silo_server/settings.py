@@ -32,6 +32,9 @@ class Settings:
     poll_seconds
         how often the event log is looked at without having been told of news: the safety net for a lost
         notification, and how SQLite's changes by another process are seen.
+    public_url
+        how users reach the server (``https://silo.example.com``), for links that are sent on. Where it is
+        not given: the address that the server listens on.
     request_head_seconds, request_body_seconds
         how long a client may take to send a request; a body gets a second more for each 8 KiB of it.
     request_log
@@ -74,6 +77,7 @@ class Settings:
     request_log: bool = False
     root_path: str = ""
     trusted_proxies: str = "127.0.0.1,::1"
+    public_url: str | None = None
     admin_username: str = "admin"
     admin_password: str | None = None
 
@@ -141,6 +145,7 @@ _ENVIRONMENT = {
     "request_log": "SILO_REQUEST_LOG",
     "root_path": "SILO_ROOT_PATH",
     "trusted_proxies": "SILO_TRUSTED_PROXIES",
+    "public_url": "SILO_PUBLIC_URL",
     "admin_username": "SILO_ADMIN_USERNAME",
     "admin_password": "SILO_ADMIN_PASSWORD",
 }

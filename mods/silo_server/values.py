@@ -25,9 +25,34 @@ class Role(StrEnum):
         return order.index(self) >= order.index(needed)
 
 
+class Scope(StrEnum):
+    """What a token may be used for, at most; each scope includes the ones before it."""
+
+    READ = "read"
+    WRITE = "write"
+    ADMIN = "admin"
+
+    @property
+    def role(self) -> Role:
+        """The role beyond which this scope does not go."""
+        return {Scope.READ: Role.VIEWER, Scope.WRITE: Role.EDITOR, Scope.ADMIN: Role.ADMIN}[self]
+
+    def covers(self, wanted: Scope) -> bool:
+        """True where this scope includes ``wanted``."""
+        return self.role.covers(wanted.role)
+
+
 @dataclass(frozen=True, slots=True)
 class Actor:
-    """Who does something, and from where."""
+    """Who does something, and from where.
+
+    role
+        what this caller may do: the user's role, or less where the token's scope is narrower.
+    scope, expires_at
+        those of the token (``auth_source`` token); ``expires_at`` None = until it is revoked.
+    by_link
+        a session that a login link began: the user may set a password without naming the old one.
+    """
 
     username: str
     role: Role
@@ -37,6 +62,13 @@ class Actor:
     address: str = ""
     csrf_token: str | None = None
     session_hash: str | None = None
+    scope: Scope = Scope.ADMIN
+    expires_at: str | None = None
+    by_link: bool = False
+
+    @property
+    def by_token(self) -> bool:
+        return self.auth_source == "token"
 
 
 SYSTEM = Actor("system", Role.ADMIN, auth_source="system")
@@ -54,7 +86,8 @@ class NewEvent:
 
 @dataclass(frozen=True, slots=True)
 class Item:
-    """An item. ``id`` is internal, ``uuid`` what the world knows; ``bom_version`` counts its BOM's states."""
+    """An item. ``id`` is internal, ``uuid`` what the world knows; ``bom_version`` counts its BOM's states,
+    ``version`` its own. ``created_as``: the number (case-folded) that it was asked for under."""
 
     id: int
     uuid: str
@@ -70,6 +103,8 @@ class Item:
     properties: Mapping[str, Any]
     current_revision: int
     bom_version: int
+    version: int
+    created_as: str | None
     created_at: str
     created_by: str
     updated_at: str

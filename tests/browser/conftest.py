@@ -87,6 +87,7 @@ def visit(chromium: Browser, server: RunningServer, api: Api) -> Iterator[Visit]
         page.on("console", lambda message: _refused(message.text, faults))
         if role is not None:
             page.goto(login_path(api, role))
+            page.get_by_role("button", name="Log in").click()
         return page
 
     yield open_page

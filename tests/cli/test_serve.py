@@ -86,8 +86,9 @@ def test_the_token_of_the_environment_is_taken_and_shown(tmp_path: Path) -> None
     database = tmp_path / "silo.db"
     with serving(database, token="our-own-token") as server:
         assert isinstance(server, Served)
-        assert server.token == "our-own-token"
-        assert server.get("/api/items").status_code == 200
+        assert server.token == "our… (the one you gave)"
+        assert "our-own-token" not in "".join(server.lines)
+        assert server.get("/api/items", token="our-own-token").status_code == 200
         assert server.get("/api/items", token="another").status_code == 401
     with serving(database) as server:
         assert isinstance(server, Served)

@@ -24,6 +24,7 @@ TABLE = {
     ("GET", "/login"): PUBLIC,
     ("POST", "/login"): PUBLIC,
     ("GET", "/login/link/{secret}"): PUBLIC,
+    ("POST", "/login/link/{secret}"): PUBLIC,
     ("POST", "/logout"): VIEWER,
     ("GET", "/"): VIEWER,
     ("GET", "/items"): VIEWER,
@@ -39,8 +40,8 @@ TABLE = {
     ("POST", "/items/{part_number}/bom/decide"): EDITOR,
     ("POST", "/items/{part_number}/bom/undo"): EDITOR,
     ("POST", "/items/{part_number}/bom/lines"): EDITOR,
-    ("POST", "/items/{part_number}/bom/lines/{child}"): EDITOR,
-    ("POST", "/items/{part_number}/bom/lines/{child}/remove"): EDITOR,
+    ("POST", "/items/{part_number}/bom/lines/{line_id}"): EDITOR,
+    ("POST", "/items/{part_number}/bom/lines/{line_id}/remove"): EDITOR,
     ("POST", "/items/{part_number}/restore"): EDITOR,
     ("GET", "/items/{part_number}/import"): EDITOR,
     ("POST", "/items/{part_number}/import/check"): EDITOR,
@@ -166,9 +167,9 @@ def test_the_way_back_after_a_login(api: Api) -> None:
 def test_a_used_link_leads_on_where_the_session_lives(api: Api) -> None:
     """Opening the same link twice in the browser that it let in is no error."""
     browser = api.as_(None)
-    path = api.good("POST", f"/api/users/{ADMIN}/login-link")["path"] + "?next=/activity"
-    cookie = browser.call("GET", path).headers["set-cookie"].split(";")[0]
-    again = browser.call("GET", path, headers={"Cookie": cookie})
+    path = api.good("POST", f"/api/users/{ADMIN}/login-link")["path"]
+    cookie = browser.call("POST", path).headers["set-cookie"].split(";")[0]
+    again = browser.call("POST", path, body=b"next=/activity", headers={"Cookie": cookie, **FORM})
     assert (again.status, again.headers["location"]) == (303, "/activity")
 
 

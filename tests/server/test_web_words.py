@@ -41,7 +41,7 @@ def test_small_words() -> None:
     )
     assert (size(812), size(14_300), size(3_200_000), size(None)) == ("812 bytes", "14 kB", "3.2 MB", "")
     assert when("2026-02-08T22:15:00.123456Z") == (
-        '<time datetime="2026-02-08T22:15:00Z">2026-02-08 22:15</time>'
+        '<time datetime="2026-02-08T22:15:00.123456Z">2026-02-08 22:15</time>'
     )
     assert when(None) == "–"
     assert segment("A/B 1#") == "A%2FB%201%23"

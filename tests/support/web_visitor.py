@@ -36,7 +36,7 @@ def enter(api: Api, username: str) -> Visitor:
     """A new session by a login link."""
     browser = api.as_(None)
     path = api.good("POST", f"/api/users/{username}/login-link")["path"]
-    cookie = browser.call("GET", path).headers["set-cookie"].split(";")[0]
+    cookie = browser.call("POST", path).headers["set-cookie"].split(";")[0]
     page = browser.call("GET", "/account", headers={"Cookie": cookie}).body.decode()
     found = re.search(r'name="csrf_token" value="([^"]+)"', page)
     assert found is not None

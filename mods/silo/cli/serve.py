@@ -31,6 +31,9 @@ def register(commands: Commands) -> None:
         "--database", metavar="URL", help="sqlite:///FILE or postgresql://…; default: your data folder"
     )
     parser.add_argument("--workers", type=int, default=1, metavar="N", help="server processes (PostgreSQL)")
+    parser.add_argument(
+        "--reset-admin", metavar="NAME", help="make this user an active admin, and print a login link"
+    )
     common.add_json_option(parser)
     parser.set_defaults(run=run)
 
@@ -58,5 +61,7 @@ def run(args: argparse.Namespace) -> int:
 
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with suppress(KeyboardInterrupt):
-        serve(args.host, args.port, args.database, workers=args.workers, tell=tell)
+        serve(
+            args.host, args.port, args.database, workers=args.workers, reset_admin=args.reset_admin, tell=tell
+        )
     return 0

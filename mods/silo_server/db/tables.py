@@ -26,6 +26,7 @@ from sqlalchemy import (
     Table,
     Text,
     UniqueConstraint,
+    false,
 )
 
 metadata = MetaData(
@@ -69,6 +70,8 @@ items = Table(
     Column("properties", Text, nullable=False),
     Column("current_revision", Integer, nullable=False),
     Column("bom_version", Integer, nullable=False),
+    Column("version", Integer, nullable=False, server_default="1"),
+    Column("created_as", String(64)),
     Column("created_at", Stamp, nullable=False),
     Column("created_by", String(64), nullable=False),
     Column("updated_at", Stamp, nullable=False),
@@ -237,6 +240,7 @@ api_tokens = Table(
     Column("name", Text, nullable=False),
     Column("token_hash", String(64), nullable=False, unique=True),
     Column("prefix", String(16), nullable=False),
+    Column("scope", String(8), nullable=False, server_default="admin"),
     Column("created_at", Stamp, nullable=False),
     Column("expires_at", Stamp),
     Column("last_used_at", Stamp),
@@ -251,6 +255,7 @@ sessions = Table(
     Column("id_hash", String(64), primary_key=True),
     Column("user_id", Id, ForeignKey("users.id"), nullable=False),
     Column("csrf_token", String(64), nullable=False),
+    Column("by_link", Boolean, nullable=False, server_default=false()),
     Column("created_at", Stamp, nullable=False),
     Column("expires_at", Stamp, nullable=False),
     Index(None, "user_id"),

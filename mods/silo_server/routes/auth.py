@@ -24,7 +24,7 @@ from silo_server.routes.context import (
 )
 from silo_server.routes.models import Body, Short, Text
 from silo_server.services import accounts, audit, credentials, logins
-from silo_server.values import Actor, Role
+from silo_server.values import Actor, Role, Scope
 
 router = APIRouter(prefix="/api", tags=["auth"])
 
@@ -44,10 +44,17 @@ class LoginBody(Body):
 
 
 class TokenBody(Body):
-    """``POST /api/auth/tokens``; ``expires_in_days`` null = until revoked."""
+    """``POST /api/auth/tokens``.
+
+    expires_in_days
+        null = until revoked; absent = as long as the token that asks (a session: until revoked).
+    scopes
+        ``read``, ``write``, ``admin``, each with those before it; absent = all that the caller may.
+    """
 
     name: Annotated[str, Field(min_length=1, max_length=200)]
     expires_in_days: Annotated[float, Field(gt=0, le=3650, strict=True)] | None = None
+    scopes: Annotated[list[Scope], Field(min_length=1, max_length=3)] | None = None
 
 
 class NewUserBody(Body):
@@ -69,9 +76,10 @@ class UserChangeBody(Body):
 
 
 class PasswordBody(Body):
-    """``PUT /api/auth/password``."""
+    """``PUT /api/auth/password``: the new password, and the old one but after a login link."""
 
     password: Text
+    current_password: Text | None = None
 
 
 @router.post("/auth/login", responses=LOGIN_ERRORS)
@@ -103,11 +111,10 @@ def who_am_i(caller: Viewer) -> dict[str, Any]:
     }
 
 
-@router.put("/auth/password", status_code=204, responses=WRITE_ERRORS)
+@router.put("/auth/password", status_code=204, responses={**LOGIN_ERRORS, **WRITE_ERRORS})
 def set_password(server: ServerDep, caller: Viewer, body: PasswordBody) -> Response:
-    """Set the own password; ends all own sessions."""
-    with server.db.write(caller, even_when_read_only=True) as tx:
-        accounts.change_user(tx, caller.username, password=body.password)
+    """Set the own password; ends all own sessions. Not with a token; asks for the old password."""
+    logins.set_own_password(server.db, caller, body.password, body.current_password)
     return Response(status_code=204)
 
 
@@ -120,9 +127,13 @@ def list_tokens(server: ServerDep, caller: Viewer) -> list[dict[str, Any]]:
 
 @router.post("/auth/tokens", status_code=201, responses=WRITE_ERRORS)
 def create_token(server: ServerDep, caller: Viewer, body: TokenBody) -> dict[str, Any]:
-    """Make a token of one's own role. The secret is in this answer and never again."""
+    """Make a token. The secret is in this answer and never again."""
+    forever = "expires_in_days" in body.model_fields_set and body.expires_in_days is None
+    scope = max(body.scopes, key=list(Scope).index) if body.scopes else None
     with server.db.write(caller, even_when_read_only=True) as tx:
-        token, secret = credentials.create_token(tx, _user_id(caller), body.name, days=body.expires_in_days)
+        token, secret = credentials.create_own_token(
+            tx, body.name, days=body.expires_in_days, forever=forever, scope=scope
+        )
         return {**_token(token), "token": secret}
 
 
@@ -131,6 +142,7 @@ def revoke_token(
     server: ServerDep, caller: Viewer, token_id: Annotated[int, Path(ge=1, le=2**62)]
 ) -> Response:
     """Revoke a token: one's own, or anybody's for an admin."""
+    credentials.check_may_change(caller)
     owner = None if caller.role is Role.ADMIN else _user_id(caller)
     with server.db.write(caller, even_when_read_only=True) as tx:
         credentials.revoke_token(tx, token_id, owner)
@@ -168,7 +180,9 @@ def create_login_link(server: ServerDep, caller: Admin, username: str) -> dict[s
     with server.db.write(caller, even_when_read_only=True) as tx:
         secret = logins.create_login_link(tx, username)
         audit.note(tx, "login_link.created", username)
-        return {"path": f"/login/link/{secret}"}
+        path = f"/login/link/{secret}"
+        public = server.settings.public_url
+        return {"path": path, "url": f"{public}{path}" if public else None}
 
 
 @router.get("/admin/audit", responses=READ_ERRORS)
@@ -219,6 +233,7 @@ def _token(token: credentials.Token) -> dict[str, Any]:
         "id": token.id,
         "name": token.name,
         "prefix": token.prefix,
+        "scopes": [scope.value for scope in Scope if token.scope.covers(scope)],
         "created_at": wire(token.created_at),
         "expires_at": wire(token.expires_at),
         "last_used_at": wire(token.last_used_at),

@@ -28,7 +28,7 @@ from silo_server.routes.render import render_expanded
 from silo_server.services import edits, rollup, tree
 from silo_server.services.items import get_item
 from silo_server.services.last_sync import last_sync, marks, remember_refusal
-from silo_server.services.lines import line_to_wire, lines_of
+from silo_server.services.lines import LineId, line_to_wire, lines_of
 from silo_server.services.merge import MergeOutcome, merge_bom, preview_merge
 from silo_server.services.merge_request import MergeOrder, read_merge_order
 from silo_server.services.review import told_quantities
@@ -85,7 +85,10 @@ def change_line(
     body: LineChangeBody,
     expected: ExpectedVersion,
 ) -> Response:
-    """Change a line. Another quantity on an assembly line makes it a manual override."""
+    """Change the one line of a child; 409 where it has several.
+
+    Another quantity on an assembly line makes it a manual override.
+    """
     with server.db.write(caller) as tx:
         edited = edits.change_line(tx, part_number, child, line_changes(body), expected)
         return _edited(edited, 200)
@@ -95,9 +98,34 @@ def change_line(
 def remove_line(
     server: ServerDep, caller: Editor, part_number: str, child: str, expected: ExpectedVersion
 ) -> Response:
-    """Remove a line."""
+    """Remove the one line of a child; 409 where it has several."""
     with server.db.write(caller) as tx:
         edited = edits.remove_line(tx, part_number, child, expected)
+    return Response(status_code=204, headers={"ETag": etag_of(edited.version)})
+
+
+@router.put("/lines/{line_id}", response_model=LineOut, responses=WRITE_ERRORS)
+def change_line_by_id(
+    server: ServerDep,
+    caller: Editor,
+    part_number: str,
+    line_id: str,
+    body: LineChangeBody,
+    expected: ExpectedVersion,
+) -> Response:
+    """Change the line with this id; for a child that has several lines (a component and an alternate)."""
+    with server.db.write(caller) as tx:
+        edited = edits.change_line(tx, part_number, LineId(line_id), line_changes(body), expected)
+        return _edited(edited, 200)
+
+
+@router.delete("/lines/{line_id}", status_code=204, responses=WRITE_ERRORS)
+def remove_line_by_id(
+    server: ServerDep, caller: Editor, part_number: str, line_id: str, expected: ExpectedVersion
+) -> Response:
+    """Remove the line with this id."""
+    with server.db.write(caller) as tx:
+        edited = edits.remove_line(tx, part_number, LineId(line_id), expected)
     return Response(status_code=204, headers={"ETag": etag_of(edited.version)})
 
 

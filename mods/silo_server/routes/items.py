@@ -14,8 +14,10 @@ from silo_server.routes.context import (
     READ_ERRORS,
     WRITE_ERRORS,
     Editor,
+    ExpectedVersion,
     ServerDep,
     Viewer,
+    etag_of,
     json_answer,
     json_body,
 )
@@ -33,8 +35,9 @@ from silo_server.routes.models import (
 from silo_server.routes.render import item_to_wire
 from silo_server.schema.catalog import describe, describe_form, find_schema, schemas
 from silo_server.services import items as service
-from silo_server.services.last_sync import NEVER, last_sync, last_syncs
+from silo_server.services.last_sync import NEVER, LastSync, last_sync, last_syncs
 from silo_server.services.numbering import preview_number
+from silo_server.values import Item
 
 router = APIRouter(prefix="/api", tags=["items"])
 
@@ -113,7 +116,7 @@ def create_item(server: ServerDep, caller: Editor, body: NewItemBody) -> Respons
     )
     with server.db.write(caller) as tx:
         item, made = service.create_item(tx, new)
-        return json_answer(item_to_wire(item), 201 if made else 200)
+        return _answer(item, 201 if made else 200)
 
 
 @router.get("/items/by-uuid/{uuid}", response_model=ItemOut, responses=READ_ERRORS)
@@ -122,7 +125,7 @@ def get_item_by_uuid(server: ServerDep, caller: Viewer, uuid: str) -> Response:
     with server.db.read(caller) as tx:
         item = service.get_by_uuid(tx, uuid)
         last = last_sync(tx, item)
-    return json_answer(item_to_wire(item, last))
+    return _answer(item, last=last)
 
 
 @router.post("/items/by-uuid", response_model=ItemsOut, responses=READ_ERRORS)
@@ -140,16 +143,20 @@ def get_item(server: ServerDep, caller: Viewer, part_number: str) -> Response:
     with server.db.read(caller) as tx:
         item = service.get_item(tx, part_number)
         last = last_sync(tx, item)
-    return json_answer(item_to_wire(item, last))
+    return _answer(item, last=last)
 
 
 @router.put("/items/{part_number}", response_model=ItemOut, responses=WRITE_ERRORS)
-def change_item(server: ServerDep, caller: Editor, part_number: str, body: ItemChangeBody) -> Response:
-    """Change an item in place; ``properties`` make a new revision. The UUID stays whatever the number."""
+def change_item(
+    server: ServerDep, caller: Editor, part_number: str, body: ItemChangeBody, expected: ExpectedVersion
+) -> Response:
+    """Change an item in place; ``properties`` make a new revision. The UUID stays whatever the number.
+
+    ``If-Match`` with the item's ``ETag``: 412 where somebody was quicker.
+    """
     change = service.ItemChange(**body.model_dump())
     with server.db.write(caller) as tx:
-        item = service.change_item(tx, part_number, change)
-        return json_answer(item_to_wire(item))
+        return _answer(service.change_item(tx, part_number, change, expected))
 
 
 @router.patch(
@@ -163,6 +170,7 @@ async def patch_properties(
     caller: Editor,
     part_number: str,
     request: Request,
+    expected: ExpectedVersion,
     comment: Annotated[Text, Query()] = "",
 ) -> Response:
     """Change some properties by a JSON merge patch (RFC 7386): null removes one, the rest stays."""
@@ -172,16 +180,16 @@ async def patch_properties(
 
     def work() -> Response:
         with server.db.write(caller) as tx:
-            return json_answer(item_to_wire(service.patch_properties(tx, part_number, patch, comment)))
+            return _answer(service.patch_properties(tx, part_number, patch, comment, expected))
 
     return await anyio.to_thread.run_sync(work)
 
 
 @router.delete("/items/{part_number}", status_code=204, responses=WRITE_ERRORS)
-def archive_item(server: ServerDep, caller: Editor, part_number: str) -> Response:
+def archive_item(server: ServerDep, caller: Editor, part_number: str, expected: ExpectedVersion) -> Response:
     """Archive an item; its number stays taken and its lines stay in their BOMs."""
     with server.db.write(caller) as tx:
-        service.archive_item(tx, part_number)
+        service.archive_item(tx, part_number, expected)
     return Response(status_code=204)
 
 
@@ -189,8 +197,7 @@ def archive_item(server: ServerDep, caller: Editor, part_number: str) -> Respons
 def unarchive_item(server: ServerDep, caller: Editor, part_number: str) -> Response:
     """Bring an archived item back."""
     with server.db.write(caller) as tx:
-        item = service.unarchive_item(tx, part_number)
-        return json_answer(item_to_wire(item))
+        return _answer(service.unarchive_item(tx, part_number))
 
 
 @router.post("/generate-part-number", response_model=NumberOut, responses=READ_ERRORS)
@@ -217,3 +224,7 @@ def get_schema(caller: Viewer, name: str) -> dict[str, Any]:
 def get_schema_form(caller: Viewer, name: str) -> dict[str, Any]:
     """The form descriptor for new items."""
     return describe_form(find_schema(name))
+
+
+def _answer(item: Item, status: int = 200, last: LastSync | None = None) -> Response:
+    return json_answer(item_to_wire(item, last), status, {"ETag": etag_of(item.version)})

@@ -141,6 +141,7 @@ class ItemOut(BaseModel):
     properties: dict[str, Any]
     current_revision: int
     bom_version: int
+    version: int
     created_at: str
     created_by: str
     updated_at: str

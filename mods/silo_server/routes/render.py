@@ -32,6 +32,7 @@ def item_to_wire(item: Item, last_sync: LastSync | None = None) -> dict[str, Any
         "properties": dict(item.properties),
         "current_revision": item.current_revision,
         "bom_version": item.bom_version,
+        "version": item.version,
         "created_at": wire(item.created_at),
         "created_by": item.created_by,
         "updated_at": wire(item.updated_at),

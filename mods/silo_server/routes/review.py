@@ -36,9 +36,13 @@ ChangeId = Annotated[int, Path(ge=0, le=2**62)]
 
 
 class DecisionBody(Body):
-    """One decision; ``reason`` says why a line is kept."""
+    """One decision; ``reason`` says why a line is kept.
 
-    child_part_number: Short
+    The line is named by ``line_id``, or by its child: then the component is meant.
+    """
+
+    child_part_number: Short = ""
+    line_id: Short | None = None
     action: service.Action
     reason: Text | None = None
 
@@ -93,7 +97,7 @@ def resolve(
     server: ServerDep, caller: Editor, part_number: str, body: ResolveBody, expected: ExpectedVersion
 ) -> Response:
     """Decide on lines: ``remove``, ``keep`` (as intentional), ``take_cad``, ``keep_silo``."""
-    decisions = [service.Decision(d.child_part_number, d.action, d.reason) for d in body.decisions]
+    decisions = [service.Decision(d.child_part_number, d.action, d.reason, d.line_id) for d in body.decisions]
     with server.db.write(caller) as tx:
         change_id, version = service.resolve(tx, part_number, decisions, expected)
         return _changed(change_id, version)

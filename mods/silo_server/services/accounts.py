@@ -11,8 +11,8 @@ from argon2 import PasswordHasher
 from argon2.exceptions import InvalidHashError, VerificationError
 from sqlalchemy import Row, func, insert, select, update
 
-from silo.bom.errors import ConflictError, NotFoundError, RejectedError
-from silo_server.db.engine import Tx
+from silo.bom.errors import ConflictError, ForbiddenError, NotFoundError, RejectedError
+from silo_server.db.engine import ADMIN_LOCK, Tx
 from silo_server.db.tables import sessions, users
 from silo_server.errors import DuplicateError
 from silo_server.services import audit
@@ -20,6 +20,7 @@ from silo_server.turnstile import Turnstile
 from silo_server.values import Role
 
 MIN_PASSWORD = 10
+NO_TOKEN = "a token cannot set the password of its own account; log in in a browser for that"
 MAX_PASSWORD = 200
 # Each hash takes 64 MiB for as long as it takes.
 _HASHING = Turnstile(places=2, waiting=16, seconds=10, who="log-ins")
@@ -114,7 +115,12 @@ def change_user(
     password: str | None = None,
 ) -> User:
     """Change a user; the last active admin cannot be taken away. A new password ends the user's sessions."""
+    if role is not None or active is not None:
+        # Two admins who demote each other at once must not both be the one but last.
+        tx.lock(ADMIN_LOCK)
     user = get_user(tx, username)
+    if password is not None and tx.actor.by_token and tx.actor.user_id == user.id:
+        raise ForbiddenError(NO_TOKEN)
     loses = (role is not None and role is not Role.ADMIN) or active is False
     if loses and user.role is Role.ADMIN and user.active and _active_admins(tx) <= 1:
         raise ConflictError(f"{user.username} is the last admin; make another user an admin first")
@@ -133,6 +139,15 @@ def change_user(
     if password is not None or active is False:
         tx.conn.execute(sessions.delete().where(sessions.c.user_id == user.id))
     return get_user(tx, username)
+
+
+def make_admin(tx: Tx, username: str) -> User:
+    """The user as an active admin; made where there is none."""
+    tx.lock(ADMIN_LOCK)
+    known = tx.conn.scalar(select(users.c.id).where(users.c.username_key == username.casefold()))
+    if known is None:
+        return create_user(tx, username, Role.ADMIN)
+    return change_user(tx, username, role=Role.ADMIN, active=True)
 
 
 @dataclass(frozen=True, slots=True)

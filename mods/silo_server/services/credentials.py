@@ -10,13 +10,13 @@ from datetime import timedelta
 
 from sqlalchemy import insert, select, update
 
-from silo.bom.errors import NotFoundError
-from silo_server.clock import stamp
+from silo.bom.errors import ForbiddenError, NotFoundError
+from silo_server.clock import stamp, wire
 from silo_server.db.bulk import update_rows
 from silo_server.db.engine import Database, Tx
 from silo_server.db.tables import api_tokens, users
 from silo_server.services import audit
-from silo_server.values import Actor, Role
+from silo_server.values import Actor, Role, Scope
 
 PREFIX = "silo_"
 # Writing down the last use of a token on every request would make every read a write.
@@ -31,6 +31,7 @@ class Token:
     username: str
     name: str
     prefix: str
+    scope: Scope
     created_at: str
     expires_at: str | None
     last_used_at: str | None
@@ -42,19 +43,57 @@ def secret_hash(secret: str) -> str:
     return hashlib.sha256(secret.encode("utf-8", "surrogatepass")).hexdigest()
 
 
+def create_own_token(
+    tx: Tx, name: str, *, days: float | None, forever: bool, scope: Scope | None = None
+) -> tuple[Token, str]:
+    """Make a token of the caller's. A token makes none that lives longer or may more than itself.
+
+    days, forever
+        its lifetime [days]; with neither it lives as long as the token that makes it.
+    Raises ForbiddenError.
+    """
+    actor = tx.actor
+    assert actor.user_id is not None  # every caller that a guard let in is a user
+    check_may_change(actor)
+    if scope is not None and not actor.scope.covers(scope):
+        raise ForbiddenError(f"a token with the scope {actor.scope} cannot make one with the scope {scope}")
+    expires = stamp(tx.at + timedelta(days=days)) if days is not None else None
+    if actor.expires_at is not None:
+        if forever or (expires is not None and expires > actor.expires_at):
+            raise ForbiddenError(
+                f"a token that ends on {wire(actor.expires_at)} cannot make one that lives longer; "
+                "log in in a browser for that"
+            )
+        expires = expires or actor.expires_at
+    return create_token(tx, actor.user_id, name, expires=expires, scope=scope or actor.scope)
+
+
+def check_may_change(actor: Actor) -> None:
+    """Raise ForbiddenError for a token that may only read."""
+    if actor.by_token and actor.scope is Scope.READ:
+        raise ForbiddenError("this token may only read; use one with the scope write")
+
+
 def create_token(
-    tx: Tx, user_id: int, name: str, *, days: float | None = None, secret: str | None = None
+    tx: Tx,
+    user_id: int,
+    name: str,
+    *,
+    expires: str | None = None,
+    secret: str | None = None,
+    scope: Scope = Scope.ADMIN,
 ) -> tuple[Token, str]:
     """Make a token of the user; returns it with its secret, which is never shown again."""
+    prefix = shown_prefix(secret) if secret else None
     secret = secret or PREFIX + secrets.token_hex(20)
-    expires = stamp(tx.at + timedelta(days=days)) if days is not None else None
     token_id = tx.conn.execute(
         insert(api_tokens)
         .values(
             user_id=user_id,
             name=name,
             token_hash=secret_hash(secret),
-            prefix=secret[:9],
+            prefix=secret[:9] if prefix is None else prefix,
+            scope=scope.value,
             created_at=tx.stamp,
             expires_at=expires,
         )
@@ -62,6 +101,11 @@ def create_token(
     ).scalar_one()
     audit.note(tx, "token.created", name)
     return next(t for t in list_tokens(tx, user_id) if t.id == token_id), secret
+
+
+def shown_prefix(secret: str) -> str:
+    """So much of a secret as may be shown: of one that somebody chose, and that may be short, not much."""
+    return secret[: min(9, len(secret) // 4)]
 
 
 def has_secret(tx: Tx, secret: str) -> bool:
@@ -80,7 +124,17 @@ def list_tokens(tx: Tx, user_id: int | None = None) -> list[Token]:
     if user_id is not None:
         query = query.where(api_tokens.c.user_id == user_id)
     return [
-        Token(r.id, r.username, r.name, r.prefix, r.created_at, r.expires_at, r.last_used_at, r.revoked_at)
+        Token(
+            r.id,
+            r.username,
+            r.name,
+            r.prefix,
+            Scope(r.scope),
+            r.created_at,
+            r.expires_at,
+            r.last_used_at,
+            r.revoked_at,
+        )
         for r in tx.conn.execute(query)
     ]
 
@@ -108,6 +162,8 @@ def actor_by_token(db: Database, secret: str, address: str) -> Actor | None:
             select(
                 api_tokens.c.id,
                 api_tokens.c.last_used_at,
+                api_tokens.c.scope,
+                api_tokens.c.expires_at,
                 users.c.id.label("user_id"),
                 users.c.username,
                 users.c.display_name,
@@ -126,7 +182,17 @@ def actor_by_token(db: Database, secret: str, address: str) -> Actor | None:
         return None
     if row.last_used_at is None or row.last_used_at < stale:
         db.token_uses[row.id] = stamp(db.clock())
-    return Actor(row.username, Role(row.role), row.user_id, row.display_name, "token", address)
+    role, scope = Role(row.role), Scope(row.scope)
+    return Actor(
+        row.username,
+        role if scope.role.covers(role) else scope.role,
+        row.user_id,
+        row.display_name,
+        "token",
+        address,
+        scope=scope,
+        expires_at=row.expires_at,
+    )
 
 
 def note_token_uses(db: Database) -> None:

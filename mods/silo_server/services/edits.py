@@ -23,7 +23,7 @@ from silo_server.services.changes import (
     new_line_id,
 )
 from silo_server.services.items import get_item
-from silo_server.services.lines import line_of, lines_of
+from silo_server.services.lines import LineId, line_of, lines_of
 from silo_server.services.merge_request import quantity_problem
 from silo_server.values import Item, Line, LineState, number
 
@@ -55,6 +55,7 @@ class Edited:
     line: Line | None
     version: int
     change_id: int
+    child_part_number: str
 
 
 def add_line(tx: Tx, part_number: str, new: NewLine, expected: int | None = None) -> Edited:
@@ -86,20 +87,20 @@ def add_line(tx: Tx, part_number: str, new: NewLine, expected: int | None = None
 
 
 def change_line(
-    tx: Tx, part_number: str, child: str, changes: Mapping[str, Any], expected: int | None = None
+    tx: Tx, part_number: str, which: str | LineId, changes: Mapping[str, Any], expected: int | None = None
 ) -> Edited:
-    """Change a line's fields (those of LineState that people own).
+    """Change the fields (those of LineState that people own) of the line with this id, or of this child.
 
     Another quantity on an assembly line makes it a manual override, which remembers what the assembly said;
     giving that quantity back ends the override. A ``source`` that is given wins over this.
     """
     parent = get_item(tx, part_number, lock=True)
     check_version(parent, expected)
-    line = line_of(lines_of(tx, parent), child, parent)
+    line = line_of(lines_of(tx, parent), which, parent)
     after = edited_state(line.state, changes)
     check_state(after)
     if after == line.state:
-        return Edited(parent, line, parent.bom_version, 0)
+        return Edited(parent, line, parent.bom_version, 0, line.child_part_number)
     if after.rel_type != line.state.rel_type:
         _check_free(tx, parent, line, after.rel_type)
     what = ", ".join(sorted(k for k in changes if getattr(after, k) != getattr(line.state, k))) or "source"
@@ -109,13 +110,13 @@ def change_line(
     return _apply(tx, parent, change, line.child_part_number, f"{line.child_part_number} changed: {what}")
 
 
-def remove_line(tx: Tx, part_number: str, child: str, expected: int | None = None) -> Edited:
-    """Remove a line; only people do this."""
+def remove_line(tx: Tx, part_number: str, which: str | LineId, expected: int | None = None) -> Edited:
+    """Remove the line with this id, or of this child; only people do this."""
     parent = get_item(tx, part_number, lock=True)
     check_version(parent, expected)
-    line = line_of(lines_of(tx, parent), child, parent)
+    line = line_of(lines_of(tx, parent), which, parent)
     change = LineChange(line.id, line.child_id, line.state, None, line.position)
-    return _apply(tx, parent, change, None, f"{line.child_part_number} removed")
+    return _apply(tx, parent, change, line.child_part_number, f"{line.child_part_number} removed")
 
 
 def edited_state(before: LineState, changes: Mapping[str, Any]) -> LineState:
@@ -162,11 +163,11 @@ def _check_free(tx: Tx, parent: Item, line: Line, rel_type: str) -> None:
             raise DuplicateError(f"{line.child_part_number} is in this BOM as {rel_type} already")
 
 
-def _apply(tx: Tx, parent: Item, change: LineChange, child: str | None, text: str) -> Edited:
+def _apply(tx: Tx, parent: Item, change: LineChange, child: str, text: str) -> Edited:
     note = ChangeNote(kind=ChangeKind.EDIT, summary=text)
     change_id, version = apply_changes(tx, parent, [change], note)
     events.bom_updated(tx, parent, ChangeKind.EDIT, text)
     after = None
-    if child is not None:
+    if change.after is not None:
         after = next(line for line in lines_of(tx, parent) if line.id == change.line_id)
-    return Edited(parent, after, version, change_id)
+    return Edited(parent, after, version, change_id, child)

@@ -15,7 +15,7 @@ from typing import Any
 
 from sqlalchemy import ColumnElement, LargeBinary, Select, cast, delete, func, select
 
-from silo_server.clock import wire
+from silo_server.clock import spec_time
 from silo_server.db.engine import Tx
 from silo_server.db.state import get_state, put_state
 from silo_server.db.tables import events
@@ -94,7 +94,7 @@ def bom_updated(tx: Tx, item: Item, kind: str, summary: str) -> None:
         "item": item.part_number,
         "kind": kind,
         "user": tx.actor.username,
-        "timestamp": wire(tx.stamp),
+        "timestamp": spec_time(tx.stamp),
         "summary": summary,
     }
     _about(tx, "bom.updated", item, data)

@@ -11,7 +11,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, func, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
-from silo.bom.errors import ConflictError, NotFoundError, RejectedError
+from silo.bom.errors import ConflictError, NotFoundError, RejectedError, VersionConflictError
 from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import items
@@ -73,6 +73,8 @@ def to_item(row: Any) -> Item:
         properties=loads(row.properties),
         current_revision=row.current_revision,
         bom_version=row.bom_version,
+        version=row.version,
+        created_as=row.created_as,
         created_at=row.created_at,
         created_by=row.created_by,
         updated_at=row.updated_at,
@@ -145,6 +147,9 @@ def create_item(tx: Tx, new: NewItem) -> tuple[Item, bool]:
     Raises RejectedError for unusable values, DuplicateError for a taken part number, ConflictError for a
     UUID whose item is not the one that is asked for.
     """
+    if new.uuid is not None:
+        # A repeat that comes while the first request is under way waits for it, and finds its item.
+        tx.lock(uuids.UUID(normal_uuid(new.uuid, "id")).int & (2**63 - 1))
     if new.uuid is not None and (known := _made_before(tx, new.uuid, new.part_number)) is not None:
         return known, False
     schema = find_schema(new.schema)
@@ -163,8 +168,10 @@ def create_item(tx: Tx, new: NewItem) -> tuple[Item, bool]:
         "properties": "{}",
         "current_revision": 0,
         "bom_version": 0,
+        "version": 1,
         "created_at": tx.stamp,
         "created_by": tx.actor.username,
+        "created_as": number.casefold() if new.part_number else None,
     }
     _insert(tx, number, values)
     item = get_item(tx, number)
@@ -191,14 +198,19 @@ class ItemChange:
     comment: str = ""
 
 
-def change_item(tx: Tx, part_number: str, change: ItemChange) -> Item:
-    """Change an item in place; a revision is made only where ``properties`` are given (and differ)."""
+def change_item(tx: Tx, part_number: str, change: ItemChange, expected: int | None = None) -> Item:
+    """Change an item in place; a revision is made only where ``properties`` are given (and differ).
+
+    Raises VersionConflictError unless the item has the ``expected`` version, where that is given.
+    """
     item = get_item(tx, part_number, lock=True)
+    check_item_version(item, expected)
     values = _changed_values(item, change)
     if change.properties is not None and dict(change.properties) != dict(item.properties):
         revisions.add_revision(tx, item, comment=change.comment, properties=change.properties)
     elif not values:
         return item
+    steps = 1 if values else 0  # a revision has counted itself
     number = values.pop("part_number", item.part_number)
     try:
         tx.conn.execute(
@@ -208,6 +220,7 @@ def change_item(tx: Tx, part_number: str, change: ItemChange) -> Item:
                 **values,
                 part_number=number,
                 part_number_key=number.casefold(),
+                version=items.c.version + steps,
                 updated_at=tx.stamp,
                 updated_by=tx.actor.username,
             )
@@ -220,18 +233,31 @@ def change_item(tx: Tx, part_number: str, change: ItemChange) -> Item:
     return after
 
 
-def patch_properties(tx: Tx, part_number: str, patch: Mapping[str, Any], comment: str = "") -> Item:
+def check_item_version(item: Item, expected: int | None) -> None:
+    """Raise VersionConflictError unless the item still has the version that the request was made from."""
+    if expected is not None and expected != item.version:
+        raise VersionConflictError(
+            f"item {item.part_number} has version {item.version}, the request was made from version "
+            f"{expected}; read it again and repeat"
+        )
+
+
+def patch_properties(
+    tx: Tx, part_number: str, patch: Mapping[str, Any], comment: str = "", expected: int | None = None
+) -> Item:
     """Change the properties that a JSON merge patch (RFC 7386) names; a new revision where one differs."""
     check_json("properties", patch)
     item = get_item(tx, part_number, lock=True)
     change = ItemChange(properties=merge_patch(dict(item.properties), dict(patch)), comment=comment)
-    return change_item(tx, part_number, change)
+    return change_item(tx, part_number, change, expected)
 
 
-def archive_item(tx: Tx, part_number: str) -> None:
+def archive_item(tx: Tx, part_number: str, expected: int | None = None) -> None:
     """Archive an item: it keeps its number, its history and its place in BOMs, and is found no more."""
     item = get_item(tx, part_number, lock=True)
-    tx.conn.execute(update(items).where(items.c.id == item.id).values(archived_at=tx.stamp))
+    check_item_version(item, expected)
+    archived = {"archived_at": tx.stamp, "version": items.c.version + 1}
+    tx.conn.execute(update(items).where(items.c.id == item.id).values(archived))
     events.item_deleted(tx, item)
 
 
@@ -239,7 +265,9 @@ def unarchive_item(tx: Tx, part_number: str) -> Item:
     """Bring an archived item back."""
     item = get_item(tx, part_number, include_archived=True, lock=True)
     if item.archived_at:
-        tx.conn.execute(update(items).where(items.c.id == item.id).values(archived_at=None))
+        tx.conn.execute(
+            update(items).where(items.c.id == item.id).values(archived_at=None, version=items.c.version + 1)
+        )
         events.item_updated(tx, item)
     return get_item(tx, part_number)
 
@@ -268,7 +296,8 @@ def _made_before(tx: Tx, uuid: str, number: str | None) -> Item | None:
     if row is None:
         return None
     item = to_item(row)
-    if number is not None and number.casefold() != item.part_number.casefold():
+    # It may have been renamed since.
+    if number is not None and number.strip().casefold() not in (item.part_number.casefold(), item.created_as):
         raise ConflictError(
             f"id: {item.uuid} is that of {item.part_number}, not of {number}; a new item needs a new id"
         )

@@ -4,13 +4,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
 from sqlalchemy import Integer, Select, select, type_coerce
 
-from silo.bom.errors import NotFoundError
+from silo.bom.errors import ConflictError, NotFoundError
 from silo_server.clock import wire
 from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
@@ -113,13 +113,45 @@ def lines_of_many(tx: Tx, parent_ids: Collection[int]) -> dict[int, list[Line]]:
     return found
 
 
-def line_of(lines: Iterable[Line], child_part_number: str, parent: Item) -> Line:
-    """The line of this child, its component line where it has several; NotFoundError where it has none."""
-    key = child_part_number.casefold()
+@dataclass(frozen=True, slots=True)
+class LineId:
+    """Names a line by its own id, which stays whatever happens to the line."""
+
+    id: str
+
+
+def line_of(lines: Iterable[Line], which: str | LineId, parent: Item) -> Line:
+    """The line with this id, or the one line of this child.
+
+    Raises NotFoundError where there is none, ConflictError where a child has several: somebody would reach
+    the wrong one.
+    """
+    if isinstance(which, LineId):
+        line = next((line for line in lines if line.id == which.id), None)
+        if line is None:
+            raise NotFoundError(f"the BOM of {parent.part_number} has no line with the id {which.id!r}")
+        return line
+    key = which.casefold()
     found = [line for line in lines if line.child_part_number.casefold() == key]
-    if found:
-        return min(found, key=lambda line: line.state.rel_type != "component")
-    raise NotFoundError(f"the BOM of {parent.part_number} has no line for {child_part_number!r}")
+    if len(found) > 1:
+        ids = ", ".join(f"{line.state.rel_type}: {line.id}" for line in found)
+        raise ConflictError(
+            f"the BOM of {parent.part_number} has {len(found)} lines for {which!r} ({ids}); "
+            "name one by its id"
+        )
+    if not found:
+        raise NotFoundError(f"the BOM of {parent.part_number} has no line for {which!r}")
+    return found[0]
+
+
+def component_of(lines: Iterable[Line], which: str | LineId, parent: Item) -> Line:
+    """As :func:`line_of`; of several lines of a child the component, which is the one that CAD speaks of."""
+    lines = list(lines)
+    if isinstance(which, str):
+        key = which.casefold()
+        own = [line for line in lines if line.child_part_number.casefold() == key]
+        lines = [line for line in own if line.state.rel_type == "component"] or own
+    return line_of(lines, which, parent)
 
 
 def state_to_json(state: LineState) -> dict[str, Any]:

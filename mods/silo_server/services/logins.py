@@ -10,7 +10,7 @@ from datetime import datetime, timedelta
 
 from sqlalchemy import delete, func, insert, select
 
-from silo.bom.errors import AuthError
+from silo.bom.errors import AuthError, ForbiddenError, RejectedError
 from silo_server.clock import stamp
 from silo_server.db.engine import LOGIN_LOCK, Database, Tx
 from silo_server.db.tables import login_failures, login_links, sessions, users
@@ -34,6 +34,31 @@ class NewSession:
 
 def log_in(db: Database, username: str, password: str, address: str) -> NewSession:
     """Begin a session; AuthError where name or password is wrong, TooManyAttemptsError after too many."""
+    user = _proved(db, username, password, address)
+    with db.write(Actor(username[:64], Role.VIEWER, address=address), even_when_read_only=True) as tx:
+        audit.note(tx, "login")
+        return _begin(tx, user.id, user.username)
+
+
+def set_own_password(db: Database, actor: Actor, new: str, current: str | None) -> None:
+    """Set the caller's password, which ends all sessions of theirs.
+
+    Asks for the old one, but for a session that a login link began, which is there for a forgotten password.
+    Raises ForbiddenError for a token, RejectedError, TooManyAttemptsError.
+    """
+    if actor.by_token:
+        raise ForbiddenError(accounts.NO_TOKEN)
+    if not actor.by_link:
+        try:
+            _proved(db, actor.username, current or "", actor.address)
+        except AuthError:
+            raise RejectedError("current password: wanted the one you have now, got another") from None
+    with db.write(actor, even_when_read_only=True) as tx:
+        accounts.change_user(tx, actor.username, password=new)
+
+
+def _proved(db: Database, username: str, password: str, address: str) -> accounts.User:
+    """The user whose password this is; AuthError, TooManyAttemptsError."""
     actor = Actor(username[:64], Role.VIEWER, address=address)
     # An attempt counts as failed from the moment it is made: what comes at the same time is counted as well.
     with db.write(actor, even_when_read_only=True) as tx:
@@ -48,13 +73,16 @@ def log_in(db: Database, username: str, password: str, address: str) -> NewSessi
     assert claimed is not None  # a password fits nobody else
     with db.write(actor, even_when_read_only=True) as tx:
         tx.conn.execute(delete(login_failures).where(login_failures.c.id == attempt))
-        audit.note(tx, "login")
-        return _begin(tx, claimed.user.id, claimed.user.username)
+    return claimed.user
 
 
 def create_login_link(tx: Tx, username: str) -> str:
     """A secret that lets this user in once, for a while; for the first start, where nobody has a password."""
     user = accounts.get_user(tx, username)
+    if tx.actor.expires_at is not None and tx.actor.user_id == user.id:
+        raise ForbiddenError(
+            "a token that ends cannot make a login link for its own account; log in for that"
+        )
     secret = secrets.token_urlsafe(32)
     expires = stamp(tx.at + timedelta(seconds=tx.settings.login_link_seconds))
     tx.conn.execute(delete(login_links).where(login_links.c.expires_at <= tx.stamp))
@@ -78,7 +106,7 @@ def use_login_link(db: Database, secret: str, address: str) -> NewSession:
             ).one_or_none()
             if user is not None:
                 audit.note(tx, "login.link", user.username)
-                return _begin(tx, user.id, user.username)
+                return _begin(tx, user.id, user.username, by_link=True)
     raise AuthError("this login link was used already or is too old; start the server again for a new one")
 
 
@@ -89,6 +117,7 @@ def actor_by_session(db: Database, secret: str, address: str) -> Actor | None:
             select(
                 sessions.c.id_hash,
                 sessions.c.csrf_token,
+                sessions.c.by_link,
                 users.c.id,
                 users.c.username,
                 users.c.display_name,
@@ -110,6 +139,7 @@ def actor_by_session(db: Database, secret: str, address: str) -> Actor | None:
         address,
         row.csrf_token,
         row.id_hash,
+        by_link=bool(row.by_link),
     )
 
 
@@ -122,7 +152,7 @@ def log_out(db: Database, actor: Actor) -> None:
         audit.note(tx, "logout")
 
 
-def _begin(tx: Tx, user_id: int, username: str) -> NewSession:
+def _begin(tx: Tx, user_id: int, username: str, *, by_link: bool = False) -> NewSession:
     secret, csrf = secrets.token_urlsafe(32), secrets.token_urlsafe(32)
     expires = stamp(tx.at + timedelta(seconds=tx.settings.session_seconds))
     tx.conn.execute(delete(sessions).where(sessions.c.expires_at <= tx.stamp))
@@ -131,6 +161,7 @@ def _begin(tx: Tx, user_id: int, username: str) -> NewSession:
             id_hash=secret_hash(secret),
             user_id=user_id,
             csrf_token=csrf,
+            by_link=by_link,
             created_at=tx.stamp,
             expires_at=expires,
         )

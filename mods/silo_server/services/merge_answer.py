@@ -9,7 +9,7 @@ from urllib.parse import quote
 
 from silo.bom.merge import summary
 from silo.bom.model import BomDiff, QuantityChange
-from silo_server.clock import wire
+from silo_server.clock import spec_time
 from silo_server.db.engine import Tx
 from silo_server.values import Item, number
 
@@ -81,7 +81,7 @@ def event_of(tx: Tx, parent: Item, diff: BomDiff, answer: Mapping[str, Any]) -> 
         "type": "bom_merge",
         "item": parent.part_number,
         "user": tx.actor.username,
-        "timestamp": wire(tx.stamp),
+        "timestamp": spec_time(tx.stamp),
         "summary": summary(diff),
         "diff": told,
         "resolve_url": answer["resolve_url"],

@@ -10,14 +10,14 @@ from enum import StrEnum
 from sqlalchemy import select, update
 
 from silo.bom.diff import same_quantity
-from silo.bom.errors import NotFoundError, RejectedError
+from silo.bom.errors import ConflictError, NotFoundError, RejectedError
 from silo_server.db.engine import Tx
 from silo_server.db.tables import bom_conflicts
 from silo_server.services import events
 from silo_server.services.changes import ChangeKind, ChangeNote, LineChange, apply_changes, check_version
 from silo_server.services.history import Change, last_merge
 from silo_server.services.items import get_item
-from silo_server.services.lines import line_of, lines_of
+from silo_server.services.lines import LineId, component_of, lines_of
 from silo_server.values import Item, Line, LineState
 
 
@@ -34,11 +34,12 @@ class Action(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """One decision about one line."""
+    """One decision about one line: the one with ``line_id``, else the component line of the child."""
 
     child_part_number: str
     action: Action
     reason: str | None = None
+    line_id: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,15 +112,18 @@ def resolve(
     conflicts = {c.line.id: c for c in open_conflicts(tx, parent, lines)}
     changes: list[LineChange] = []
     problems: list[str] = []
+    settled: list[Decision] = []
     seen: set[str] = set()
     for index, decision in enumerate(decisions):
         try:
-            line = line_of(lines, decision.child_part_number, parent)
+            which = LineId(decision.line_id) if decision.line_id else decision.child_part_number
+            line = component_of(lines, which, parent)
             if line.id in seen:
                 raise RejectedError(f"{line.child_part_number} is decided twice")
             seen.add(line.id)
             after = _decided(line, decision, conflicts.get(line.id))
-        except (RejectedError, NotFoundError) as error:
+            settled.append(replace(decision, child_part_number=line.child_part_number, line_id=line.id))
+        except (RejectedError, NotFoundError, ConflictError) as error:
             problems.append(f"decisions[{index}]: {error}")
             continue
         if decision.action is Action.KEEP_SILO:
@@ -128,7 +132,7 @@ def resolve(
             changes.append(LineChange(line.id, line.child_id, line.state, after, line.position))
     if problems:
         raise RejectedError(f"nothing was changed: {problems[0]}", problems)
-    return _write(tx, parent, decisions, changes)
+    return _write(tx, parent, settled, changes)
 
 
 def _decided(line: Line, decision: Decision, conflict: Conflict | None) -> LineState | None:

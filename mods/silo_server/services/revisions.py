@@ -74,7 +74,7 @@ def add_revision(
     tx.conn.execute(
         update(items)
         .where(items.c.id == item.id)
-        .values(**changed, updated_at=tx.stamp, updated_by=tx.actor.username)
+        .values(**changed, version=items.c.version + 1, updated_at=tx.stamp, updated_by=tx.actor.username)
     )
     index_item(tx, item.id)
     revision = get_revision(tx, item, number)

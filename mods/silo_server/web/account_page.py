@@ -10,9 +10,10 @@ from starlette.datastructures import FormData
 from starlette.responses import Response
 
 from silo.bom.errors import RejectedError
+from silo_server.errors import TooManyAttemptsError
 from silo_server.routes.context import SESSION_COOKIE, Server, ServerDep
-from silo_server.services import accounts, credentials
-from silo_server.values import Actor, Role
+from silo_server.services import accounts, credentials, logins
+from silo_server.values import Actor, Role, Scope
 from silo_server.web.forms import Form, back, text, whole
 from silo_server.web.guard import Reader
 from silo_server.web.render import page
@@ -37,14 +38,19 @@ def create_token(request: Request, server: ServerDep, caller: Reader, form: Form
         return _show(request, server, caller, problem="A token needs a name of at most 200 characters.")
     if days not in (None, *LIFETIMES):
         return _show(request, server, caller, problem="Choose one of the lifetimes.")
+    try:
+        scope = Scope(text(form, "scope") or Scope.WRITE)
+    except ValueError:
+        return _show(request, server, caller, problem="Choose one of the scopes.")
     with server.db.write(caller, even_when_read_only=True) as tx:
-        _, secret = credentials.create_token(tx, _user_id(caller), name, days=days)
+        _, secret = credentials.create_own_token(tx, name, days=days, forever=days is None, scope=scope)
     return _show(request, server, caller, fresh=(name, secret))
 
 
 @router.post("/account/tokens/{token_id}/revoke")
 def revoke_token(server: ServerDep, caller: Reader, token_id: TokenId, form: Form) -> Response:
     """Revoke a token: one's own, or anybody's for an admin."""
+    credentials.check_may_change(caller)
     owner = None if caller.role is Role.ADMIN else _user_id(caller)
     with server.db.write(caller, even_when_read_only=True) as tx:
         credentials.revoke_token(tx, token_id, owner)
@@ -53,14 +59,13 @@ def revoke_token(server: ServerDep, caller: Reader, token_id: TokenId, form: For
 
 @router.post("/account/password")
 def set_password(request: Request, server: ServerDep, caller: Reader, form: Form) -> Response:
-    """Set the own password; ends all own sessions."""
+    """Set the own password; ends all own sessions. Asks for the old one, but after a login link."""
     password, again = password_of(form, "password"), password_of(form, "again")
     try:
         if password != again:
             raise RejectedError("The two passwords differ.")
-        with server.db.write(caller, even_when_read_only=True) as tx:
-            accounts.change_user(tx, caller.username, password=password)
-    except RejectedError as error:
+        logins.set_own_password(server.db, caller, password, password_of(form, "current"))
+    except (RejectedError, TooManyAttemptsError) as error:
         return _show(request, server, caller, problem=str(error))
     response = back("/login", "The password is set. Log in with it.")
     response.delete_cookie(SESSION_COOKIE)
@@ -94,6 +99,8 @@ def _show(
         now=now,
         user=user,
         lifetimes=LIFETIMES,
+        scopes=[scope for scope in Scope if caller.role.covers(scope.role)],
+        asks_password=not caller.by_link,
         problem=problem,
         fresh=fresh,
         shortest=accounts.MIN_PASSWORD,

@@ -52,9 +52,15 @@ def log_in(request: Request, server: ServerDep, form: Form) -> Response:
 
 
 @router.get("/login/link/{secret}")
-def use_link(request: Request, server: ServerDep, secret: str, next: Next = START) -> Response:
+def login_link(request: Request, secret: str, next: Next = START) -> Response:
+    """Ask whether to use the link up: what only looks at links (mail scanners, previews) must not do that."""
+    return page(request, "login_link.html", None, secret=secret, target=local_path(next))
+
+
+@router.post("/login/link/{secret}", dependencies=[Depends(own_form)])
+def use_link(request: Request, server: ServerDep, secret: str, form: Form) -> Response:
     """Begin a session by a one-time link; one that was used already leads on where the session lives."""
-    target = local_path(next)
+    target = local_path(text(form, "next"))
     try:
         session = logins.use_login_link(server.db, secret, client_address(request))
     except AuthError as error:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Annotated, Any
 
@@ -11,14 +12,14 @@ from fastapi import APIRouter, Query, Request
 from starlette.datastructures import FormData
 from starlette.responses import Response
 
-from silo.bom.errors import NotFoundError, RejectedError, SiloError, VersionConflictError
+from silo.bom.errors import ConflictError, NotFoundError, RejectedError, SiloError, VersionConflictError
 from silo_server.db.engine import Tx
 from silo_server.routes.context import Server, ServerDep
 from silo_server.services import edits, events, history
 from silo_server.services import review as service
 from silo_server.services.items import get_item
 from silo_server.services.last_sync import in_sentences, last_sync
-from silo_server.services.lines import line_of, lines_of
+from silo_server.services.lines import LineId, line_of, lines_of
 from silo_server.services.review import Action, Decision
 from silo_server.values import Actor, Line
 from silo_server.web.forms import Form, amount, back, text, texts, whole
@@ -71,7 +72,8 @@ def decide(request: Request, server: ServerDep, caller: Writer, part_number: str
     """Carry a decision out, for one line or for all chosen ones."""
 
     def work(tx: Tx) -> str:
-        decisions = decisions_of(form)
+        names = {line.id: line.child_part_number for line in lines_of(tx, get_item(tx, part_number))}
+        decisions = decisions_of(form, names)
         if not decisions:
             return "No line was chosen, so nothing was changed."
         service.resolve(tx, part_number, decisions, whole(form, "version"))
@@ -109,42 +111,50 @@ def add_line(request: Request, server: ServerDep, caller: Writer, part_number: s
     return _do(request, server, caller, part_number, work, Asked(typed=_typed(form)))
 
 
-@router.post("/items/{part_number}/bom/lines/{child}")
+@router.post("/items/{part_number}/bom/lines/{line_id}")
 def change_line(
-    request: Request, server: ServerDep, caller: Writer, part_number: str, child: str, form: Form
+    request: Request, server: ServerDep, caller: Writer, part_number: str, line_id: str, form: Form
 ) -> Response:
     """Change what a person may change on a line."""
 
     def work(tx: Tx) -> str:
-        edited = edits.change_line(tx, part_number, child, line_fields(form), whole(form, "version"))
-        if not edited.change_id:
+        which = LineId(line_id)
+        edited = edits.change_line(tx, part_number, which, line_fields(form), whole(form, "version"))
+        if not edited.change_id or edited.line is None:
             return "Nothing was different, so nothing was changed."
-        return f"{child} changed."
+        return f"{edited.line.child_part_number} changed."
 
-    return _do(request, server, caller, part_number, work, Asked(edit=child, typed=_typed(form)))
+    return _do(request, server, caller, part_number, work, Asked(edit=line_id, typed=_typed(form)))
 
 
-@router.post("/items/{part_number}/bom/lines/{child}/remove")
+@router.post("/items/{part_number}/bom/lines/{line_id}/remove")
 def remove_line(
-    request: Request, server: ServerDep, caller: Writer, part_number: str, child: str, form: Form
+    request: Request, server: ServerDep, caller: Writer, part_number: str, line_id: str, form: Form
 ) -> Response:
     """Take a line out of the BOM."""
 
     def work(tx: Tx) -> str:
-        edits.remove_line(tx, part_number, child, whole(form, "version"))
-        return f"{child} removed."
+        edited = edits.remove_line(tx, part_number, LineId(line_id), whole(form, "version"))
+        return f"{edited.child_part_number} removed."
 
     return _do(request, server, caller, part_number, work)
 
 
-def decisions_of(form: FormData) -> list[Decision]:
-    """The decisions in a submitted form: one action for each line in ``chosen``."""
+def decisions_of(form: FormData, names: Mapping[str, str]) -> list[Decision]:
+    """The decisions in a submitted form: one action for each line (by its id, or its child) in ``chosen``.
+
+    names
+        line id → part number, of the BOM's lines.
+    """
     try:
         action = Action(text(form, "action"))
     except ValueError:
         raise RejectedError("action: wanted one of the buttons, got none; load the page again") from None
     reason = text(form, "reason") or (KEPT if action is Action.KEEP else None)
-    return [Decision(child, action, reason) for child in texts(form, "chosen")]
+    return [
+        Decision(names.get(which, which), action, reason, which if which in names else None)
+        for which in texts(form, "chosen")
+    ]
 
 
 def line_fields(form: FormData) -> dict[str, Any]:
@@ -216,10 +226,10 @@ def _show(
 def _editing(lines: list[Line], asked: Asked, item: Any) -> Line | None:
     if not asked.edit:
         return None
-    try:
-        return line_of(lines, asked.edit, item)
-    except NotFoundError:
-        return None
+    for which in (LineId(asked.edit), asked.edit):
+        with suppress(NotFoundError, ConflictError):
+            return line_of(lines, which, item)
+    return None
 
 
 def _typed(form: FormData) -> dict[str, str]:

@@ -71,7 +71,8 @@ def create_login_link(request: Request, server: ServerDep, caller: Administrator
     with server.db.write(caller, even_when_read_only=True) as tx:
         secret = logins.create_login_link(tx, username)
         audit.note(tx, "login_link.created", username)
-    link = f"{str(request.base_url).rstrip('/')}/login/link/{secret}"
+    # Not by the Host header, which the caller chooses: the link is sent on, and lets its holder in.
+    link = f"{server.settings.public_url or ''}/login/link/{secret}"
     return _show(request, server, caller, link=(username, link))
 
 

@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What a token may do beyond its user's role: its scope, its end, and the account that it belongs to."""
+
+from __future__ import annotations
+
+import threading
+import uuid
+from pathlib import Path
+from typing import Any
+
+import pytest
+from server_testing import Api, Databases, bom
+
+from silo.bom.errors import ConflictError
+from silo_server.bootstrap import prepare
+from silo_server.db.engine import Database
+from silo_server.run import Greeting, RunningServer, running_server
+from silo_server.services import accounts
+from silo_server.settings import Settings
+from silo_server.values import SYSTEM, Role
+
+
+def token(api: Api, **values: Any) -> Any:
+    """A new token of the caller's."""
+    return api.good("POST", "/api/auth/tokens", {"name": "t" + uuid.uuid4().hex[:6], **values})
+
+
+def test_a_token_that_ends_makes_none_that_lives_longer(api: Api) -> None:
+    """Neither an eternal one, nor one with a later end, nor a password, nor a link for its own account."""
+    short = token(api, expires_in_days=1)
+    mine = api.as_(short["token"])
+    for days in (None, 2, 3650):
+        mine.bad(403, "POST", "/api/auth/tokens", {"name": "longer", "expires_in_days": days})
+    same = mine.good("POST", "/api/auth/tokens", {"name": "same end"})
+    assert same["expires_at"] == short["expires_at"]
+    shorter = mine.good("POST", "/api/auth/tokens", {"name": "shorter", "expires_in_days": 0.5})
+    assert shorter["expires_at"] < short["expires_at"]
+    mine.bad(403, "PUT", "/api/auth/password", {"password": "a new password"})
+    mine.bad(403, "PUT", "/api/users/admin", {"password": "a new password"})
+    mine.bad(403, "POST", "/api/users/admin/login-link")
+
+
+def test_no_token_sets_the_password_of_its_account(api: Api) -> None:
+    """Not even one that lives for ever."""
+    api.bad(403, "PUT", "/api/auth/password", {"password": "a new password", "current_password": "x"})
+    api.bad(403, "PUT", "/api/users/ADMIN", {"password": "a new password"})
+
+
+@pytest.mark.parametrize(
+    ("scopes", "reads", "writes", "rules"),
+    [
+        (["read"], 200, 403, 403),
+        (["write"], 200, 201, 403),
+        (["admin"], 200, 201, 200),
+        (["admin", "read"], 200, 201, 200),
+    ],
+)
+def test_a_token_goes_as_far_as_its_scope(
+    api: Api, scopes: list[str], reads: int, writes: int, rules: int
+) -> None:
+    """And it makes none that goes further."""
+    made = token(api, scopes=scopes)
+    assert made["scopes"] == ["read", "write", "admin"][: len(made["scopes"])]
+    assert set(scopes) <= set(made["scopes"])
+    mine = api.as_(made["token"])
+    assert mine.call("GET", "/api/items").status == reads
+    assert mine.call("POST", "/api/items", {"part_number": "S-" + uuid.uuid4().hex[:8]}).status == writes
+    assert mine.call("GET", "/api/users").status == rules
+    further = {"name": "further", "scopes": ["admin"]}
+    assert (mine.call("POST", "/api/auth/tokens", further).status == 201) == ("admin" in scopes)
+    assert set(api.get("/api/auth/tokens")[0]["scopes"]) <= {"read", "write", "admin"}
+
+
+def test_a_token_that_may_only_read_changes_nothing_at_all(api: Api) -> None:
+    """Not its own tokens either; looking many items up is reading."""
+    made = token(api, scopes=["read"])
+    mine = api.as_(made["token"])
+    assert mine.call("POST", "/api/items/by-uuid", {"uuids": []}).status == 200
+    mine.bad(403, "POST", "/api/auth/tokens", {"name": "x"})
+    mine.bad(403, "DELETE", f"/api/auth/tokens/{made['id']}")
+    parent, child = api.items(2)
+    mine.bad(403, "POST", bom(parent), {"child_part_number": child})
+    assert mine.get("/api/auth/me")["role"] == "viewer"
+
+
+def test_scopes_that_there_are_not(api: Api) -> None:
+    """Refused, and no token is made."""
+    for scopes in ([], ["king"], ["read", 1], "read"):
+        api.bad(400, "POST", "/api/auth/tokens", {"name": "x", "scopes": scopes})
+
+
+def test_the_first_characters_of_a_short_secret_are_not_most_of_it(api: Api, server: RunningServer) -> None:
+    """A secret that somebody chose is not shown by its prefix, nor when the server starts."""
+    given = next(t for t in api.get("/api/auth/tokens") if t["name"] == "SILO_API_TOKEN")
+    assert len(given["prefix"]) <= len(server.token) // 4
+    assert server.token not in "".join(Greeting("u", given["prefix"], "l", "d", False).lines())
+
+
+def test_links_are_built_from_the_configured_address(api: Api, server: RunningServer) -> None:
+    """Whatever the Host header says."""
+    made = api.good("POST", "/api/users/admin/login-link", headers={"Host": "evil.example"})
+    assert made["url"] == f"{server.base_url}{made['path']}"
+
+
+def test_two_admins_who_demote_each_other_leave_one(kind: str, databases: Databases, tmp_path: Path) -> None:
+    """Both begin at the same moment; one of them is told that the other is the last."""
+    db = Database(Settings(database_url=databases.new(kind), files_dir=tmp_path))
+    prepare(db)
+    for number in range(8):
+        with db.write() as tx:
+            accounts.change_user(tx, "admin", role=Role.ADMIN)
+            if number == 0:
+                accounts.create_user(tx, "other", Role.ADMIN)
+            accounts.change_user(tx, "other", role=Role.ADMIN)
+        gate, refused = threading.Barrier(2), []
+
+        def demote(name: str, gate: threading.Barrier = gate, refused: list[str] = refused) -> None:
+            with db.write(SYSTEM) as tx:
+                # On PostgreSQL both are inside here at once; SQLite lets one in after the other.
+                if tx.postgres:
+                    gate.wait(30)
+                try:
+                    accounts.change_user(tx, name, role=Role.VIEWER)
+                except ConflictError:
+                    refused.append(name)
+
+        threads = [threading.Thread(target=demote, args=(name,)) for name in ("admin", "other")]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join(60)
+        with db.read() as tx:
+            admins = [user for user in accounts.list_users(tx) if user.role is Role.ADMIN]
+        assert len(admins) == len(refused) == 1
+    db.close()
+
+
+def test_a_server_without_an_admin_starts_and_can_be_got_back(
+    kind: str, databases: Databases, tmp_path: Path
+) -> None:
+    """It serves those who have tokens, says what to do, and ``--reset-admin`` lets somebody in."""
+    url = databases.new(kind)
+    settings = Settings(database_url=url, files_dir=tmp_path)
+    db = Database(settings)
+    prepare(db)
+    with db.write() as tx:
+        from silo_server.db.tables import users
+
+        tx.conn.execute(users.update().values(role="viewer"))
+    locked_out = prepare(db, "silo_of_nobody")
+    assert (locked_out.username, locked_out.token, locked_out.login_secret) == (None, None, None)
+    assert "--reset-admin" in Greeting("u", None, None, "d", False).lines()[-1]
+    with running_server(url, files_dir=tmp_path) as running, Api(running.base_url) as nobody:
+        assert nobody.call("GET", "/ready").status == 200
+    for name in ("Admin", "new-boss"):
+        back = prepare(db, reset_admin=name)
+        assert back.username is not None
+        assert back.username.casefold() == name.casefold()
+        with db.read() as tx:
+            user = accounts.get_user(tx, name)
+        assert (user.role, user.active) == (Role.ADMIN, True)
+        assert back.token
+        assert back.login_secret
+    db.close()
