@@ -13,13 +13,17 @@ import pytest
 from fcstd_writer import COMMENT, Doc, container, part, save_xml
 from hypothesis import given
 from hypothesis import strategies as st
+from other_disk import other_disk
 
 from silo.bom.errors import DocumentError
 from silo.bom.identity import identity_of
 from silo.fcstd import check_stampable, open_document, stamp
-from silo.fcstd.container import FileState
+from silo.fcstd.container import ContainerFile, FileState
 from silo.fcstd.edit import replace_file
+from silo.fcstd.limits import Limits
+from silo.fcstd.rewrite import replaced_entry
 from silo.fcstd.stamp import _read_back
+from silo.platform import sync_folder
 
 ROOT = hasattr(os, "geteuid") and os.geteuid() == 0
 
@@ -169,7 +173,7 @@ def test_read_only_folders_stay(tmp_path: Path) -> None:
 
 def write(path: Path, state: FileState, content: bytes) -> None:
     real = str(path)
-    replace_file(real, state, content, lambda copy: _read_back(real, copy, "SiloUUID", "u-1"))
+    replace_file(real, state, [content], lambda copy: _read_back(real, copy, "SiloUUID", "u-1"))
 
 
 def test_a_file_that_changed_meanwhile_is_left_alone(tmp_path: Path) -> None:
@@ -355,3 +359,53 @@ def test_what_cannot_be_stamped_is_known_before(tmp_path: Path) -> None:
     stamp(path, "u-1")
     with pytest.raises(DocumentError, match="another identity"):
         check_stampable(path)
+
+
+LINUX = pytest.mark.skipif(not os.path.exists("/proc/self"), reason="needs /proc")
+
+
+def test_a_disk_without_extended_attributes_is_no_failure(tmp_path: Path) -> None:
+    """As FUSE and some shares are: what can be kept is kept, and the file is written."""
+    with other_disk(tmp_path) as disk:
+        path = part().save(disk / "a.FCStd")
+        assert stamp(path, "u-1")
+        assert open_document(path).Meta == {"SiloUUID": "u-1"}
+
+
+@LINUX
+def test_a_folder_that_cannot_be_synced_is_no_failure() -> None:
+    """/proc says EINVAL, as some shares do: the file was written all the same."""
+    sync_folder("/proc/self")
+    with pytest.raises(OSError, match="No such file"):
+        sync_folder("/proc/self/nothing")
+
+
+def test_a_file_with_several_names_is_not_torn_apart(tmp_path: Path) -> None:
+    """Replacing one name would leave the old content under the others."""
+    path, other = tmp_path / "a.FCStd", tmp_path / "b.FCStd"
+    part().save(path)
+    other.hardlink_to(path)
+    before = path.read_bytes()
+    for refused in (lambda: check_stampable(path), lambda: stamp(path, "u-1")):
+        with pytest.raises(DocumentError, match=r"2 names.*hard links"):
+            refused()
+    assert (path.read_bytes(), path.samefile(other)) == (before, True)
+    other.unlink()
+    assert stamp(path, "u-1")
+
+
+def test_a_big_file_is_not_held_in_memory(tmp_path: Path) -> None:
+    """Only Document.xml is; the rest goes from file to file."""
+    path = tmp_path / "big.FCStd"
+    doc = part()
+    doc.entries["shape.brp"] = os.urandom(3_000_000)
+    doc.save(path)
+    with ContainerFile(str(path), Limits()) as container:
+        entry = container.entry(b"Document.xml")
+        assert entry is not None
+        pieces = replaced_entry(container, entry, b"<Document/>")
+    assert sum(len(piece) for piece in pieces if isinstance(piece, bytes)) < 100_000
+    assert stamp(path, "u-1")
+    with zipfile.ZipFile(path) as archive:
+        assert archive.testzip() is None
+        assert archive.read("shape.brp") == doc.entries["shape.brp"]

@@ -11,7 +11,8 @@ import contextlib
 import os
 import stat
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from typing import BinaryIO
 
 from silo.bom.errors import DocumentError
 from silo.durable import replace_patiently, sync_folder
@@ -19,6 +20,9 @@ from silo.fcstd.container import DOCUMENT_XML, ContainerFile, Entry, FileState
 from silo.fcstd.inflate import Inflater
 from silo.fcstd.limits import Limits
 from silo.fcstd.problem import FcstdError
+from silo.fcstd.rewrite import Piece
+
+_BLOCK = 1 << 20
 
 # The text of Document.xml → as it is to become; ValueError where it cannot be edited, says why.
 Edit = Callable[[bytes], bytes]
@@ -37,6 +41,13 @@ def check_writable(path: str) -> None:
         raise DocumentError(path, "it is read-only; nothing was written")
     if not os.access(os.path.dirname(path), os.W_OK):
         raise DocumentError(path, "its folder is read-only; nothing was written")
+    names = os.stat(path).st_nlink
+    if names > 1:
+        raise DocumentError(
+            path,
+            f"it has {names} names on this disk (hard links), and the others would keep the old content; "
+            "nothing was written. Make it a file of its own: copy it, then put the copy in its place",
+        )
 
 
 def document_xml(container: ContainerFile, limits: Limits) -> tuple[Entry, bytes]:
@@ -57,7 +68,7 @@ def edited_xml(container: ContainerFile, edit: Edit, limits: Limits) -> tuple[En
         raise FcstdError(container.path, f"its Document.xml {error}; nothing was written") from error
 
 
-def replace_file(path: str, state: FileState, content: bytes, check: Callable[[str], None]) -> None:
+def replace_file(path: str, state: FileState, content: Iterable[Piece], check: Callable[[str], None]) -> None:
     """Replace the file, which must still be in ``state``, in one step. Raises DocumentError.
 
     check
@@ -70,12 +81,12 @@ def replace_file(path: str, state: FileState, content: bytes, check: Callable[[s
         raise DocumentError(path, f"it cannot be written: {error.strerror or error}") from error
 
 
-def _write(path: str, state: FileState, content: bytes, check: Callable[[str], None]) -> None:
+def _write(path: str, state: FileState, content: Iterable[Piece], check: Callable[[str], None]) -> None:
     folder = os.path.dirname(path)
     descriptor, temporary = tempfile.mkstemp(prefix=".silo-", suffix=".tmp", dir=folder)
     try:
         with os.fdopen(descriptor, "wb") as file:
-            file.write(content)
+            _put(path, content, file)
             file.flush()
             _keep_rights(path, file.fileno())
             os.fsync(file.fileno())
@@ -90,15 +101,35 @@ def _write(path: str, state: FileState, content: bytes, check: Callable[[str], N
     sync_folder(folder)
 
 
+def _put(path: str, content: Iterable[Piece], file: BinaryIO) -> None:
+    with open(path, "rb") as old:
+        for piece in content:
+            if isinstance(piece, bytes):
+                file.write(piece)
+                continue
+            old.seek(piece.offset)
+            left = piece.length
+            while left:
+                block = old.read(min(left, _BLOCK))
+                if not block:
+                    raise changed(path)
+                file.write(block)
+                left -= len(block)
+
+
 def _keep_rights(path: str, descriptor: int) -> None:
     status = os.stat(path)
     if hasattr(os, "fchown"):
         with contextlib.suppress(OSError):  # only an administrator may give files away
             os.fchown(descriptor, status.st_uid, status.st_gid)
     if hasattr(os, "fchmod"):
-        os.fchmod(descriptor, stat.S_IMODE(status.st_mode))
+        with contextlib.suppress(OSError):  # FAT and some shares have no rights to keep
+            os.fchmod(descriptor, stat.S_IMODE(status.st_mode))
     if hasattr(os, "listxattr"):
-        for name in os.listxattr(path):
+        names: list[str] = []
+        with contextlib.suppress(OSError):  # FUSE and CIFS may have no extended attributes
+            names = os.listxattr(path)
+        for name in names:
             with contextlib.suppress(OSError):  # some belong to the system
                 os.setxattr(descriptor, name, os.getxattr(path, name))
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import zlib
+from typing import NamedTuple
 
 from silo.fcstd.container import CENTRAL, END, LOCAL, ContainerFile, Directory, Entry
 from silo.fcstd.problem import FcstdError
@@ -13,8 +14,18 @@ _DEFLATED = 8
 _LARGEST = 0xFFFFFFFF
 
 
-def replaced_entry(container: ContainerFile, entry: Entry, content: bytes) -> bytes:
-    """The bytes of the container with ``content`` in ``entry``.
+class Span(NamedTuple):
+    """Bytes of the old container that stay as they are: taken from there when the new one is written."""
+
+    offset: int
+    length: int
+
+
+Piece = bytes | Span
+
+
+def replaced_entry(container: ContainerFile, entry: Entry, content: bytes) -> tuple[Piece, ...]:
+    """The container with ``content`` in ``entry``, in pieces: a big file is never held in memory.
 
     Raises FcstdError where entries overlap, or the result were too large for a plain zip.
     """
@@ -26,14 +37,13 @@ def replaced_entry(container: ContainerFile, entry: Entry, content: bytes) -> by
         raise FcstdError(container.path, "it is damaged: its entries overlap")
     local, packed = _local(container, entry, content)
     growth = len(local) - (end - begin)
-    before = container.read(0, begin)
-    after = container.read(end, container.directory.offset - end)
+    before, after = Span(0, begin), Span(end, container.directory.offset - end)
     directory = _directory(container.directory, entries, entry, content, packed, growth)
     tail = _end(container.directory, growth)
-    whole = b"".join((before, local, after, directory, tail))
-    if len(whole) > _LARGEST:
+    size = before.length + len(local) + after.length + len(directory) + len(tail)
+    if size > _LARGEST:
         raise FcstdError(container.path, "it is too large for a plain zip container")
-    return whole
+    return before, local, after, directory, tail
 
 
 def _entries(container: ContainerFile) -> list[Entry]:
