@@ -5,15 +5,23 @@ Qt."""
 from __future__ import annotations
 
 import queue
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import pytest
+
+from silo.bom.errors import SiloError
+from silo.bom.model import BomEntry, Extraction
 from silo.outbox.send import Sent
+from silo.registration import Registration
 from silo.testing import FakeSilo
 from silo.workbench.commit.plan import Plan, Row
 from silo.workbench.commit.snapshot import Snapshot
+from silo.workbench.preview.rows import Preview
+from silo.workbench.register.registering import Candidate, Offer, Order, Seen, State
 from silo.workbench.session.session import Listener, Session
 from silo.workbench.settings.preferences import DEFAULTS, Preferences
 from silo.workbench.settings.server import Known
@@ -76,6 +84,7 @@ class Document:
     identity: str = ""
     changed: bool = True
     closed: bool = False
+    parts: dict[Document, int] = field(default_factory=dict)
     OutList: list[Document] = field(default_factory=list)
 
     @property
@@ -115,6 +124,69 @@ class Documents:
 
 
 @dataclass
+class PreviewWindow:
+    """What the flow did with it."""
+
+    title: str
+    wishes: Any
+    filled: list[Preview] = field(default_factory=list)
+    failed: list[SiloError] = field(default_factory=list)
+    raised: int = 0
+
+    def busy(self) -> None:
+        return
+
+    def fill(self, preview: Preview) -> None:
+        self.filled.append(preview)
+
+    def fail(self, error: SiloError) -> None:
+        self.failed.append(error)
+
+    def show(self) -> None:
+        return
+
+    def raise_(self) -> None:
+        self.raised += 1
+
+
+@dataclass
+class RegisterWindow:
+    """What the flow did with it."""
+
+    title: str
+    wishes: Any
+    offers: list[Offer] = field(default_factory=list)
+    results: list[Registration] = field(default_factory=list)
+    numbers: dict[str, str] = field(default_factory=dict)
+    told: list[str] = field(default_factory=list)
+    stops: int = 0
+
+    def fill(self, offer: Offer) -> None:
+        self.offers.append(offer)
+
+    def fail(self, error: SiloError) -> None:
+        self.told.append(str(error))
+
+    def set_number(self, category: str, number: str) -> None:
+        self.numbers[category] = number
+
+    def registered(self, _order: Order, result: Registration) -> None:
+        self.results.append(result)
+
+    def stopped(self) -> None:
+        self.stops += 1
+
+    def tell(self, text: str) -> None:
+        self.told.append(text)
+
+    def show(self) -> None:
+        return
+
+    def raise_(self) -> None:
+        return
+
+
+@dataclass
 class Desk:
     """A person who says yes, and turns that the test lets pass."""
 
@@ -123,12 +195,41 @@ class Desk:
     warned: list[str] = field(default_factory=list)
     asked: list[str] = field(default_factory=list)
     willing: bool = True
+    open: list[Document] = field(default_factory=list)
+    previews: list[PreviewWindow] = field(default_factory=list)
+    registers: list[RegisterWindow] = field(default_factory=list)
 
     def snapshot(self, doc: Any) -> Snapshot:
-        return Snapshot(doc.FileName, doc.Label, doc.identity or None)
+        extraction = None
+        if doc.parts:
+            head = BomEntry(doc.FileName, silo_uuid=doc.identity or None, label=doc.Label, is_assembly=True)
+            entries = (
+                BomEntry(part.FileName, silo_uuid=part.identity or None, quantity=count, label=part.Label)
+                for part, count in doc.parts.items()
+            )
+            extraction = Extraction(head, tuple(entries))
+        return Snapshot(doc.FileName, doc.Label, doc.identity or None, extraction)
 
-    def find(self, _path: str) -> None:
-        return None
+    def find(self, path: str) -> Document | None:
+        return next((doc for doc in self.open if doc.FileName == path), None)
+
+    def preview_window(self, title: str, wishes: Any) -> PreviewWindow:
+        self.previews.append(PreviewWindow(title, wishes))
+        return self.previews[-1]
+
+    def register_window(self, title: str, wishes: Any, *, asks: bool) -> RegisterWindow:
+        self.registers.append(RegisterWindow(title, wishes))
+        return self.registers[-1]
+
+    def look_at(self, paths: Iterable[str]) -> dict[str, Seen]:
+        return {path: Seen(State.READY) for path in paths}
+
+    def write_identity(self, candidate: Candidate, identity: str) -> None:
+        assert threading.current_thread() is threading.main_thread()
+        doc = self.find(candidate.entry.doc_path)
+        assert doc is not None
+        doc.identity = identity
+        self.documents.save(doc)
 
     def save_as(self, _doc: Any) -> None:
         return
@@ -181,7 +282,9 @@ class Office:
         path = self.folder / "vault" / f"{name}.FCStd"
         path.parent.mkdir(exist_ok=True)
         identity = self.silo.create_item("kindred-rd", "M01", name).id if registered else ""
-        return Document(name, str(path), content, identity)
+        made = Document(name, str(path), content, identity)
+        self.desk.open.append(made)
+        return made
 
     def files(self, name: str) -> list[bytes]:
         """Contents of the item's revisions, oldest first."""
@@ -198,3 +301,14 @@ class Office:
             self.session._rows.left(0.01)
             self.session._disk.left(0.01)
             self.session._net.left(0.01)
+
+
+@pytest.fixture
+def office(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Office]:
+    """With no server in the environment, and closed at the end."""
+    for name in ("SILO_API_URL", "SILO_API_TOKEN"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    made = Office(tmp_path)
+    yield made
+    made.session.close()

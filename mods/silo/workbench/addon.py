@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from silo.outbox.send import Sent
     from silo.workbench.commit.flow import CommitFlow
     from silo.workbench.freecad.hooks import CommitHook
+    from silo.workbench.freecad.live_desk import LiveDesk
     from silo.workbench.pane.activity import Action
     from silo.workbench.preview.flow import PreviewFlow
     from silo.workbench.register.flow import RegisterFlow
@@ -40,6 +41,7 @@ class AddOn:
         self.dock = ActivityDock(host.main_window(), self.act)
         self.relay = qt.Relay(self._bug)
         self._session: Session | None = None
+        self._desk: LiveDesk | None = None
         self._commits: CommitFlow | None = None
         self._previews: PreviewFlow | None = None
         self._registrations: RegisterFlow | None = None
@@ -101,15 +103,21 @@ class AddOn:
         return self._session
 
     @property
+    def desk(self) -> LiveDesk:
+        """FreeCAD as the flows see it; made when first needed."""
+        if self._desk is None:
+            from silo.workbench.freecad.live_desk import LiveDesk
+
+            self._desk = LiveDesk(lambda: self.preferences.flag("CountHardware"))
+        return self._desk
+
+    @property
     def commits(self) -> CommitFlow:
         """The commit flow; made when first needed."""
         if self._commits is None:
             from silo.workbench.commit.flow import CommitFlow
-            from silo.workbench.freecad.live_desk import LiveDesk
 
-            self._commits = CommitFlow(
-                self.session, self.preferences, LiveDesk(lambda: self.preferences.flag("CountHardware"))
-            )
+            self._commits = CommitFlow(self.session, self.preferences, self.desk)
         return self._commits
 
     @property
@@ -121,6 +129,7 @@ class AddOn:
             self._previews = PreviewFlow(
                 self.session,
                 self.commits,
+                self.desk,
                 register=self.register_path,
                 show=self.show_objects,
                 view=self.open_page,
@@ -133,7 +142,7 @@ class AddOn:
         if self._registrations is None:
             from silo.workbench.register.flow import RegisterFlow
 
-            self._registrations = RegisterFlow(self.session, self.preferences, self.commits)
+            self._registrations = RegisterFlow(self.session, self.preferences, self.commits, self.desk)
         return self._registrations
 
     def settings_changed(self) -> None:

@@ -3,24 +3,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from pathlib import Path
-
 import pytest
 from desk import Office
 
 from silo.workbench.commit.flow import CommitFlow
 from silo.workbench.pane.activity import Do
-
-
-@pytest.fixture(name="office")
-def _office(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Office]:
-    for name in ("SILO_API_URL", "SILO_API_TOKEN"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
-    made = Office(tmp_path)
-    yield made
-    made.session.close()
 
 
 @pytest.fixture(name="flow")

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,16 +13,6 @@ from desk import Office
 from silo.bom.errors import SiloError, UnreachableError
 from silo.outbox.entry import Commit, State
 from silo.outbox.store import Store
-
-
-@pytest.fixture(name="office")
-def _office(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Office]:
-    for name in ("SILO_API_URL", "SILO_API_TOKEN"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
-    made = Office(tmp_path)
-    yield made
-    made.session.close()
 
 
 def commit(office: Office, name: str, content: bytes = b"content", *, hold: bool = True) -> Commit:

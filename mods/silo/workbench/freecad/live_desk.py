@@ -11,8 +11,10 @@ from typing import Any
 from silo.workbench.commit import snapshot
 from silo.workbench.commit.plan import Plan, Row
 from silo.workbench.commit.snapshot import Snapshot
-from silo.workbench.freecad import host, live, saving
+from silo.workbench.freecad import components, host, live, saving
 from silo.workbench.gui import qt
+from silo.workbench.preview import window as preview
+from silo.workbench.register import window as register
 
 
 class LiveDocuments:
@@ -43,6 +45,8 @@ class LiveDesk:
         return snapshot.take(cached, assembly=hint, walk=walk)
 
     find = staticmethod(host.find_document)
+    look_at = staticmethod(components.look_at)
+    write_identity = staticmethod(components.write_identity)
 
     def save_as(self, _doc: Any) -> None:
         """FreeCAD's own dialog, for the active document."""
@@ -54,6 +58,22 @@ class LiveDesk:
 
         dialog = CommitDialog(planned, host.main_window(), note=note)
         return (dialog.chosen(), dialog.text()) if qt.run_dialog(dialog) else None
+
+    def preview_window(self, title: str, wishes: preview.Wishes) -> preview.Window:
+        """The preview window."""
+        from silo.workbench.preview.dialog import PreviewDialog
+
+        window: preview.Window = PreviewDialog(title, wishes, host.main_window())
+        window.show()
+        return window
+
+    def register_window(self, title: str, wishes: register.Wishes, *, asks: bool) -> register.Window:
+        """The Register Parts dialog."""
+        from silo.workbench.register.dialog import RegisterDialog
+
+        window: register.Window = RegisterDialog(title, wishes, host.main_window(), asks=asks)
+        window.show()
+        return window
 
     def warn(self, title: str, text: str) -> None:
         """A message box."""

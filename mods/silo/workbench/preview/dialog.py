@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from typing import Any
 
 from silo.bom.errors import SiloError
@@ -12,6 +11,7 @@ from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QtCore, QtGui, QtWidgets
 from silo.workbench.pane.activity import Tone
 from silo.workbench.preview.rows import MOST_ROWS, Kind, Preview, Row, rows, summary
+from silo.workbench.preview.window import Wishes
 from silo.workbench.words import counted, plain, tip, translate
 
 # Of the sentences below the table, only the first are broken into lines.
@@ -40,29 +40,13 @@ _SIGNS = {
 _WIDE = (Kind.GROUP, Kind.NOT_COUNTED)
 
 
-@dataclass(frozen=True)
-class Wishes:
-    """What the window asks for; all in the GUI thread.
-
-    sync
-        (preview, sub-assemblies too, although links are broken).
-    show
-        select instances: (document, objects).
-    """
-
-    refresh: Callable[[], None]
-    sync: Callable[[Preview, bool, bool], None]
-    register: Callable[[Preview], None]
-    show: Callable[[str, tuple[str, ...]], None]
-    view: Callable[[Preview], None]
-
-
 class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
     """Not modal: one looks at the model while one reads it."""
 
     def __init__(self, title: str, wishes: Wishes, parent: Any) -> None:
         super().__init__(parent)
         self._wishes = wishes
+        self.finished.connect(lambda _result: wishes.closed())
         self._preview: Preview | None = None
         self.setObjectName("SiloPreview")
         self.setWindowTitle(translate("Silo", "BOM in Silo: {name}").replace("{name}", plain(title, 80)))

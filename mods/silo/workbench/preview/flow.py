@@ -4,20 +4,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from silo.bom.errors import SiloError
 from silo.outbox.entry import new_key
 from silo.workbench.commit.flow import CommitFlow, commit_of
 from silo.workbench.commit.snapshot import Snapshot
-from silo.workbench.freecad import host
-from silo.workbench.gui import widgets
+from silo.workbench.preview.rows import Preview, ask, to_sync
+from silo.workbench.preview.window import PreviewDesk, Window, Wishes
 from silo.workbench.session.session import Session
 from silo.workbench.words import translate
-
-if TYPE_CHECKING:
-    from silo.workbench.preview.dialog import PreviewDialog
-    from silo.workbench.preview.rows import Preview
 
 
 class PreviewFlow:
@@ -31,14 +27,15 @@ class PreviewFlow:
         self,
         session: Session,
         commits: CommitFlow,
+        desk: PreviewDesk,
         *,
         register: Callable[[str], None],
         show: Callable[[str, tuple[str, ...]], None],
         view: Callable[[str], None],
     ) -> None:
-        self._session, self._commits = session, commits
+        self._session, self._commits, self._desk = session, commits, desk
         self._register, self._show, self._view = register, show, view
-        self._open: dict[str, PreviewDialog] = {}
+        self._open: dict[str, Window] = {}
 
     def start(self, doc: Any) -> None:
         """Compare a document's assembly with the server."""
@@ -47,16 +44,14 @@ class PreviewFlow:
             return
         if not taken.is_assembly:
             text = taken.problem or translate("Silo", "{name} holds no assembly, so it has no BOM.")
-            widgets.warn(
-                host.main_window(), translate("Silo", "BOM in Silo"), text.replace("{name}", taken.label)
-            )
+            self._desk.warn(translate("Silo", "BOM in Silo"), text.replace("{name}", taken.label))
             return
         self._dialog(taken, doc.Name)
         self._ask(taken)
 
     def again(self, path: str) -> None:
         """Compare anew where a window is open: what it shows has changed."""
-        doc = host.find_document(path)
+        doc = self._desk.find(path)
         if path in self._open and doc is not None and (taken := self._take(doc)) is not None:
             self._ask(taken)
 
@@ -64,51 +59,39 @@ class PreviewFlow:
         try:
             return self._commits.snapshot(doc)
         except SiloError as error:
-            widgets.warn(host.main_window(), translate("Silo", "BOM in Silo"), str(error))
+            self._desk.warn(translate("Silo", "BOM in Silo"), str(error))
             return None
 
-    def _dialog(self, taken: Snapshot, name: str) -> PreviewDialog:
-        from silo.workbench.preview.dialog import PreviewDialog, Wishes
-
+    def _dialog(self, taken: Snapshot, name: str) -> None:
         if taken.path in self._open:
             self._open[taken.path].raise_()
-            return self._open[taken.path]
+            return
         wishes = Wishes(
             refresh=lambda: self.again(taken.path),
             sync=self._sync,
             register=lambda preview: self._register(preview.snapshot.path),
             show=self._show,
             view=lambda preview: self._view(preview.page),
+            closed=lambda: self._open.pop(taken.path, None),
         )
-        dialog = PreviewDialog(taken.label or name, wishes, host.main_window())
-        self._open[taken.path] = dialog
-        dialog.finished.connect(lambda _result: self._open.pop(taken.path, None))
-        dialog.show()
-        return dialog
+        self._open[taken.path] = self._desk.preview_window(taken.label or name, wishes)
 
     def _ask(self, taken: Snapshot) -> None:
         self._open[taken.path].busy()
 
-        def question(client: Any, control: Any) -> Preview:
-            from silo.workbench.preview.rows import ask
-
-            return ask(taken, client, control)
-
         self._session.ask(
             translate("Silo", "Comparing with Silo"),
-            question,
+            lambda client, control: ask(taken, client, control),
             done=lambda preview: self._with_dialog(taken.path, lambda dialog: dialog.fill(preview)),
             failed=lambda error: self._with_dialog(taken.path, lambda dialog: dialog.fail(error)),
         )
 
-    def _with_dialog(self, path: str, call: Callable[[PreviewDialog], None]) -> None:
+    def _with_dialog(self, path: str, call: Callable[[Window], None]) -> None:
         # The window may have been closed while the server was thinking.
         if path in self._open:
             call(self._open[path])
 
     def _sync(self, preview: Preview, below: bool, allow_missing: bool) -> None:
-        from silo.workbench.preview.rows import to_sync
-
         def failed(error: SiloError) -> None:
             self._with_dialog(preview.snapshot.path, lambda dialog: dialog.fail(error))
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,28 +23,13 @@ from silo.workbench.register.rows import (
     retype,
     type_words,
 )
+from silo.workbench.register.window import Wishes
 from silo.workbench.words import counted, plain, tip, translate
 
 # Rows have buttons, and nobody decides on a thousand parts at once; the next ones come after these.
 MOST_ROWS = 400
 
 COMPONENT, NAME, TYPE, CATEGORY, NUMBER, NOTE, BUTTON = range(7)
-
-
-@dataclass(frozen=True)
-class Wishes:
-    """What the dialog asks for; all in the GUI thread.
-
-    same
-        the person says that these copied identities are one part.
-    number
-        tell the next number of this category.
-    """
-
-    register: Callable[[Sequence[Order]], None]
-    same: Callable[[Sequence[EditedRow]], None]
-    number: Callable[[str], None]
-    ask_again: Callable[[bool], None]
 
 
 @dataclass(frozen=True)
@@ -67,6 +52,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
     def __init__(self, title: str, wishes: Wishes, parent: Any, *, asks: bool) -> None:
         super().__init__(parent)
         self._wishes = wishes
+        self.finished.connect(lambda _result: wishes.closed())
         self._rows: list[EditedRow] = []
         self._offer = Offer((), {})
         self._types = type_words()

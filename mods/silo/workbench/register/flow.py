@@ -1,30 +1,33 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""From the command to the Register Components dialog, and from its buttons to documents and server."""
+"""From the command to the Register Parts dialog, and from its buttons to documents and server. GUI thread.
+
+::
+
+    start ── a worker looks ──▶ the dialog is filled ──▶ a person orders ──▶ a worker registers, one by one
+                                       ▲                                          │ identities: GUI thread
+                                       ╰─────────────── next numbers ◀── commits ◀┘
+
+FreeCAD and Qt come in through the :class:`~silo.workbench.register.window.RegisterDesk` only.
+"""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import Any
 
-from silo.bom.errors import DocumentError, SiloError
+from silo.bom.errors import SiloError
 from silo.bom.identity import walk_entries
 from silo.bom.model import BomEntry, Extraction
 from silo.registration import Journal, Registration
 from silo.workbench.commit.flow import CommitFlow
 from silo.workbench.commit.snapshot import Snapshot
-from silo.workbench.freecad import host, live, saving
-from silo.workbench.freecad.open_in_others import OpenInOthers
-from silo.workbench.gui import widgets
-from silo.workbench.register.registering import Candidate, Order, Seen, State, carry_out, next_number, offer
+from silo.workbench.register.registering import Candidate, Order, carry_out, next_number, offer
+from silo.workbench.register.rows import EditedRow
+from silo.workbench.register.window import RegisterDesk, Window, Wishes
 from silo.workbench.session.session import Session
 from silo.workbench.settings.preferences import Preferences
 from silo.workbench.words import translate
-
-if TYPE_CHECKING:
-    from silo.workbench.register.dialog import RegisterDialog
-    from silo.workbench.register.rows import EditedRow
 
 
 class RegisterFlow:
@@ -39,24 +42,28 @@ class RegisterFlow:
         session: Session,
         preferences: Preferences,
         commits: CommitFlow,
+        desk: RegisterDesk,
         *,
+        journal: Journal | None = None,
         changed: Callable[[str], None] = lambda _path: None,
     ) -> None:
         self._session, self._preferences, self._commits = session, preferences, commits
-        self._changed = changed
-        self._journal = Journal()
-        self._open: dict[str, RegisterDialog] = {}
+        self._desk, self._changed = desk, changed
+        self._journal = journal or Journal()
+        self._open: dict[str, Window] = {}
 
     def start(self, doc: Any) -> None:
         """Show the components of a document that have no number."""
         try:
             taken = self._commits.snapshot(doc)
         except SiloError as error:
-            widgets.warn(host.main_window(), translate("Silo", "Register Components"), str(error))
+            self._desk.warn(translate("Silo", "Register Components"), str(error))
             return
         self._dialog(taken)
         extraction = whole(taken)
-        seen = look_at(entry.doc_path for entry in walk_entries((extraction.assembly, *extraction.entries)))
+        seen = self._desk.look_at(
+            entry.doc_path for entry in walk_entries((extraction.assembly, *extraction.entries))
+        )
         schema = self._preferences.text("Schema")
         self._session.ask(
             translate("Silo", "Looking for components without a part number"),
@@ -66,8 +73,6 @@ class RegisterFlow:
         )
 
     def _dialog(self, taken: Snapshot) -> None:
-        from silo.workbench.register.dialog import RegisterDialog, Wishes
-
         if taken.path in self._open:
             self._open[taken.path].raise_()
             return
@@ -76,15 +81,12 @@ class RegisterFlow:
             same=self._same,
             number=lambda category: self._number(taken.path, category),
             ask_again=lambda on: self._preferences.set("AskRegister", on),
+            closed=lambda: self._open.pop(taken.path, None),
         )
-        dialog = RegisterDialog(
-            taken.label, wishes, host.main_window(), asks=self._preferences.flag("AskRegister")
-        )
-        self._open[taken.path] = dialog
-        dialog.finished.connect(lambda _result: self._open.pop(taken.path, None))
-        dialog.show()
+        asks = self._preferences.flag("AskRegister")
+        self._open[taken.path] = self._desk.register_window(taken.label, wishes, asks=asks)
 
-    def _with_dialog(self, path: str, call: Callable[[RegisterDialog], None]) -> None:
+    def _with_dialog(self, path: str, call: Callable[[Window], None]) -> None:
         if path in self._open:
             call(self._open[path])
 
@@ -123,7 +125,9 @@ class RegisterFlow:
                 orders,
                 client,
                 self._journal,
-                lambda candidate, identity: self._session.in_gui(lambda: write(candidate, identity), control),
+                lambda candidate, identity: self._session.in_gui(
+                    lambda: self._desk.write_identity(candidate, identity), control
+                ),
                 schema=client.find_schema(schema),
                 control=control,
                 done=tell,
@@ -153,10 +157,10 @@ class RegisterFlow:
         comment = translate("Silo", "Registered")
         # A file that gives several parts is no single item's.
         for part in dict.fromkeys(c.entry.doc_path for c in registered if not c.shares_file):
-            doc = host.find_document(part)
+            doc = self._desk.find(part)
             if doc is not None and part != path:
                 self._commits.send(doc, comment)
-        top = host.find_document(path)
+        top = self._desk.find(path)
         if top is None:
             return
         if any(candidate.entry.doc_path == path for candidate in registered):
@@ -174,45 +178,3 @@ def whole(taken: Snapshot) -> Extraction:
     return Extraction(
         BomEntry(taken.path, silo_uuid=taken.identity, label=label, document_label=label, level=0)
     )
-
-
-def look_at(paths: Iterable[str]) -> dict[str, Seen]:
-    """How the files of components stand. GUI thread; what needs the disk's content is left to the worker."""
-    known = host.documents_by_path()
-    own = next((str(doc.TransientDir) for doc in known.values()), "")
-    elsewhere = OpenInOthers(own)
-    seen = {}
-    for path in dict.fromkeys(paths):
-        seen[path] = _look_at(path, known)
-        spelt = known[path].FileName if path in known else ""
-        if seen[path].state.usable and elsewhere.has(path, spelt):
-            seen[path] = replace(seen[path], state=State.ELSEWHERE)
-    return seen
-
-
-def _look_at(path: str, known: Mapping[str, Any]) -> Seen:
-    if not path:
-        return Seen(State.UNNAMED)
-    if not os.path.isfile(path):
-        return Seen(State.MISSING)
-    if not saving.is_writable(path):
-        return Seen(State.READ_ONLY)
-    doc = known.get(path)
-    if doc is None:
-        return Seen(State.READY)
-    if live.lost_assemblies(doc):
-        return Seen(State.LOST)
-    saved_at = str(getattr(doc, "LastModifiedDate", "") or "")
-    if not saving.is_modified(doc):
-        return Seen(State.READY, saved_at)
-    return Seen(State.PARTIAL if host.is_partial(doc) else State.EDITED, saved_at)
-
-
-def write(candidate: Candidate, identity: str) -> None:
-    """Write an identity into a component's document and save it. GUI thread."""
-    entry = candidate.entry
-    doc = saving.open_fully(entry.doc_path)
-    if live.lost_assemblies(doc):
-        raise DocumentError(entry.doc_path, "made by a newer FreeCAD; saving it here would destroy it")
-    saving.write_identity(doc, entry.object_name, identity, whole_document=not candidate.shares_file)
-    saving.save(doc)

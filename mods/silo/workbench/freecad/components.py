@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""How the files of components stand, and identities in them. GUI thread."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import Any
+
+from silo.bom.errors import DocumentError
+from silo.workbench.freecad import host, live, saving
+from silo.workbench.freecad.open_in_others import OpenInOthers
+from silo.workbench.register.registering import Candidate, Seen, State
+
+
+def look_at(paths: Iterable[str]) -> dict[str, Seen]:
+    """How the files of components stand. GUI thread; what needs the disk's content is left to the worker."""
+    known = host.documents_by_path()
+    own = next((str(doc.TransientDir) for doc in known.values()), "")
+    elsewhere = OpenInOthers(own)
+    seen = {}
+    for path in dict.fromkeys(paths):
+        seen[path] = _look_at(path, known)
+        spelt = known[path].FileName if path in known else ""
+        if seen[path].state.usable and elsewhere.has(path, spelt):
+            seen[path] = replace(seen[path], state=State.ELSEWHERE)
+    return seen
+
+
+def _look_at(path: str, known: Mapping[str, Any]) -> Seen:
+    if not path:
+        return Seen(State.UNNAMED)
+    if not os.path.isfile(path):
+        return Seen(State.MISSING)
+    if not saving.is_writable(path):
+        return Seen(State.READ_ONLY)
+    doc = known.get(path)
+    if doc is None:
+        return Seen(State.READY)
+    if live.lost_assemblies(doc):
+        return Seen(State.LOST)
+    saved_at = str(getattr(doc, "LastModifiedDate", "") or "")
+    if not saving.is_modified(doc):
+        return Seen(State.READY, saved_at)
+    return Seen(State.PARTIAL if host.is_partial(doc) else State.EDITED, saved_at)
+
+
+def write_identity(candidate: Candidate, identity: str) -> None:
+    """Write an identity into a component's document and save it. GUI thread."""
+    entry = candidate.entry
+    doc = saving.open_fully(entry.doc_path)
+    if live.lost_assemblies(doc):
+        raise DocumentError(entry.doc_path, "made by a newer FreeCAD; saving it here would destroy it")
+    saving.write_identity(doc, entry.object_name, identity, whole_document=not candidate.shares_file)
+    saving.save(doc)

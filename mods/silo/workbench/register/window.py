@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The Register Parts dialog as its flow sees it; :mod:`silo.workbench.register.dialog` is the real one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from silo.bom.errors import SiloError
+from silo.registration import Registration
+from silo.workbench.commit.desk import Desk
+from silo.workbench.register.registering import Candidate, Offer, Order, Seen
+from silo.workbench.register.rows import EditedRow
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What the dialog asks for; all in the GUI thread.
+
+    same
+        the person says that these copied identities are one part.
+    number
+        tell the next number of this category.
+    closed
+        the dialog is gone.
+    """
+
+    register: Callable[[Sequence[Order]], None]
+    same: Callable[[Sequence[EditedRow]], None]
+    number: Callable[[str], None]
+    ask_again: Callable[[bool], None]
+    closed: Callable[[], object]
+
+
+class Window(Protocol):
+    """An open dialog."""
+
+    def fill(self, offer: Offer, /) -> None: ...
+
+    def fail(self, error: SiloError, /) -> None: ...
+
+    def set_number(self, category: str, number: str, /) -> None: ...
+
+    def registered(self, order: Order, result: Registration, /) -> None: ...
+
+    def stopped(self) -> None: ...
+
+    def tell(self, text: str, /) -> None: ...
+
+    def show(self) -> None: ...
+
+    def raise_(self) -> None: ...
+
+
+class RegisterDesk(Desk, Protocol):
+    """A desk that can open the dialog, look at components' files, and write identities into them."""
+
+    def register_window(self, title: str, wishes: Wishes, /, *, asks: bool) -> Window: ...
+
+    def look_at(self, paths: Iterable[str], /) -> dict[str, Seen]: ...
+
+    def write_identity(self, candidate: Candidate, identity: str, /) -> None: ...

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Registering from the command to the server, without FreeCAD and Qt."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from desk import Document, Office
+
+from silo.bom.errors import ReadOnlyError, SiloError
+from silo.registration import Journal
+from silo.workbench.commit.flow import CommitFlow
+from silo.workbench.register.flow import RegisterFlow
+from silo.workbench.register.registering import Order
+
+
+@pytest.fixture(name="flow")
+def _flow(office: Office) -> RegisterFlow:
+    commits = CommitFlow(office.session, office.preferences, office.desk, path=office.folder / "same.json")
+    journal = Journal(office.folder / "journal")
+    return RegisterFlow(office.session, office.preferences, commits, office.desk, journal=journal)
+
+
+@pytest.fixture(name="top")
+def _top(office: Office) -> Document:
+    """An assembly with a number, of two parts without."""
+    top = office.document("Top")
+    for name in ("Shaft", "Plate"):
+        doc = office.document(name, name.encode(), registered=False)
+        office.desk.documents.save(doc)
+        top.parts[doc] = 2
+    office.desk.documents.save(top)
+    return top
+
+
+def orders(office: Office) -> list[Order]:
+    offer = office.desk.registers[0].offers[-1]
+    return [Order(c, c.proposal.name, "part", "M01") for c in offer.candidates]
+
+
+def test_from_the_offer_to_the_bom(office: Office, flow: RegisterFlow, top: Document) -> None:
+    """Items, identities in the files, the files in Silo, and the assembly's BOM."""
+    flow.start(top)
+    office.settle()
+    (window,) = office.desk.registers
+    assert sorted(c.proposal.name for c in window.offers[0].candidates) == ["Plate", "Shaft"]
+    window.wishes.register(orders(office))
+    office.settle()
+    assert [result.error for result in window.results] == [None, None]
+    assert window.stops == 1
+    assert office.files("Plate") == [b"Plate"]
+    assert {line.child_name: line.quantity for line in office.silo.get_bom("M01-0001")} == {
+        "Plate": 2,
+        "Shaft": 2,
+    }
+    assert all(doc.identity for doc in top.parts)
+    assert "M01" in window.numbers
+
+
+def test_a_server_that_refuses_leaves_the_files_alone(
+    office: Office, flow: RegisterFlow, top: Document
+) -> None:
+    """And the dialog shows why, row by row."""
+    flow.start(top)
+    office.settle()
+
+    def refuse(name: str) -> None:
+        if name == "create_item":
+            raise ReadOnlyError("maintenance")
+
+    office.silo.before = refuse
+    office.desk.registers[0].wishes.register(orders(office))
+    office.settle()
+    assert {type(result.error) for result in office.desk.registers[0].results} == {ReadOnlyError}
+    assert [doc.identity for doc in top.parts] == ["", ""]
+    assert [Path(doc.FileName).read_bytes() for doc in top.parts] == [b"Shaft", b"Plate"]
+
+
+def test_a_dialog_that_was_closed_meanwhile_is_not_drawn(
+    office: Office, flow: RegisterFlow, top: Document
+) -> None:
+    """What it had asked for is done all the same."""
+    flow.start(top)
+    office.settle()
+    (window,) = office.desk.registers
+    window.wishes.register(orders(office))
+    window.wishes.closed()
+    office.settle()
+    assert (window.results, window.stops) == ([], 0)
+    assert all(doc.identity for doc in top.parts)
+
+
+def test_what_cannot_be_read_is_said(office: Office, flow: RegisterFlow, top: Document) -> None:
+    """No dialog comes up."""
+
+    def fail(_doc: object) -> None:
+        raise SiloError("several assemblies")
+
+    office.desk.snapshot = fail  # type: ignore[method-assign, assignment]
+    flow.start(top)
+    assert (office.desk.warned, office.desk.registers) == (["several assemblies"], [])
