@@ -74,7 +74,7 @@ def prepare(freecad: Window, client: SiloClient) -> None:
         for proposal in proposals_for(extraction, client, "kindred-rd")
         if Path(proposal.entry.doc_path).stem not in LATER
     ]
-    for done in register_all(early, extraction, client, schema="kindred-rd"):
+    for done in register_all(early, client, schema="kindred-rd"):
         if done.error is not None:
             raise done.error
     story.upload()

@@ -98,6 +98,12 @@ class Resolved:
     last_syncs: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
 
     @property
+    def unregistered(self) -> tuple[BomEntry, ...]:
+        """The components without an item, parts first, the assembly itself last."""
+        head = () if self.assembly.part_number else (self.assembly,)
+        return tuple(sorted((*self.unresolved, *head), key=lambda entry: (entry.is_assembly, -entry.level)))
+
+    @property
     def folder(self) -> str:
         """Where the assembly's file lies; a merge names components relative to it."""
         return os.path.dirname(self.assembly.doc_path)

@@ -57,10 +57,15 @@ def check_writable(*paths: str | None) -> None:
             raise InputError(f"{path} cannot be written: it is a folder, or may not be changed")
 
 
+def content_hash(path: Path | str) -> str:
+    """The SHA-256 of a file's content, in hexadecimal. Raises OSError."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
 def sha256_of(path: str) -> str:
-    """The hash of a file's content, in hexadecimal."""
+    """The hash of a document that must be readable; DocumentError where it is not."""
     try:
-        with open(path, "rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
+        return content_hash(path)
     except OSError as error:
         raise DocumentError(path, error.strerror or str(error)) from error

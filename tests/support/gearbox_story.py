@@ -46,7 +46,7 @@ class GearboxStory:
         """Give every component its part number."""
         extraction = read_assembly(str(self.top))
         proposals = proposals_for(extraction, self.client, "kindred-rd")
-        for done in register_all(proposals, extraction, self.client, schema="kindred-rd"):
+        for done in register_all(proposals, self.client, schema="kindred-rd"):
             if done.error is not None:
                 raise done.error
 

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from silo.api.wire import MergeDiff, MergeEvent, MergeResult, MergeWarning
 
@@ -23,16 +25,26 @@ class ActivityText:
         return tuple(line for line in (self.headline, self.counts, link, self.unregistered) if line)
 
 
-def counts_text(diff: MergeDiff, warnings: tuple[MergeWarning, ...] = ()) -> str:
-    """``+1 added  ~1 qty changed  ⚠1 unreferenced``, leaving out what is zero."""
+class Counts(NamedTuple):
+    """What a merge counts, in the order in which it is shown."""
+
+    added: int
+    changed: int
+    unreferenced: int
+    in_conflict: int
+
+
+def counts(diff: MergeDiff, warnings: Iterable[MergeWarning] = ()) -> Counts:
+    """The counts of a merge; the pane has its own, translated words for them."""
     conflicts = sum(1 for warning in warnings if warning.type == "conflict")
-    parts = [
-        (len(diff.added), "+{} added"),
-        (len(diff.quantity_changed), "~{} qty changed"),
-        (len(diff.removed), "⚠{} unreferenced"),
-        (conflicts, "⚡{} in conflict"),
-    ]
-    return "  ".join(text.format(count) for count, text in parts if count) or "no changes"
+    return Counts(len(diff.added), len(diff.quantity_changed), len(diff.removed), conflicts)
+
+
+def counts_text(diff: MergeDiff, warnings: Iterable[MergeWarning] = ()) -> str:
+    """``+1 added  ~1 qty changed  ⚠1 unreferenced``, leaving out what is zero."""
+    words = ("+{} added", "~{} qty changed", "⚠{} unreferenced", "⚡{} in conflict")
+    parts = zip(words, counts(diff, warnings), strict=True)
+    return "  ".join(text.format(count) for text, count in parts if count) or "no changes"
 
 
 def unregistered_text(count: int) -> str:

@@ -32,12 +32,13 @@ _PART_WORDS = ("part", "machin", "custom", "manufactur", "component", "mechanic"
 
 @dataclass(frozen=True)
 class Proposal:
-    """How a component would be registered."""
+    """How a component would be registered. ``shares_file``: its file gives other components too."""
 
     entry: BomEntry
     name: str
     item_type: str
     category: str
+    shares_file: bool = False
 
 
 def clean_name(text: str) -> str:
@@ -120,4 +121,13 @@ def propose(entry: BomEntry, categories: Mapping[str, str], *, shares_file: bool
         name=name,
         item_type="assembly" if entry.is_assembly else "part",
         category=proposed_category(entry, name, categories),
+        shares_file=shares_file,
     )
+
+
+def propose_all(
+    entries: Iterable[BomEntry], tree: Iterable[BomEntry], categories: Mapping[str, str]
+) -> list[Proposal]:
+    """A proposal for each; ``tree`` is all that the assembly holds, and says which files are shared."""
+    crowded = crowded_files(tree)
+    return [propose(entry, categories, shares_file=entry.doc_path in crowded) for entry in entries]

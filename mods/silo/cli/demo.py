@@ -161,7 +161,7 @@ class Demo:
             for p in proposals_for(extraction, self.client, "kindred-rd")
             if UNREGISTERED not in Path(p.entry.doc_path).name
         ]
-        for done in register_all(proposals, extraction, self.client, schema="kindred-rd"):
+        for done in register_all(proposals, self.client, schema="kindred-rd"):
             if done.error is not None:
                 raise done.error
             self.out.print(f"✓ {done.part_number}  {done.proposal.name}", markup=False)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from silo.bom.errors import ConflictError, InputError, SiloError
 from silo.bom.model import BomEntry, Extraction
-from silo.bom.naming import Proposal, crowded_files, propose
+from silo.bom.naming import Proposal, propose_all
 from silo.bom.report import base_of, relative
 from silo.bom_sync import resolve
 from silo.cli import common
@@ -62,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
         if args.category:
             proposals = [p if p.entry.is_assembly else replace(p, category=args.category) for p in proposals]
         chosen = proposals if args.yes else _ask(proposals, base_of(extraction))
-        done = register_all(chosen, extraction, client, schema=schema, ask=_asker(args.unclear))
+        done = register_all(chosen, client, schema=schema, ask=_asker(args.unclear))
     skipped = [p for p in proposals if p not in chosen]
     _tell(args, extraction, done, skipped)
     return 1 if skipped or any(r.error for r in done) else 0
@@ -70,21 +70,13 @@ def run(args: argparse.Namespace) -> int:
 
 def proposals_for(extraction: Extraction, client: SiloClient, schema: str) -> list[Proposal]:
     """What to register: the components without an item, parts first, and the assembly itself last."""
-    resolved = resolve(extraction, client)
-    wanted = list(resolved.unresolved)
-    if resolved.assembly.part_number is None:
-        wanted.append(extraction.assembly)
-    if not wanted:
-        return []
-    categories = client.categories(schema)
-    crowded = crowded_files((extraction.assembly, *extraction.entries))
-    parts_first = sorted(wanted, key=lambda entry: (entry.is_assembly, -entry.level))
-    return [propose(entry, categories, shares_file=entry.doc_path in crowded) for entry in parts_first]
+    wanted = resolve(extraction, client).unregistered
+    tree = (extraction.assembly, *extraction.entries)
+    return propose_all(wanted, tree, client.categories(schema)) if wanted else []
 
 
 def register_all(
     proposals: Sequence[Proposal],
-    extraction: Extraction,
     client: SiloClient,
     *,
     schema: str,
@@ -94,10 +86,10 @@ def register_all(
     from silo.api.policy import ends_run
     from silo.fcstd import check_stampable, stamp
 
-    crowded = crowded_files((extraction.assembly, *extraction.entries))
+    shared = {proposal.entry.key for proposal in proposals if proposal.shares_file}
 
     def own_name(entry: BomEntry) -> str | None:
-        return entry.object_name if entry.doc_path in crowded else None
+        return entry.object_name if entry.key in shared else None
 
     def write(entry: BomEntry, identity: str) -> None:
         stamp(entry.doc_path, identity, object_name=own_name(entry))

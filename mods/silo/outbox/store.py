@@ -31,6 +31,7 @@ from silo.api.address import canonical
 from silo.bom.errors import ConflictError, DocumentError, InputError
 from silo.bom.snapshot import to_plain
 from silo.durable import replacing, sync_folder
+from silo.files import content_hash
 from silo.folders import data_folder
 from silo.outbox.entry import ASKED, SAME_PART, Commit, Entry, State
 
@@ -308,9 +309,7 @@ class Store:
         """The copy, after its hash was looked at. InputError where it is damaged, OSError where it cannot
         be read."""
         path = self.copies / entry.copy
-        with path.open("rb") as file:
-            found = hashlib.file_digest(file, "sha256").hexdigest()
-        if found != entry.sha256:
+        if content_hash(path) != entry.sha256:
             raise InputError(
                 f"{entry.file_name}: the copy kept for sending is damaged ({path}), so it was not sent. "
                 f"Commit "
@@ -336,8 +335,7 @@ class Store:
 
     def _copied(self, source: Path, copy: Path) -> tuple[str, int]:
         if source == copy:
-            with copy.open("rb") as file:
-                return hashlib.file_digest(file, "sha256").hexdigest(), os.fstat(file.fileno()).st_size
+            return content_hash(copy), copy.stat().st_size
         digest, size = hashlib.sha256(), 0
         with source.open("rb") as read, replacing(copy) as write:
             while block := read.read(_BLOCK):

@@ -58,7 +58,7 @@ def register_but(story: GearboxStory, left_out: str) -> None:
         for proposal in proposals_for(extraction, story.client, "kindred-rd")
         if Path(proposal.entry.doc_path).stem != left_out
     ]
-    for done in register_all(proposals, extraction, story.client, schema="kindred-rd"):
+    for done in register_all(proposals, story.client, schema="kindred-rd"):
         assert done.error is None
 
 

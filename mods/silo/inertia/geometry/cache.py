@@ -23,6 +23,7 @@ from typing import Any
 from silo.bom.errors import InputError
 from silo.bom.report import relative
 from silo.durable import replacing
+from silo.files import content_hash
 from silo.folders import cache_folder
 from silo.inertia.geometry import store
 from silo.inertia.geometry.labels import file_key
@@ -39,12 +40,6 @@ MAX_BYTES = 1_000_000_000
 def default_folder() -> Path:
     """Where readings are kept. Nothing is created."""
     return cache_folder() / "geometry"
-
-
-def content_hash(path: Path) -> str:
-    """SHA-256 of a file's bytes."""
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def key_of(path: Path, options: Mapping[str, Any]) -> str:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable
 from datetime import datetime
 from typing import Any
 
+from silo.api.activity import counts
 from silo.api.sse import MERGE, RESET, ServerEvent
 from silo.api.wire import MergeDiff, MergeEvent, MergeWarning
 from silo.bom.errors import SiloError
@@ -82,14 +83,14 @@ def _badges(sent: Sent) -> tuple[Line, ...]:
 
 def badges(diff: MergeDiff, warnings: Iterable[MergeWarning] = ()) -> tuple[Line, ...]:
     """The counts of a merge, as the spec's box has them; what is zero is left out."""
-    conflicts = sum(1 for warning in warnings if warning.type == "conflict")
-    parts = (
-        (len(diff.added), translate("Silo", "+{n} added"), Tone.GOOD),
-        (len(diff.quantity_changed), translate("Silo", "~{n} qty changed"), Tone.CHANGED),
-        (len(diff.removed), translate("Silo", "⚠{n} unreferenced"), Tone.WARNING),
-        (conflicts, translate("Silo", "⚡{n} in conflict"), Tone.WARNING),
+    words = (
+        (translate("Silo", "+{n} added"), Tone.GOOD),
+        (translate("Silo", "~{n} qty changed"), Tone.CHANGED),
+        (translate("Silo", "⚠{n} unreferenced"), Tone.WARNING),
+        (translate("Silo", "⚡{n} in conflict"), Tone.WARNING),
     )
-    told = tuple(Line(text.replace("{n}", str(count)), tone) for count, text, tone in parts if count)
+    parts = zip(words, counts(diff, warnings), strict=True)
+    told = tuple(Line(text.replace("{n}", str(count)), tone) for (text, tone), count in parts if count)
     return told or (Line(translate("Silo", "no changes"), Tone.QUIET),)
 
 

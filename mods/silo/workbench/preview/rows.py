@@ -103,8 +103,7 @@ class Preview:
     @property
     def unregistered(self) -> tuple[BomEntry, ...]:
         """Components without a part number, the assembly itself included."""
-        head = self.top.resolved.assembly
-        return (*self.top.resolved.unresolved, *(() if head.part_number else (head,)))
+        return self.top.resolved.unregistered
 
     @property
     def drifted_below(self) -> int:

@@ -3,12 +3,12 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 import zipfile
 
 from silo.bom.identity import meta_key
 from silo.bom.model import BomEntry
+from silo.files import content_hash
 
 _SAVED_AT = re.compile(rb'name="LastModifiedDate"[^>]*>\s*<String value="([^"]{0,40})"')
 
@@ -40,7 +40,6 @@ def _head(path: str) -> bytes:
 def sha256_or_nothing(path: str) -> str:
     """The hash of a file's content; "" where it cannot be read."""
     try:
-        with open(path, "rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
+        return content_hash(path)
     except OSError:
         return ""

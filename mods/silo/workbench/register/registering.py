@@ -18,7 +18,7 @@ from silo.bom.errors import NotFoundError, SiloError
 from silo.bom.findings import FindingCode
 from silo.bom.identity import walk_entries
 from silo.bom.model import BomEntry, Extraction
-from silo.bom.naming import Proposal, clean_name, crowded_files, propose
+from silo.bom.naming import Proposal, clean_name, propose_all
 from silo.registration import Journal, Registration, RegistrationApi, component_key, register, unclear
 from silo.workbench.register.on_disk import changed_since, sha256_or_nothing
 from silo.workbench.session.jobs import Control
@@ -95,7 +95,6 @@ class Candidate:
 
     proposal: Proposal
     state: State
-    shares_file: bool = False
     similar: tuple[Similar, ...] = ()
     twins: tuple[str, ...] = ()
     same_as: str = ""
@@ -104,6 +103,10 @@ class Candidate:
     @property
     def entry(self) -> BomEntry:
         return self.proposal.entry
+
+    @property
+    def shares_file(self) -> bool:
+        return self.proposal.shares_file
 
     @property
     def wanted(self) -> bool:
@@ -126,14 +129,6 @@ class Offer:
 
 
 # --- which components, and what of them -------------------------------------------------------------------
-
-
-def unregistered(extraction: Extraction, resolved: Any) -> tuple[BomEntry, ...]:
-    """The components without an item, parts first, the assembly itself last."""
-    wanted = list(resolved.unresolved)
-    if resolved.assembly.part_number is None:
-        wanted.append(extraction.assembly)
-    return tuple(sorted(wanted, key=lambda entry: (entry.is_assembly, -entry.level)))
 
 
 def copied(extraction: Extraction) -> tuple[BomEntry, ...]:
@@ -167,15 +162,16 @@ def offer(
     schema = api.find_schema(schema)
     numbers = _numbers_by_identity(resolved)
     categories = api.categories(schema)
-    crowded = crowded_files((extraction.assembly, *extraction.entries))
-    candidates = [
-        _candidate(entry, categories, crowded, seen, same_as="")
-        for entry in unregistered(extraction, resolved)
-    ]
-    candidates += [
-        _candidate(entry, categories, crowded, seen, same_as=numbers[(entry.silo_uuid or "").lower()])
+    tree = (extraction.assembly, *extraction.entries)
+    copies = [
+        entry
         for entry in _perhaps_copies(extraction, numbers, api)
         if (entry.silo_uuid or "").lower() in numbers
+    ]
+    candidates = [_candidate(p, seen) for p in propose_all(resolved.unregistered, tree, categories)]
+    candidates += [
+        _candidate(p, seen, same_as=numbers[(p.entry.silo_uuid or "").lower()])
+        for p in propose_all(copies, tree, categories)
     ]
     control.check()
     looked = _with_look_alikes(candidates, api, control, begun or {})
@@ -199,22 +195,15 @@ def _numbers_by_identity(resolved: Any) -> dict[str, str]:
     return {e.silo_uuid.lower(): e.part_number for e in known if e.silo_uuid and e.part_number}
 
 
-def _candidate(
-    entry: BomEntry,
-    categories: Mapping[str, str],
-    crowded: frozenset[str],
-    seen: Mapping[str, Seen],
-    same_as: str,
-) -> Candidate:
-    shares = entry.doc_path in crowded
+def _candidate(proposal: Proposal, seen: Mapping[str, Seen], same_as: str = "") -> Candidate:
+    entry = proposal.entry
     look = seen.get(entry.doc_path, Seen(State.MISSING))
     state, digest = look.state, ""
     if state.usable:
         if look.saved_at and changed_since(entry, look.saved_at):
             state = State.NEWER
         digest = sha256_or_nothing(entry.doc_path)
-    proposal = propose(entry, categories, shares_file=shares)
-    return Candidate(proposal, state, shares, same_as=same_as, sha256=digest)
+    return Candidate(proposal, state, same_as=same_as, sha256=digest)
 
 
 def _with_look_alikes(
