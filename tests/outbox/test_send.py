@@ -16,7 +16,7 @@ import pytest
 
 from silo.api.client import SiloClient
 from silo.api.policy import Backoff, Retries
-from silo.api.wire import MergeEntry, MergeRequest, MergeResult, SourceDocument
+from silo.api.wire import MergeEntry, MergeRequest, MergeResult, Revision, SourceDocument
 from silo.bom.errors import (
     AuthError,
     CancelledError,
@@ -492,3 +492,60 @@ def test_it_sends_to_the_embedded_server(outbox: Outbox, embedded: SiloClient, m
     revision = embedded.revisions(TOP)[0]
     assert (revision.comment, revision.file_checksum) == ("c1", hashlib.sha256(b"first state").hexdigest())
     assert [(line.child_part_number, line.quantity) for line in embedded.get_bom(TOP)] == [(BOLT, 4)]
+
+
+def test_the_names_of_a_commit_go_along(outbox: Outbox, silo: FakeSilo, model: Path) -> None:
+    """Its key makes a repeat harmless, for the file and for the BOM; its hash says what must arrive."""
+    entry = outbox.put(silo.base_url, TOP, file=model, bom=bom(1))
+    seen: dict[str, Any] = {}
+
+    class Spy(FakeSilo):
+        def upload_file(
+            self, part_number: str, path: Path | str, *arguments: Any, **options: Any
+        ) -> Revision:
+            seen.update(options)
+            return super().upload_file(part_number, path, *arguments, **options)
+
+        def merge_bom(self, part_number: str, request: MergeRequest, /, **options: Any) -> MergeResult:
+            seen["sync_id"] = request.sync_id
+            return super().merge_bom(part_number, request, **options)
+
+    spy = Spy()
+    spy.items = silo.items
+    outbox.send(spy)
+    assert (seen["idempotency_key"], seen["sync_id"], seen["sha256"]) == (entry.key, entry.key, entry.sha256)
+
+
+def test_what_was_seen_of_the_old_server_says_nothing_of_the_new_one(
+    outbox: Outbox, silo: FakeSilo, model: Path
+) -> None:
+    """The old one had five revisions; on the new one this very file is there already, as the first."""
+    for number in range(5):
+        model.write_bytes(b"older %d" % number)
+        silo.upload_file(TOP, model)
+    model.write_bytes(b"ours")
+    entry = outbox.put(silo.base_url, TOP, file=model)
+    fail(silo, "upload_file", UnreachableError("gone"))
+    outbox.send(silo)
+    moved = FakeSilo("http://moved.example")
+    moved.create_item("kindred-rd", "A01", "Top")
+    moved.upload_file(TOP, model)
+    outbox.retry(entry.id, server=moved.base_url)
+    outbox.send(moved)
+    assert (len(moved.revisions(TOP)), outbox.entries()) == (1, ())
+
+
+def test_an_entry_that_is_not_copied_yet_keeps_its_place(outbox: Outbox, silo: FakeSilo, model: Path) -> None:
+    """A later commit of the same item waits for it; others do not."""
+    outbox.copies.mkdir(parents=True, exist_ok=True)
+    first = Commit(str(model), 1.0, part_number=TOP, file=model, comment="first")
+    outbox.stage(first)
+    outbox._finishing.add(first.key)  # another thread is at it
+    outbox.put(silo.base_url, TOP, bom=bom(2))
+    outbox.put(silo.base_url, OTHER, bom=bom(3))
+    outbox.send(silo)
+    assert (log_of(silo, TOP), log_of(silo, OTHER)) == ([], ["3"])
+    outbox._finishing.clear()
+    outbox.finish(first.key, model)
+    outbox.send(silo)
+    assert log_of(silo, TOP) == ["first", "2"]
