@@ -14,9 +14,10 @@ import pytest
 
 from silo.bom.errors import DocumentError, InputError
 from silo.bom.model import BomEntry, Extraction
+from silo.outbox.database import OutboxError
 from silo.outbox.entry import Commit, State, new_key
 from silo.outbox.send import send_all
-from silo.outbox.store import OutboxError, Store
+from silo.outbox.store import Store
 from silo.testing import FakeSilo
 
 

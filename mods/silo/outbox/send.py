@@ -36,8 +36,9 @@ from silo.bom.errors import (
 from silo.bom.merge import MergePlan
 from silo.bom.snapshot import from_plain
 from silo.bom_sync import Resolved, Status, decide, merge_request, resolve, server_lines
+from silo.outbox.database import OutboxError
 from silo.outbox.entry import ASKED, SAME_PART, Entry, State
-from silo.outbox.store import OutboxError, Store
+from silo.outbox.store import Store
 
 PAUSES = Backoff(first=5.0, longest=900.0)
 

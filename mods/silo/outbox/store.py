@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The outbox on disk: one SQLite file, beside it the copies of files that are not sent yet.
+"""The outbox on disk: a row for each commit (:mod:`silo.outbox.database`), beside it the copies of their
+files.
 
 The rules of this module:
 
 * a row is there before any file of it, and gone before they are: a file whose row is gone may be removed at
   once, and nothing else may;
 * a copy has its name only when it is whole and on disk, and its row the copy's hash;
-* every change of a row is one transaction, on disk when it returns;
 * several processes may share the file; who sends holds the send lock, which ends with its process;
 * a disk error leaves things as they are. Damage is a hash that differs or a BOM that cannot be parsed.
 
@@ -20,64 +20,24 @@ import json
 import os
 import shutil
 import sqlite3
-import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from silo.api.address import canonical
 from silo.bom.errors import ConflictError, DocumentError, InputError
 from silo.bom.snapshot import to_plain
-from silo.durable import replacing, sync_folder
+from silo.durable import replacing
 from silo.files import content_hash
 from silo.folders import data_folder
+from silo.outbox.database import Database, insert
 from silo.outbox.entry import ASKED, SAME_PART, Commit, Entry, State
 
-VERSION = 2
 _BLOCK = 1 << 20
 # A second name that no row has is one for which a commit may just be coming.
 _HELD_AGE = 3600.0
-
-_TABLES = """
-CREATE TABLE entry (
-    id INTEGER PRIMARY KEY AUTOINCREMENT,
-    key TEXT NOT NULL UNIQUE,
-    server TEXT NOT NULL DEFAULT '',
-    state TEXT NOT NULL CHECK (state IN ('keeping', 'waiting', 'held')),
-    path TEXT NOT NULL,
-    label TEXT NOT NULL DEFAULT '',
-    identity TEXT NOT NULL DEFAULT '',
-    part_number TEXT NOT NULL DEFAULT '',
-    taken_at REAL NOT NULL,
-    comment TEXT NOT NULL DEFAULT '',
-    properties TEXT NOT NULL DEFAULT '{}',
-    file_left INTEGER NOT NULL DEFAULT 0,
-    file_name TEXT NOT NULL DEFAULT '',
-    copy TEXT NOT NULL DEFAULT '',
-    sha256 TEXT NOT NULL DEFAULT '',
-    size INTEGER NOT NULL DEFAULT 0,
-    bom_left INTEGER NOT NULL DEFAULT 0,
-    allow_missing INTEGER NOT NULL DEFAULT 0,
-    remark TEXT NOT NULL DEFAULT '',
-    reason TEXT NOT NULL DEFAULT '',
-    attempts INTEGER NOT NULL DEFAULT 0,
-    next_attempt REAL NOT NULL DEFAULT 0,
-    base_revision INTEGER,
-    revision INTEGER,
-    renamed TEXT NOT NULL DEFAULT '',      -- '', 'asked', 'same part'
-    extraction TEXT NOT NULL DEFAULT '',   -- JSON; "" where there is none
-    request TEXT NOT NULL DEFAULT ''       -- JSON; written before it is sent, and then sent again unchanged
-);
-CREATE TABLE sent (
-    server TEXT NOT NULL,
-    item TEXT NOT NULL COLLATE NOCASE,     -- a part number or an identity
-    kind TEXT NOT NULL CHECK (kind IN ('file', 'bom')),
-    entry_id INTEGER NOT NULL,             -- the newest entry that arrived
-    PRIMARY KEY (server, item, kind)
-)
-"""
 
 # All but what may be large.
 _COLUMNS = (
@@ -91,25 +51,18 @@ _SELECT = f"""SELECT {_COLUMNS}, EXISTS (
 ) AS superseded FROM entry e"""  # noqa: S608
 
 
-class OutboxError(InputError):
-    """The database cannot be used now: its disk is full, it is locked, or it is no database."""
-
-
-class Store:
-    """The file and its folders. Methods open the database for themselves, so any thread may call them.
+class Store(Database):
+    """Rows and copies. Any thread may call the methods, and other processes share the file.
 
     path
-        the file; the user's data folder unless given. Made where it is missing, for its owner only.
+        the database; in the user's data folder unless given.
     """
 
     def __init__(self, path: Path | None = None, *, clock: Callable[[], float] = time.time) -> None:
-        self.path = path or data_folder() / "outbox.sqlite3"
-        self.copies = self.path.parent / f"{self.path.stem}-files"
+        super().__init__(path or data_folder() / "outbox.sqlite3")
         self._held = self.path.parent / f"{self.path.stem}-held"
         self.clock = clock
         self._finishing: set[str] = set()
-        self._lock = threading.Lock()
-        self._is_ready = False
 
     # -- a commit comes in ------------------------------------------------------------------------------
 
@@ -351,31 +304,6 @@ class Store:
                 (self.copies / entry.copy).unlink(missing_ok=True)
         shutil.rmtree(self._held / entry.key, ignore_errors=True)
 
-    # -- the database -----------------------------------------------------------------------------------
-
-    @contextmanager
-    def transaction(self) -> Iterator[sqlite3.Connection]:
-        """All or nothing, on disk when it returns."""
-        with self._open() as db, _transaction(db):
-            yield db
-
-    @contextmanager
-    def send_lock(self) -> Iterator[bool]:
-        """True for the one process and thread that may send now.
-
-        A transaction on a database of its own: the system ends it with the process, however that dies.
-        """
-        self._make_ready()
-        with self._translated(), closing(self._connect(self.path.with_suffix(".lock"), timeout=0)) as db:
-            try:
-                db.execute("BEGIN EXCLUSIVE")
-            except sqlite3.OperationalError as error:
-                if "locked" not in str(error):
-                    raise
-                yield False
-                return
-            yield True
-
     def _one(self, where: str, *values: Any) -> Entry | None:
         with self._open() as db:
             row = db.execute(f"{_SELECT} WHERE {where}", values).fetchone()
@@ -386,92 +314,6 @@ class Store:
         if entry is None:
             raise InputError(f"the outbox has no entry {entry_id}; it was sent or discarded meanwhile")
         return entry
-
-    @contextmanager
-    def _open(self) -> Iterator[sqlite3.Connection]:
-        self._make_ready()
-        with self._translated(), closing(self._connect(self.path)) as db:
-            db.row_factory = sqlite3.Row
-            db.execute("PRAGMA synchronous = FULL")
-            yield db
-
-    def _connect(self, path: Path, timeout: float = 20.0) -> sqlite3.Connection:
-        return sqlite3.connect(path, timeout=timeout, isolation_level=None)
-
-    @contextmanager
-    def _translated(self) -> Iterator[None]:
-        try:
-            yield
-        except sqlite3.Error as error:
-            raise OutboxError(
-                f"{self.path}: the outbox cannot be used now ({error}). What waits in it is still there. "
-                f"Make "
-                "room on the disk or mend its permissions; a file that is no database must be moved away"
-            ) from error
-
-    def _make_ready(self) -> None:
-        """Make folders and file when they are first needed: not where FreeCAD has only just started."""
-        with self._lock:
-            if not self._is_ready:
-                self._prepare()
-                self._is_ready = True
-
-    def _prepare(self) -> None:
-        try:
-            self.copies.mkdir(mode=0o700, parents=True, exist_ok=True)
-            # Made for its owner only before SQLite opens it; the -wal and -shm files take over its mode.
-            for path in (self.path, self.path.with_suffix(".lock")):
-                os.close(os.open(path, os.O_RDWR | os.O_CREAT, 0o600))
-            sync_folder(self.path.parent)
-        except OSError as error:
-            raise InputError(
-                f"{self.path}: the outbox cannot be made ({error.strerror or error}). Nothing was kept for "
-                "sending; make room or mend the permissions, then commit again"
-            ) from error
-        self._migrate()
-
-    def _migrate(self) -> None:
-        with self._translated(), closing(self._connect(self.path)) as db:
-            db.row_factory = sqlite3.Row
-            if _version(db) == VERSION:
-                return
-            if db.execute("PRAGMA journal_mode").fetchone()[0] != "wal":
-                db.execute("PRAGMA journal_mode = WAL")
-            db.execute("PRAGMA synchronous = FULL")
-            with _transaction(db):
-                version = _version(db)
-                if version > VERSION:
-                    raise InputError(
-                        f"{self.path}: this outbox was written by a newer silo-mod; update this one"
-                    )
-                if version == 1:
-                    db.execute("ALTER TABLE entry RENAME TO entry1")
-                    db.execute("ALTER TABLE sent RENAME TO sent1")
-                if version < VERSION:
-                    for statement in _TABLES.split(";\n"):
-                        db.execute(statement)
-                if version == 1:
-                    from silo.outbox.takeover import of_first_outbox
-
-                    of_first_outbox(db)
-                db.execute(f"PRAGMA user_version = {VERSION}")
-
-
-@contextmanager
-def _transaction(db: sqlite3.Connection) -> Iterator[None]:
-    db.execute("BEGIN IMMEDIATE")
-    try:
-        yield
-    except BaseException:
-        db.execute("ROLLBACK")
-        raise
-    db.execute("COMMIT")
-
-
-def insert(db: sqlite3.Connection, row: dict[str, Any]) -> None:
-    """Add a row; columns that it does not name have their defaults."""
-    names, places = ", ".join(row), ", ".join(f":{name}" for name in row)
-    db.execute(f"INSERT INTO entry ({names}) VALUES ({places})", row)  # noqa: S608
 
 
 _FLAGS = ("file_left", "bom_left", "allow_missing", "superseded")
@@ -489,7 +331,3 @@ def _strict_json(data: Any) -> str:
         return json.dumps(dict(data), allow_nan=False)
     except (TypeError, ValueError, RecursionError) as error:
         raise InputError(f"these properties cannot be sent as JSON: {error}") from error
-
-
-def _version(db: sqlite3.Connection) -> int:
-    return int(db.execute("PRAGMA user_version").fetchone()[0])

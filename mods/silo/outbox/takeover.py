@@ -19,8 +19,9 @@ from typing import Any
 from silo.api.address import canonical
 from silo.bom.errors import DocumentError, SiloError
 from silo.bom.snapshot import from_plain
+from silo.outbox.database import insert
 from silo.outbox.entry import Commit, State
-from silo.outbox.store import Store, insert
+from silo.outbox.store import Store
 
 _NAMES = ("commit.json", "commit.unreadable")
 _WAITING = {"waiting": State.WAITING, "rejected": State.HELD}
