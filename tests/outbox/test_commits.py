@@ -10,6 +10,7 @@ import pytest
 
 from silo.bom.errors import (
     AuthError,
+    ConflictError,
     ForbiddenError,
     ReadOnlyError,
     RejectedError,
@@ -362,3 +363,61 @@ def test_what_is_sent_again_is_what_was_sent(vault: Vault) -> None:
     vault.send(force=True)
     assert (vault.lines(), vault.waiting()) == ({"F01-0001": 1}, ())
     assert len([event for event in vault.silo.log if event.type == "bom_merge"]) == 1
+
+
+def held_bom(vault: Vault) -> None:
+    """A BOM that was refused, while the file of its commit arrived."""
+    on(vault.silo, "merge_bom", RejectedError("not now"))
+    vault.commit(vault.snapshot(vault.part("Bolt", 1)))
+    vault.send()
+    well(vault.silo)
+
+
+def test_a_newer_commit_whose_bom_was_not_sent_makes_no_older_one_out_of_date(vault: Vault) -> None:
+    """Its broken link held it back: the older BOM undoes nothing."""
+    held_bom(vault)
+    vault.commit(vault.snapshot(vault.part("Bolt", 2), broken=True), content=b"two")
+    vault.send()
+    (waiting,) = vault.waiting()
+    assert not waiting.superseded
+    vault.outbox.retry(waiting.id)
+    vault.send()
+    assert vault.lines() == {"F01-0001": 1}
+
+
+def test_what_was_held_without_a_number_is_out_of_date_by_its_identity(vault: Vault) -> None:
+    """The item was not known yet; registered later, its newer commit arrived first."""
+    identity = "7f9fd73b-50c9-41d8-b7b2-575a030c1eeb"
+    vault.commit(vault.snapshot(identity=identity))
+    vault.send()
+    vault.silo.create_item("kindred-rd", "A01", "Late", item_type="assembly", idempotency_key=identity)
+    vault.commit(vault.snapshot(identity=identity), content=b"newer")
+    vault.send()
+    (waiting,) = vault.waiting()
+    assert (waiting.part_number, waiting.superseded) == ("", True)
+    with pytest.raises(ConflictError, match="a newer commit of it was sent"):
+        vault.outbox.retry(waiting.id)
+
+
+def test_numbers_are_the_same_in_any_spelling(vault: Vault) -> None:
+    """A commit by number, typed in small letters, is of the same item."""
+    held_bom(vault)
+    request = vault.outbox.bom(vault.waiting()[0].id)[1]
+    older = vault.outbox.add(Commit("", 1.0, part_number=vault.number.lower(), request=request))
+    vault.outbox.update(older.id, state=State.HELD, server=vault.waiting()[0].server)
+    vault.commit(vault.snapshot(vault.part("Bolt", 3)), content=b"three")
+    vault.send()
+    assert [waiting.superseded for waiting in vault.waiting()] == [True, True]
+
+
+def test_a_commit_by_number_waits_for_an_older_one_by_identity(vault: Vault) -> None:
+    """They are one item, and go in order."""
+    on(vault.silo, "upload_file", UnreachableError("this one only"))
+    vault.commit(vault.snapshot())
+    request = '{"entries": [{"child_part_number": "F01-0001", "quantity": 9}]}'
+    vault.outbox.add(Commit("", 9.0, part_number=vault.number, request=request))
+    vault.send()
+    assert vault.lines() == {}
+    well(vault.silo)
+    vault.send(force=True)
+    assert (vault.lines(), vault.waiting()) == ({"F01-0001": 9}, ())
