@@ -199,7 +199,7 @@ def _roles(bodies: Sequence[Body], holders: list[list[int]]) -> tuple[list[_Role
             roles.append(_Role.BODY)
             hosts.append(number)
             continue
-        opposite = body.props.reversed is not bodies[around].props.reversed
+        opposite = body.props.reversed != bodies[around].props.reversed
         hosts.append(around if roles[around] is _Role.BODY else hosts[around])
         if roles[around] is _Role.CAVITY:
             roles.append(_Role.BODY)
