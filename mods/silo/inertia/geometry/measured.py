@@ -90,6 +90,15 @@ def integration_notes(
     return notes
 
 
+def differing_note(difference: float) -> Note:
+    """Two integrations that both converged, and differ."""
+    words = (
+        f"two exact integrations differ by {difference:.1g}: its edges do not quite meet, by the file's own "
+        "tolerances, and no finer integration helps"
+    )
+    return (GeometryCode.NOT_CONVERGENT, words)
+
+
 def mesh_notes(deviation: float | None, missing: int) -> Notes:
     """What the mesh says of a solid: its relative deviation in volume (None: not closed), missing faces."""
     if deviation is not None and deviation > MESH_TOLERANCE:

@@ -30,8 +30,9 @@ except ImportError as error:  # pragma: no cover - a machine without a desktop's
         "On Debian and Ubuntu: apt-get install libgl1"
     ) from error
 
-from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Surface
+from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Curve2d, BRepAdaptor_Surface
 from OCP.GeomAbs import (
+    GeomAbs_Circle,
     GeomAbs_Cone,
     GeomAbs_Cylinder,
     GeomAbs_Line,
@@ -145,6 +146,19 @@ def has_surface(face: Any) -> bool:
 def is_elementary(face: Any) -> bool:
     """True for a plane, a cylinder, a cone, a sphere or a torus."""
     return BRepAdaptor_Surface(face, False).GetType() in _ELEMENTARY
+
+
+def is_plain(solid: Any) -> bool:
+    """True where all faces are elementary, and all edges straight or round in them: integrals are exact."""
+    for face in faces_of(solid):
+        surface = BRepAdaptor_Surface(face, False).GetType()
+        if surface not in _ELEMENTARY:
+            return False
+        for edge in _explored(face, TopAbs_EDGE):
+            kind = BRepAdaptor_Curve2d(_as_edge(edge), face).GetType()
+            if kind != GeomAbs_Line and not (kind == GeomAbs_Circle and surface == GeomAbs_Plane):
+                return False
+    return True
 
 
 def is_flat(solid: Any) -> bool:

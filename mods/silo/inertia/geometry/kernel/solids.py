@@ -3,8 +3,7 @@
 
 Rules of this module, each found on real files:
 
-* ``VolumeProperties`` with a tolerance, never the overload without: that one is off by more than 1e-4 on one
-  real part in thirteen, in silence. Where even that one gives up, our own integration takes its place.
+* The integration is chosen by :mod:`moments`; the kernel's usual one is off in silence.
 * Integrated with the solid moved to the origin: from afar the tensor is the difference of huge numbers.
 * A negative volume is a reversed shell. Its sign is turned, and said.
 * The tessellation is integrated as well, by other code. Where both disagree the geometry is bad.
@@ -26,7 +25,7 @@ from silo.inertia.core import place
 from silo.inertia.geometry.kernel import occt
 from silo.inertia.geometry.kernel.closure import closed_shells, gap_of
 from silo.inertia.geometry.kernel.common import KernelCommon
-from silo.inertia.geometry.kernel.moments import by_kernel, converged
+from silo.inertia.geometry.kernel.moments import solid_moments
 from silo.inertia.geometry.kernel.tessellate import (
     MM,
     bounds,
@@ -60,14 +59,11 @@ from silo.inertia.geometry.mesh import (
 from silo.inertia.geometry.together import Body, together
 from silo.inertia.model import GeometryCode, GeometryProblem, SolidProps
 
-TENSOR_SHARE = 1e-4
-"""The kernel's tolerance is about the volume; a tensor lags behind by ten to four powers of ten (a torus at
-1e-8: volume 2e-16, tensor 1.1e-7; at 1e-12: 1.6e-11). Solids of planes, cylinders, cones, spheres and tori
-cost nothing at the finer one, and are exact then; free-form ones would take twice as long for digits that
-their own tolerances do not have."""
-
 SMALL = 0.1
 """Size of a solid in sizes of its product, below which its picture may be coarse."""
+
+MANY_FACES = 60
+"""A solid with more is full of small faces, whose picture may be coarse; meshing it is the most work."""
 
 NEAR = 50.0
 """Distance from the origin, in sizes of the solid, up to where integrating from there costs no digits."""
@@ -174,9 +170,7 @@ def _integrated(solid: Any, eps: float, notes: Notes) -> SolidProps | None:
         solid = _rebuilt(solid, -centre)
     else:
         centre = np.zeros(3)
-    if all(occt.is_elementary(face) for face in occt.faces_of(solid)):
-        eps *= TENSOR_SHARE
-    found = converged(solid, by_kernel(solid, eps), eps)
+    found = solid_moments(solid, eps, notes)
     if not np.isfinite(found.volume) or found.volume == 0.0:
         notes.append(NO_VOLUME)
         return None
@@ -211,6 +205,7 @@ def _triangulated_solid(solid: Any, notes: Notes) -> tuple[SolidProps | None, Me
 
 def _checked_mesh(solid: Any, props: SolidProps | None, picture: _Picture, notes: Notes) -> Mesh:
     small = box(solid)[1] < SMALL * picture.size
-    check = cross_check(solid, props.volume_m3 if props is not None else None, small=small)
+    coarse = small or len(occt.faces_of(solid)) > MANY_FACES
+    check = cross_check(solid, props.volume_m3 if props is not None else None, small=coarse)
     notes += mesh_notes(check.deviation, check.missing)
     return simplified(check.picture, picture.triangles)
