@@ -47,6 +47,7 @@ from silo.bom.resolve import (
     resolve_with,
     unregistered_findings,
 )
+from silo.standard_items import find_items
 
 __all__ = [
     "BomDiff",
@@ -101,7 +102,9 @@ class Resolved:
     def unregistered(self) -> tuple[BomEntry, ...]:
         """The components without an item, parts first, the assembly itself last."""
         head = () if self.assembly.part_number else (self.assembly,)
-        return tuple(sorted((*self.unresolved, *head), key=lambda entry: (entry.is_assembly, -entry.level)))
+        return tuple(
+            sorted((*self.unresolved, *head), key=lambda e: (e.is_assembly, e.is_standard, -e.level))
+        )
 
     @property
     def folder(self) -> str:
@@ -165,6 +168,7 @@ def resolve(extraction: Extraction, api: ItemLookup) -> Resolved:
     head = extraction.assembly
     uuids = [e.silo_uuid for e in walk_entries((head, *extraction.entries)) if e.silo_uuid]
     known = look_up(uuids, api)
+    known = {**known, **find_items(extraction.entries, known, api)}
     entries, unresolved = resolve_with(extraction.entries, known)
     item = known.get(head.silo_uuid) if head.silo_uuid else None
     if item is not None:

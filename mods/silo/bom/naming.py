@@ -50,8 +50,8 @@ def clean_name(text: str) -> str:
 
 
 def crowded_files(entries: Iterable[BomEntry]) -> frozenset[str]:
-    """Files that give more than one component of this tree."""
-    files = Counter(entry.doc_path for entry in walk_entries(entries))
+    """Files that give more than one component of this tree; standard parts need no place in a file."""
+    files = Counter(entry.doc_path for entry in walk_entries(entries) if not entry.is_standard)
     return frozenset(path for path, count in files.items() if count > 1)
 
 

@@ -18,6 +18,7 @@ from silo.cli import common
 from silo.cli.common import Commands
 from silo.registration import Ask, Journal, Registration, unclear
 from silo.registration import register as register_component
+from silo.standard_items import register_standard
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
@@ -103,7 +104,10 @@ def register_all(
         if stopped is not None:
             done.append(Registration(proposal, error=stopped))
             continue
-        result = register_component(proposal, client, journal, write, schema=schema, check=check, ask=ask)
+        if proposal.entry.is_standard:
+            result = register_standard(proposal, client, schema=schema)
+        else:
+            result = register_component(proposal, client, journal, write, schema=schema, check=check, ask=ask)
         stopped = result.error if result.error is not None and ends_run(result.error, client) else None
         done.append(result)
     return done
@@ -137,8 +141,9 @@ def _ask(proposals: Sequence[Proposal], base: str) -> list[Proposal]:
     chosen: list[Proposal] = []
     for number, proposal in enumerate(proposals, start=1):
         where = relative(proposal.entry.doc_path, base)
+        what = proposal.entry.standard or f"{where}#{proposal.entry.object_name}"
         question = (
-            f"[{number}/{len(proposals)}] {where}#{proposal.entry.object_name}: register as "
+            f"[{number}/{len(proposals)}] {what}: register as "
             f"{proposal.item_type} {proposal.name!r} in category {proposal.category}? [Y/n/q/new name] "
         )
         try:
@@ -189,6 +194,7 @@ def _row(proposal: Proposal, base: str, result: Registration | None = None) -> M
     row: dict[str, Any] = {
         "doc_path": relative(proposal.entry.doc_path, base),
         "object": proposal.entry.object_name,
+        "standard": proposal.entry.standard,
         "name": proposal.name,
         "item_type": proposal.item_type,
         "category": proposal.category,

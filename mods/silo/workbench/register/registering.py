@@ -20,6 +20,7 @@ from silo.bom.identity import walk_entries
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.naming import Proposal, clean_name, propose_all
 from silo.registration import Journal, Registration, RegistrationApi, component_key, register, unclear
+from silo.standard_items import register_standard
 from silo.workbench.register.on_disk import changed_since, sha256_or_nothing
 from silo.workbench.session.jobs import Control
 from silo.workbench.words import translate
@@ -197,6 +198,8 @@ def _numbers_by_identity(resolved: Any) -> dict[str, str]:
 
 def _candidate(proposal: Proposal, seen: Mapping[str, Seen], same_as: str = "") -> Candidate:
     entry = proposal.entry
+    if entry.is_standard:  # no file is written for it
+        return Candidate(proposal, State.READY, same_as=same_as)
     look = seen.get(entry.doc_path, Seen(State.MISSING))
     state, digest = look.state, ""
     if state.usable:
@@ -212,6 +215,8 @@ def _with_look_alikes(
     first, rest = candidates[:MOST_LOOKED_UP], candidates[MOST_LOOKED_UP:]
 
     def one(candidate: Candidate) -> Candidate:
+        if candidate.entry.is_standard:  # an item of this designation is joined, whoever made it
+            return candidate
         if control.cancelled.is_set():
             return candidate
         own = begun.get(component_key(candidate.entry), "")
@@ -337,6 +342,8 @@ def carry_out(
 def _carry_out(
     order: Order, api: RegistrationApi, journal: Journal, write: Write, schema: str
 ) -> Registration:
+    if order.candidate.entry.is_standard:
+        return register_standard(order.proposal, api, schema=schema)
     if order.existing is not None:
         try:
             write(order.candidate, order.existing.item_id)

@@ -106,6 +106,8 @@ class EditedRow:
     @cached_property
     def _component(self) -> str:
         entry = self.candidate.entry
+        if entry.standard:
+            return plain(translate("Silo", "Standard part: {name}").replace("{name}", entry.standard), 80)
         file = os.path.basename(entry.doc_path)
         return plain(f"{file} · {entry.label}" if self.candidate.shares_file else file, 80)
 
