@@ -153,4 +153,4 @@ def test_watch_prints_events_as_lines_of_json(run: Any, silo: Any, gearbox: Path
         worker.join()
     assert ran.code == 0
     [line] = ran.out.splitlines()
-    assert set(json.loads(line)) == {"id", "type", "data"}
+    assert set(json.loads(line)) == {"id", "type", "event", "data"}

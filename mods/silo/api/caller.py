@@ -9,6 +9,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from silo.api.abilities import Abilities
 from silo.api.address import ServerAddress
 from silo.api.multipart import as_json
 from silo.api.replies import Reply
@@ -32,7 +33,7 @@ class Caller:
 
     _address: ServerAddress
     _transport: Transport
-    _strict: bool = False  # the server refuses keys that it does not know
+    abilities: Abilities
 
     def _get(self, subject: str, *segments: str, params: Params | None = None) -> Reply:
         """Ask; a question may be repeated freely."""
@@ -86,7 +87,7 @@ class Caller:
                 )
             )
 
-        if self._strict or bare == said:
+        if self.abilities.strict or bare == said:
             return send(bare)
         try:
             return send(said)
@@ -94,7 +95,7 @@ class Caller:
             if not _UNKNOWN_KEY.search(f"{error} {' '.join(error.problems)}"):
                 raise
         reply = send(bare)
-        self._strict = True
+        self.abilities.strict = True
         return reply
 
     def _delete(self, subject: str, *segments: str) -> None:

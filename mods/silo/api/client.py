@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -17,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Self
 import requests
 
 from silo.api import files
+from silo.api.abilities import Abilities, load, save
 from silo.api.address import ServerAddress
 from silo.api.boms import BomCalls
 from silo.api.caller import LISTS
@@ -51,6 +53,8 @@ class SiloClient(ItemCalls, BomCalls):
         more than this is refused in an answer (downloads have their own limit).
     silence
         seconds after which an event stream without a byte counts as dead.
+    memory
+        a file in which what was learned about the server is kept for a day (:mod:`silo.api.abilities`).
 
     May be shared between threads. Close it, or use it as a context manager.
     """
@@ -67,10 +71,14 @@ class SiloClient(ItemCalls, BomCalls):
         retries: Retries | None = None,
         max_bytes: int = 64 << 20,
         silence: float = SILENCE,
+        memory: Path | None = None,
     ) -> None:
         connect, read = timeout if isinstance(timeout, tuple) else (timeout, timeout)
         self._address = ServerAddress.parse(base_url)
         self._silence = silence
+        self._memory = memory
+        self.abilities = load(memory, self.base_url) if memory is not None else Abilities()
+        self._known_before = replace(self.abilities, schemas=dict(self.abilities.schemas))
         self._transport = Transport(
             self._address,
             token,
@@ -93,7 +101,9 @@ class SiloClient(ItemCalls, BomCalls):
         self.close()
 
     def close(self) -> None:
-        """Give the connections back."""
+        """Give the connections back, and keep what was learned about the server."""
+        if self._memory is not None and self.abilities != self._known_before:
+            save(self._memory, self.base_url, self.abilities)
         self._transport.close()
 
     @property
@@ -112,6 +122,14 @@ class SiloClient(ItemCalls, BomCalls):
     def ready(self) -> ServerState:
         """Whether the server takes changes: ``normal``, ``read-only`` or ``degraded``."""
         return ServerState.model_validate(self._state("ready"))
+
+    def modules(self) -> list[str]:
+        """The names of the server's modules that are on."""
+        said = self._get("its modules", "modules").mapping()
+        found = said.get("modules", said)
+        if isinstance(found, dict):
+            return [name for name, on in found.items() if not isinstance(on, dict) or on.get("enabled", True)]
+        return [str(one.get("name", one)) if isinstance(one, dict) else str(one) for one in found or ()]
 
     def health(self) -> dict[str, Any]:
         """What the server says of its own health."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import cached_property
 from typing import Any
 from uuid import UUID
 
@@ -37,13 +36,13 @@ MAX_WORKERS = 8
 class ItemCalls(Caller):
     """Finding and making items."""
 
-    # None until known: an older server has no batch look-up, and is asked for it only once.
-    _has_batch: bool | None = None
     _is_silo: bool | None = None
+    _can_post_batch = True  # for this token and mode; the route itself is an ability
 
-    @cached_property
-    def _schemas(self) -> dict[str, str]:
-        return {}
+    @property
+    def keeps_item_ids(self) -> bool:
+        """True where the server was seen to give a new item the UUID that we proposed."""
+        return self.abilities.keeps_item_ids
 
     def get_item_by_uuid(self, uuid: str, /) -> Item | None:
         """The item with this identity; None where the server has none (unknown, archived, or no UUID)."""
@@ -73,7 +72,8 @@ class ItemCalls(Caller):
         for start in range(0, len(wanted), MAX_UUIDS):
             stop_if(cancelled)
             chunk = wanted[start : start + MAX_UUIDS]
-            batch = self._batch(chunk, cancelled) if self._has_batch is not False else None
+            ask = self._can_post_batch and self.abilities.batch is not False
+            batch = self._batch(chunk, cancelled) if ask else None
             found.update(self._one_by_one(chunk, cancelled) if batch is None else batch)
         return found
 
@@ -87,14 +87,17 @@ class ItemCalls(Caller):
                 repeatable=True,
                 cancelled=cancelled,
             )
-        except (NotFoundError, ForbiddenError, ReadOnlyError, BusyError):
-            # Not known here, or no POST for viewers and on a read-only server: GET is allowed all the same.
-            self._has_batch = False
+        except NotFoundError:
+            self.abilities.batch = False
+            return None
+        except (ForbiddenError, ReadOnlyError, BusyError):
+            # No POST for viewers and on a read-only server: GET is allowed all the same.
+            self._can_post_batch = False
             return None
         except RejectedError:
             # One malformed identity spoils the batch; asked one by one, only that one is unknown.
             return None
-        self._has_batch = True
+        self.abilities.batch = True
         known = {_written(item.id): item for item in reply.models(Item, *LISTS)}
         return {uuid: known[_written(uuid)] for uuid in uuids if _written(uuid) in known}
 
@@ -183,7 +186,10 @@ class ItemCalls(Caller):
             headers=headers,
             extensions=("id", "name"),
         )
-        return self._made(reply)
+        item = self._made(reply)
+        if values["id"] is not None:
+            self.abilities.keeps_item_ids = item.id == values["id"]
+        return item
 
     def _made(self, reply: Reply) -> Item:
         """The item of an answer to its creation, bare or wrapped; else asked for by its number."""
@@ -223,8 +229,8 @@ class ItemCalls(Caller):
 
         Raises :class:`InputError` that lists the schemas where there are several others, or none.
         """
-        if wanted in self._schemas:
-            return self._schemas[wanted]
+        if wanted in self.abilities.schemas:
+            return self.abilities.schemas[wanted]
         try:
             self.get_schema(wanted)
             found = wanted
@@ -232,7 +238,7 @@ class ItemCalls(Caller):
             raise
         except NotFoundError as error:
             found = self._only_schema(wanted, error)
-        self._schemas[wanted] = found
+        self.abilities.schemas[wanted] = found
         return found
 
     def _only_schema(self, wanted: str, missing: NotFoundError) -> str:

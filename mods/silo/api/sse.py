@@ -45,12 +45,15 @@ class ServerEvent:
         the JSON as it came; the text where it is none.
     merge
         the typed content of a ``bom_merge``; None where that cannot be read (``data`` still has it).
+    name
+        the event as the server calls it: ``bom.merged`` and ``bom_merge`` are one ``type``.
     """
 
     id: str | None
     type: str
     data: Any = None
     merge: MergeEvent | None = field(default=None, compare=False)
+    name: str = field(default="", compare=False)
 
     @property
     def item(self) -> str | None:
@@ -138,7 +141,7 @@ def read_block(block: bytes) -> ServerEvent | None:
     if name == "message" and isinstance(data, dict) and isinstance(data.get("type"), str):
         name = data["type"]
     kind = _SAME.get(name, name)
-    return ServerEvent(_marker(block), kind, data, _merge(data) if kind == MERGE else None)
+    return ServerEvent(_marker(block), kind, data, _merge(data) if kind == MERGE else None, name)
 
 
 def _marker(block: bytes) -> str | None:

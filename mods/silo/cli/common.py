@@ -65,11 +65,12 @@ def add_json_option(parser: argparse.ArgumentParser) -> None:
 @contextmanager
 def client_of(args: argparse.Namespace) -> Iterator[SiloClient]:
     """A client for the server that the options, the environment or the configuration name."""
+    from silo.api.abilities import default_path
     from silo.api.client import SiloClient
     from silo.api.config import resolve_server
 
     where = resolve_server(getattr(args, "server", None), getattr(args, "token", None))
-    with SiloClient(where.url, where.token, verify=where.verify) as client:
+    with SiloClient(where.url, where.token, verify=where.verify, memory=default_path()) as client:
         yield client
 
 

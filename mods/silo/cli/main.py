@@ -29,6 +29,7 @@ _COMMANDS = (
     "serve",
     "backup",
     "watch",
+    "doctor",
     "inertia",
     "links",
     "mass",

@@ -6,10 +6,11 @@ from __future__ import annotations
 import argparse
 import queue
 import sys
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from silo.api.activity import activity_text
-from silo.bom.errors import AuthError
+from silo.bom.errors import AuthError, NotFoundError, RouteMissingError
 from silo.cli import common
 from silo.cli.common import Commands
 
@@ -40,7 +41,10 @@ def run(args: argparse.Namespace) -> int:
 
     events: queue.Queue[ServerEvent | ConnectionState] = queue.Queue()
     with common.client_of(args) as client:
-        client.whoami()  # a wrong address or token is told at once, not retried for ever
+        with suppress(NotFoundError):  # a server that does not say who we are has answered all the same
+            client.whoami()  # a wrong address or token is reported at once, not retried for ever
+        mode = client.ready().mode
+        print(f"[{client.base_url}: {mode}]", file=sys.stderr)
         listener = EventListener(client, on_event=events.put, on_state=events.put)
         listener.start()
         try:
@@ -58,7 +62,9 @@ def _print(
     while args.count is None or shown < args.count:
         event = events.get()
         if isinstance(event, ConnectionState):
-            if event.kind in (Connection.REFUSED, Connection.UNSUPPORTED):
+            if event.kind is Connection.UNSUPPORTED:
+                raise RouteMissingError(f"there is no live connection: {event.message}")
+            if event.kind is Connection.REFUSED:
                 raise AuthError(f"the live connection ended: {event.message}")
             print(f"[{event}]", file=sys.stderr)
             continue
@@ -66,7 +72,17 @@ def _print(
             continue
         shown += 1
         if args.json:
-            print(common.json_text({"id": event.id, "type": event.type, "data": event.data}), flush=True)
+            print(
+                common.json_text(
+                    {
+                        "id": event.id,
+                        "type": event.type,
+                        "event": event.name or event.type,
+                        "data": event.data,
+                    }
+                ),
+                flush=True,
+            )
         else:
             _show(client, event)
     return 0
