@@ -421,3 +421,16 @@ def test_a_commit_by_number_waits_for_an_older_one_by_identity(vault: Vault) -> 
     well(vault.silo)
     vault.send(force=True)
     assert (vault.lines(), vault.waiting()) == ({"F01-0001": 9}, ())
+
+
+def test_a_commit_by_identity_waits_for_an_older_one_by_number(vault: Vault) -> None:
+    """That they are one item is known only once the identity was looked up."""
+    request = '{"entries": [{"child_part_number": "F01-0001", "quantity": 9}]}'
+    vault.outbox.add(Commit("", 1.0, part_number=vault.number, request=request))
+    on(vault.silo, "merge_bom", UnreachableError("this one only"))
+    vault.commit(vault.snapshot())
+    vault.send()
+    assert vault.files() == []
+    well(vault.silo)
+    vault.send(force=True)
+    assert (vault.lines(), vault.files(), vault.waiting()) == ({"F01-0001": 9}, [b"top file"], ())

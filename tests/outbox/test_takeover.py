@@ -118,6 +118,8 @@ def test_the_first_outbox_is_sent(tmp_path: Path, silo: FakeSilo) -> None:
         (7, State.WAITING),
         (8, State.WAITING),
     ]
+    # The older version had sent a BOM with the id 20 to the same server.
+    assert [e.superseded for e in store.entries()] == [True, False, True]
     send_all(store, silo)
     (left,) = store.entries()
     assert (left.reason, left.superseded) == ("unknown part", True)

@@ -178,8 +178,6 @@ class Store(Database):
         if self.bom(entry_id)[0]:
             # What was refused is made anew: the missing part may have its number now.
             changed["request"] = ""
-        if entry.identity:
-            changed["part_number"] = ""
         self.update(entry_id, **changed)
 
     def discard(self, entry_id: int) -> None:

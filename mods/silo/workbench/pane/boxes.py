@@ -12,7 +12,7 @@ from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QtCore, QtWidgets
 from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone
 from silo.workbench.pane.banner import Banner
-from silo.workbench.pane.waiting import Row, meant_for_another, rows
+from silo.workbench.pane.waiting import Row, host_of, meant_for_another, rows
 from silo.workbench.session.session import Shown
 from silo.workbench.words import counted, plain, translate
 
@@ -191,9 +191,11 @@ class WaitingWidget(QtWidgets.QFrame):  # type: ignore[misc]
             )
         send = [Action(Do.RETRY, translate("Silo", "Send now"))]
         if len(away := meant_for_another(shown.waiting, shown.server.url)) > 1:
-            text = translate("Silo", "Send all {n} of another address to the server in use")
-            ids = ",".join(map(str, away))
-            send.append(Action(Do.SEND_HERE, text.replace("{n}", str(len(away))), target=ids))
+            text = translate("Silo", "Send all {n} of another address to {host}").replace(
+                "{n}", str(len(away))
+            )
+            text = text.replace("{host}", host_of(shown.server.url))
+            send.append(Action(Do.SEND_HERE, text, target=",".join(map(str, away))))
         self._layout.addLayout(buttons(send, self._on_action))
 
     def _row(self, row: Row) -> None:

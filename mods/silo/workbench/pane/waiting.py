@@ -51,7 +51,7 @@ def _row(entry: Entry, here: str) -> Row:
     text = entry.reason
     if away:
         meant = translate("Silo", "It is meant for {there}, which is not the server in use.")
-        text = "\n".join(filter(None, (meant.replace("{there}", _host(entry.server)), text)))
+        text = "\n".join(filter(None, (meant.replace("{there}", host_of(entry.server)), text)))
     elif entry.superseded:
         text = translate("Silo", "A newer commit of it has arrived since; this one would undo it.")
     elif entry.state is State.KEEPING and not text:
@@ -70,7 +70,7 @@ def _row(entry: Entry, here: str) -> Row:
 def _actions(entry: Entry, here: str, *, away: bool) -> Iterable[Action]:
     target = str(entry.id)
     if away:
-        text = translate("Silo", "Send to {host}").replace("{host}", _host(here))
+        text = translate("Silo", "Send to {host}").replace("{host}", host_of(here))
         yield Action(Do.SEND_HERE, text, target=target)
     elif entry.state is State.HELD and not entry.superseded:
         yield Action(Do.RETRY, translate("Silo", "Retry"), target=target)
@@ -86,5 +86,6 @@ def _what(entry: Entry) -> str:
     return translate("Silo", "BOM") if entry.bom_left else translate("Silo", "file")
 
 
-def _host(address: str) -> str:
+def host_of(address: str) -> str:
+    """An address as people read it."""
     return plain(urlsplit(address).netloc or address, 80)

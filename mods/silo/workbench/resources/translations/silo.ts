@@ -458,7 +458,7 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../pane/boxes.py" />
-            <source>Send all {n} of another address to the server in use</source>
+            <source>Send all {n} of another address to {host}</source>
             <translation type="unfinished" />
         </message>
         <message>
