@@ -165,6 +165,27 @@ def test_a_sub_assembly_gets_its_own_mass(assemble: Fixture, compute: Fixture, a
     assert all("written to that one's item" in s.reason for s in plan.skipped)
 
 
+@pytest.mark.parametrize(("apart", "told"), [(0.0, True), (0.005, False)])
+def test_sub_assemblies_that_differ_inside_have_no_common_centre(
+    assemble: Fixture, compute: Fixture, at: Fixture, apart: float, told: bool
+) -> None:
+    """Five millimetres between the lids of two motors: the item gets a mass and no centre."""
+    case, lid = box("case", 0.1, 0.1, 0.1), box("lid", 0.1, 0.1, 0.1)
+    motors = [
+        item
+        for i in range(2)
+        for item in (
+            (f"l/motor{i}/case", case, at(i, 0, 0), "l/motor/case"),
+            (f"l/motor{i}/lid", lid, at(i, 0, 1 + i * apart), "l/motor/lid"),
+        )
+    ]
+    frames = {("l", f"motor{i}"): at(i, 0, 0) for i in range(2)}
+    report = compute(assemble(*motors, frames=frames), MOTOR + "P01-0001,2,,2.000 kg,motor\n")
+    (one,) = report.sub_assemblies
+    assert (one.com is not None) is told
+    assert ("com_m" in plan_push(report).items[0].properties) is told
+
+
 @pytest.mark.parametrize(
     ("row", "reason"),
     [

@@ -42,6 +42,10 @@ SAID = {*DOUBTS, GeometryCode.COINCIDENT_SOLIDS, GeometryCode.NO_SOLID, Geometry
 """Warnings that say that the file is not what it should be."""
 
 
+OPEN = {GeometryCode.OPEN_SHELL, GeometryCode.NOT_WATERTIGHT, GeometryCode.NO_SOLID}
+"""One of them is said of every surface with a hole."""
+
+
 def solid_of(one: Piece) -> Any:
     """A piece as a solid, a shell, or what is left of one."""
     x, y, z = one.size
@@ -188,6 +192,8 @@ def complaint(found: Product, assembly: Assembly, part: Prototype) -> str:
         return f"off by {error:.2g} in silence"
     if found.doubt is False and (error > 1e-6 or said):
         return f"off by {error:.2g}, doubted as {sorted(said)}, and nothing was wrong with it"
+    if found.kind == "opened" and not codes & OPEN:
+        return f"is open, and only {sorted(codes)} was said"
     if found.doubt is True and not said:
         return "nothing was said of it"
     return ""

@@ -296,3 +296,25 @@ def test_both_engines_agree_where_both_converge(box: Any) -> None:
     assert ours.volume == pytest.approx(kernel.volume_m3 * 1e9, rel=1e-8)
     np.testing.assert_allclose(ours.com, kernel.com_m * 1e3, rtol=1e-7)
     np.testing.assert_allclose(ours.inertia, kernel.inertia_unit * 1e15, rtol=1e-6, atol=1e-2)
+
+
+def test_corners_within_one_edge_are_found() -> None:
+    """A rectangle drawn in one stroke: its corners are no breaks, and many halvings close in on them."""
+    x, y, z = 2.0, 3.0, 4.0
+    corners = np.array([0.0, 0.2312, 0.4187, 0.7731, 1.0])
+
+    def stroke(points: list[tuple[float, float]]) -> list[Curve]:
+        u, v = np.array([*points, points[0]]).T
+        return [
+            Curve(
+                lambda t: np.column_stack([np.interp(t, corners, u), np.interp(t, corners, v)]),
+                np.array([0.0, 1.0]),
+            )
+        ]
+
+    faces = box_faces(x, y, z)
+    faces[0] = plane((0, 0, 0), (0, 1, 0), (1, 0, 0), stroke([(0, 0), (y, 0), (y, x), (0, x)]))
+    faces[1] = plane((0, 0, z), (1, 0, 0), (0, 1, 0), stroke([(0, 0), (x, 0), (x, y), (0, y)]))
+    found = integrate(faces, centre=np.zeros(3), size=5.0, volume=x * y * z, eps=1e-8)
+    assert found.volume == pytest.approx(x * y * z, rel=1e-5)
+    np.testing.assert_allclose(found.com, [x / 2, y / 2, z / 2], rtol=1e-5)
