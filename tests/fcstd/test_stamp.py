@@ -409,3 +409,27 @@ def test_a_big_file_is_not_held_in_memory(tmp_path: Path) -> None:
     with zipfile.ZipFile(path) as archive:
         assert archive.testzip() is None
         assert archive.read("shape.brp") == doc.entries["shape.brp"]
+
+
+def test_the_object_names_its_item_too(tmp_path: Path) -> None:
+    """As the add-on writes it, and as the real Silo finds its own documents."""
+    path = tmp_path / "a.FCStd"
+    Doc().add("Part::Box", "Other").add("Part::Box", "Box", Note="<Properties Count='9'>").save(path)
+    with zipfile.ZipFile(path) as archive:
+        before = archive.read("Document.xml").decode()
+    assert stamp(path, "u-1", item_object="Box")
+    document = open_document(path)
+    assert document.getObject("Box").SiloItemId == "u-1"
+    assert not hasattr(document.getObject("Other"), "SiloItemId")
+    assert (document.Meta, identity_of(document.getObject("Box"))) == ({"SiloUUID": "u-1"}, "u-1")
+    with zipfile.ZipFile(path) as archive:
+        after = archive.read("Document.xml").decode()
+    assert len(after.splitlines()) > len(before.splitlines())
+    for count, more in (("3", -1), ("4", 1)):  # Box has one more property than before, nothing else changed
+        word = f'Count="{count}" TransientCount'
+        assert after.count(word) == before.count(word) + more
+    assert stamp(path, "u-1", item_object="Box") is False
+    with pytest.raises(DocumentError, match="SiloItemId is another identity"):
+        stamp(path, "u-2", item_object="Box", replace=True)
+    with pytest.raises(DocumentError, match="no object named"):
+        check_stampable(tmp_path / "a.FCStd", item_object="Gone")

@@ -31,8 +31,14 @@ def test_freecad_reads_and_keeps_what_we_stamp(version: str, tmp_path: Path) -> 
     folder = corpus.base("asm4/link_to_assembly")
     top = folder / "top.FCStd"
     identities = {name: str(uuid.uuid4()) for name in ("top", "sub", "bolt", "plate")}
+    objects = {"sub": SUB, "bolt": BOLT, "plate": PLATE}
+    objects = {name: key.partition("#")[2] for name, key in objects.items()}
     for name, identity in identities.items():
-        assert stamp(folder / f"{name}.FCStd", identity)
+        path = str(folder / f"{name}.FCStd")
+        if name == "top":
+            with Library() as library:
+                objects["top"] = str(choose_assembly(library.open(path)).Name)
+        assert stamp(path, identity, item_object=objects[name])
     wanted = {SUB: identities["sub"], BOLT: identities["bolt"], PLATE: identities["plate"]}
 
     env = freecad.profile(tmp_path / "profile")
@@ -49,5 +55,9 @@ def test_freecad_reads_and_keeps_what_we_stamp(version: str, tmp_path: Path) -> 
         assert document.ProgramVersion.startswith(version)
         found = extract(choose_assembly(document))
     assert found.assembly.silo_uuid == identities["top"]
+    for name, identity in identities.items():
+        path = str(folder / f"{name}.FCStd")
+        with Library() as library:
+            assert library.open(path).getObject(objects[name]).SiloItemId == identity
     assert answers.uuids_of(found.entries, str(folder)) == wanted
     assert answers.bom_of(found.entries, str(folder)) == {SUB: (1, {BOLT: 2, PLATE: 1})}

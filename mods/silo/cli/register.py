@@ -93,10 +93,12 @@ def register_all(
         return entry.object_name if entry.key in shared else None
 
     def write(entry: BomEntry, identity: str) -> None:
-        stamp(entry.doc_path, identity, object_name=own_name(entry))
+        item = entry.object_name or None
+        stamp(entry.doc_path, identity, object_name=own_name(entry), item_object=item)
 
     def check(entry: BomEntry) -> None:
-        check_stampable(entry.doc_path, object_name=own_name(entry))
+        item = entry.object_name or None
+        check_stampable(entry.doc_path, object_name=own_name(entry), item_object=item)
 
     journal, done = Journal(), []
     stopped: SiloError | None = None

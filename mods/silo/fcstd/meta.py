@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Document.xml with one more item in the document's ``Meta`` map; every other byte of it stays.
+"""Document.xml with an identity in the document's ``Meta`` map, and on an object; all other bytes stay.
 
 Where things are is asked of expat, so comments, other quotes and another order of attributes do no harm.
 """
@@ -13,6 +13,10 @@ from silo.fcstd import careful
 from silo.fcstd.careful import Malformed, Node
 
 _MORE = {'"': "&quot;", "'": "&apos;", "\n": "&#10;", "\r": "&#13;", "\t": "&#9;"}
+_ITEM_ID = (
+    b'<Property name="SiloItemId" type="App::PropertyString" group="Silo" doc="Identity of the item in Silo"'
+    b' attr="0" ro="0" hide="0">\n                    <String value="%s"/>\n                </Property>'
+)
 _COUNT = re.compile(rb"""(<Properties\b[^<>]*?\sCount\s*=\s*["'])(\d+)(["'])""")
 
 
@@ -33,6 +37,32 @@ def with_meta(text: bytes, key: str, value: str, depth_limit: int) -> bytes:
         element = element[:first] + _property(element[first:last], items) + element[last:]
     else:
         element = _with_property(element, {key: value})
+    return text[:begin] + element + text[end:]
+
+
+def with_item_id(text: bytes, object_name: str, value: str, depth_limit: int) -> bytes:
+    """The text with the property ``SiloItemId`` on an object, as the add-on writes it there.
+
+    Raises ValueError where it cannot be edited (says why).
+    """
+    _, data = careful.index_document(text, depth_limit)
+    if object_name not in data:
+        raise Malformed(f"has no data of the object {object_name!r}")
+    begin, end = data[object_name]
+    element = text[begin:end]
+    spans = careful.index_properties(element, depth_limit)
+    if not spans:
+        raise Malformed(f"has no properties of the object {object_name!r}")
+    prop = _ITEM_ID % escape(value, _MORE).encode()
+    if "SiloItemId" in spans:
+        first, last = spans["SiloItemId"]
+        element = element[:first] + prop + element[last:]
+    else:
+        # Before the first property stands the start of their list, whatever stood before that.
+        start = element.rindex(b"<Properties", 0, min(span[0] for span in spans.values()))
+        close = max(span[1] for span in spans.values())
+        head = _COUNT.sub(lambda m: m[1] + b"%d" % (int(m[2]) + 1) + m[3], element[start:close], count=1)
+        element = element[:start] + head + b"\n                " + prop + element[close:]
     return text[:begin] + element + text[end:]
 
 

@@ -18,7 +18,7 @@ from silo.fcstd.container import ContainerFile, Entry, FileState
 from silo.fcstd.edit import changed, check_writable, edited_xml, replace_file
 from silo.fcstd.library import Library
 from silo.fcstd.limits import Limits
-from silo.fcstd.meta import with_meta
+from silo.fcstd.meta import with_item_id, with_meta
 from silo.fcstd.rewrite import replaced_entry
 
 _LONGEST = 200
@@ -29,6 +29,7 @@ def stamp(
     identity: str,
     *,
     object_name: str | None = None,
+    item_object: str | None = None,
     replace: bool = False,
     limits: Limits | None = None,
 ) -> bool:
@@ -37,6 +38,9 @@ def stamp(
     object_name
         the object that the identity is for, where one file gives several parts: ``Meta["SiloUUID/<Name>"]``;
         None: the whole document, ``Meta["SiloUUID"]``.
+    item_object
+        the object that is the component: it gets the property ``SiloItemId`` too, by which a Silo finds the
+        documents that are its own.
     replace
         write over another identity of the same key.
 
@@ -49,16 +53,20 @@ def stamp(
     key = meta_key(object_name or "")
     with ContainerFile(real, limits) as container:
         state = container.state
-        if _present(real, state, identity, object_name, replace, limits):
+        if _present(real, state, identity, object_name, replace, limits, item_object):
             return False
         check_writable(real)
-        content = replaced_entry(container, *_stamped_xml(container, key, identity, limits))
+        content = replaced_entry(container, *_stamped_xml(container, key, identity, limits, item_object))
     replace_file(real, state, content, lambda copy: _read_back(real, copy, key, identity))
     return True
 
 
 def check_stampable(
-    path: Path | str, *, object_name: str | None = None, limits: Limits | None = None
+    path: Path | str,
+    *,
+    object_name: str | None = None,
+    item_object: str | None = None,
+    limits: Limits | None = None,
 ) -> None:
     """Raise the DocumentError that :func:`stamp` would raise for a new identity; changes nothing.
 
@@ -67,9 +75,9 @@ def check_stampable(
     real = os.path.realpath(path)
     limits = limits or Limits()
     with ContainerFile(real, limits) as container:
-        _present(real, container.state, "", object_name, False, limits)
+        _present(real, container.state, "", object_name, False, limits, item_object)
         check_writable(real)
-        _stamped_xml(container, meta_key(object_name or ""), "0" * 36, limits)
+        _stamped_xml(container, meta_key(object_name or ""), "0" * 36, limits, item_object)
 
 
 def _check_identity(path: str, identity: str) -> None:
@@ -81,18 +89,26 @@ def _check_identity(path: str, identity: str) -> None:
 
 
 def _present(
-    path: str, state: FileState, identity: str, object_name: str | None, replace: bool, limits: Limits
+    path: str,
+    state: FileState,
+    identity: str,
+    object_name: str | None,
+    replace: bool,
+    limits: Limits,
+    item_object: str | None,
 ) -> bool:
     """True where the file carries the identity already. Raises DocumentError where it carries another."""
     with Library(limits=limits) as library:
         document = library.open(path)
         if document.state != state:
             raise changed(path)
-        obj = None if object_name is None else document.getObject(object_name)
-        if object_name is not None and obj is None:
-            raise DocumentError(path, f"it holds no object named {object_name!r}")
-        owner = document if obj is None else obj
-        for name in ("SiloUUID",) if obj is None else ("SiloItemId", "SiloUUID"):
+        places: list[tuple[object, str]] = [] if object_name is not None else [(document, "SiloUUID")]
+        for wanted in dict.fromkeys(filter(None, (object_name, item_object))):
+            obj = document.getObject(wanted)
+            if obj is None:
+                raise DocumentError(path, f"it holds no object named {wanted!r}")
+            places += [(obj, "SiloItemId"), (obj, "SiloUUID")]
+        for owner, name in places:
             # A property of its own goes before Meta, so Meta would have no effect beside another one.
             own = _property(owner, name)
             if own and own.lower() != identity.lower():
@@ -110,9 +126,16 @@ def _property(owner: object, name: str) -> str:
     return value.strip() if isinstance(value, str) else ""
 
 
-def _stamped_xml(container: ContainerFile, key: str, identity: str, limits: Limits) -> tuple[Entry, bytes]:
+def _stamped_xml(
+    container: ContainerFile, key: str, identity: str, limits: Limits, item_object: str | None
+) -> tuple[Entry, bytes]:
     """The entry Document.xml, and its content as it is to become."""
-    return edited_xml(container, lambda text: with_meta(text, key, identity, limits.depth), limits)
+
+    def edit(text: bytes) -> bytes:
+        stamped = with_meta(text, key, identity, limits.depth)
+        return with_item_id(stamped, item_object, identity, limits.depth) if item_object else stamped
+
+    return edited_xml(container, edit, limits)
 
 
 def _read_back(path: str, temporary: str, key: str, identity: str) -> None:
