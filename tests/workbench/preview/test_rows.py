@@ -233,3 +233,31 @@ def _known(extraction: Extraction, uuids: dict[str, str]) -> Extraction:
 
 def _last(row: Row) -> Row:
     return _last(row.children[-1]) if row.children else row
+
+
+def test_a_missing_component_is_a_row_of_its_own_kind(tmp_path: Path) -> None:
+    """With its quantity and where it should be; the line that the server knows it by stays."""
+    from silo.testing import FakeSilo
+
+    silo = FakeSilo()
+    uuids = {}
+    for name in ("Top", "Lid", "Pin"):
+        uuids[name] = silo.create_item("kindred-rd", "M01", name, item_type="part", properties={}).id
+    top = BomEntry(str(tmp_path / "top.FCStd"), uuids["Top"], object_name="Assembly", is_assembly=True)
+    known = [
+        BomEntry(str(tmp_path / f"{name}.FCStd"), uuids[name], quantity=2, object_name="Body")
+        for name in ("Lid", "Pin")
+    ]
+    from silo.bom_sync import resolve, sync
+
+    sync(resolve(Extraction(top, tuple(known)), silo), silo, sync_id="one")
+    lost = replace(known[0], silo_uuid=None, missing=True, label="Lid")
+    preview = ask(
+        Snapshot(top.doc_path, "top", top.silo_uuid, Extraction(top, (lost, known[1]))), silo, CONTROL
+    )
+    kinds = {(row.kind, row.name, row.cad, row.silo) for row in rows(preview)}
+    assert (Kind.MISSING, "Lid", "2", "") in kinds
+    assert (Kind.MISSING, "Lid", "", "2") in kinds
+    assert (Kind.UNCHANGED, "Pin", "2", "2") in kinds
+    assert next(row.note for row in rows(preview)) == "missing: Lid.FCStd#Body"
+    assert summary(preview) == "1 missing"

@@ -117,6 +117,13 @@ def _status_lines(sent: Sent) -> tuple[Line, ...]:
             "Silo", "{n} items in the Silo BOM are not referenced by components in this assembly."
         )
         lines.append(Line(counted(removed, one, many), Tone.WARNING))
+    missing = sum(entry.missing for entry in sent.resolved.entries) if sent.resolved is not None else 0
+    if missing:
+        one = translate("Silo", "Incomplete: {n} component is missing; its known line stays as it is.")
+        many = translate(
+            "Silo", "Incomplete: {n} components are missing; their known lines stay as they are."
+        )
+        lines.append(Line(counted(missing, one, many), Tone.WARNING))
     if sent.status is Status.BLOCKED:
         text = translate("Silo", "The file is in Silo. The BOM waits until these are mended:")
         lines.append(Line(text, Tone.ERROR))

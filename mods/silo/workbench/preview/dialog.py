@@ -24,6 +24,7 @@ _TONES = {
     Kind.UNREFERENCED: Tone.WARNING,
     Kind.MANUAL: Tone.QUIET,
     Kind.UNREGISTERED: Tone.WARNING,
+    Kind.MISSING: Tone.ERROR,
     Kind.NOT_COUNTED: Tone.PLAIN,
 }
 _SIGNS = {
@@ -33,6 +34,7 @@ _SIGNS = {
     Kind.UNREFERENCED: "⚠",
     Kind.MANUAL: "✎",
     Kind.UNREGISTERED: "?",
+    Kind.MISSING: "✗",
     Kind.UNCHANGED: "=",
 }
 

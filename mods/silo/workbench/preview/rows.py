@@ -35,6 +35,7 @@ class Kind(StrEnum):
     MANUAL = "manual"
     UNCHANGED = "unchanged"
     UNREGISTERED = "unregistered"
+    MISSING = "missing"
     NOT_COUNTED = "not counted"
     GROUP = "group"
 
@@ -114,8 +115,10 @@ class Preview:
 def ask(snapshot: Snapshot, api: Any, control: Control) -> Preview:
     """Compare a snapshot with the server, sub-assemblies included. Worker."""
     from silo.bom_sync import assemblies, blocking, names_of, resolve, server_lines
+    from silo.fcstd.suggest import with_suggestions
 
     extraction = snapshot.extraction or Extraction(BomEntry(snapshot.path, label=snapshot.label))
+    extraction = with_suggestions(extraction)
     whole = resolve(extraction, api)
     compared = []
     for one in assemblies(whole):
@@ -184,10 +187,13 @@ def _assembly_rows(
     above = above | {one.resolved.assembly.key}
     for entry in one.resolved.entries:
         kind, silo, note = states.get(entry.part_number or "", (Kind.UNCHANGED, "", ""))
+        if entry.missing:
+            base = os.path.dirname(one.resolved.assembly.doc_path)
+            kind, note = Kind.MISSING, _missing_words(relative(entry.doc_path, base), entry.object_name)
         yield Row(
             kind,
             number=entry.part_number or "",
-            name=entry.name or "",
+            name=entry.name or (display_name(entry) if entry.missing else ""),
             cad=quantity(entry.quantity),
             silo=silo,
             note=note,
@@ -196,7 +202,11 @@ def _assembly_rows(
             children=tuple(_below(entry, known, names, above, share)),
         )
     local = {entry.part_number for entry in one.resolved.entries}
-    for kind, changes in ((Kind.UNREFERENCED, one.diff.removed), (Kind.MANUAL, one.diff.manual)):
+    for kind, changes in (
+        (Kind.UNREFERENCED, one.diff.removed),
+        (Kind.MISSING, one.diff.kept),
+        (Kind.MANUAL, one.diff.manual),
+    ):
         for change in changes:
             if change.part_number not in local:
                 number, amount = change.part_number, quantity(change.quantity)
@@ -228,6 +238,8 @@ def _states(diff: BomDiff) -> dict[str, tuple[Kind, str, str]]:
         states[change.part_number] = (Kind.CHANGED, quantity(change.remote_quantity), notes[Kind.CHANGED])
     for change in diff.conflicts:
         states[change.part_number] = (Kind.CONFLICT, quantity(change.remote_quantity), notes[Kind.CONFLICT])
+    for line in diff.kept:
+        states[line.part_number] = (Kind.MISSING, quantity(line.quantity), notes[Kind.MISSING])
     return states
 
 
@@ -238,7 +250,13 @@ def _notes() -> dict[Kind, str]:
         Kind.CONFLICT: translate("Silo", "manual line in Silo with another quantity: a person decides there"),
         Kind.UNREFERENCED: translate("Silo", "not in the assembly: kept, marked unreferenced"),
         Kind.MANUAL: translate("Silo", "manual line: not touched"),
+        Kind.MISSING: translate("Silo", "its file is missing: the line stays as it is"),
     }
+
+
+def _missing_words(file: str, name: str) -> str:
+    text = translate("Silo", "missing: {file}")
+    return text.replace("{file}", f"{file}#{name}" if name else file)
 
 
 def _unregistered_row(entry: BomEntry, base: str, children: tuple[Row, ...]) -> Row:
@@ -281,6 +299,7 @@ def summary(preview: Preview) -> str:
         (len(diff.removed), translate("Silo", "{n} unreferenced")),
         (len(diff.conflicts), translate("Silo", "{n} in conflict")),
         (len(preview.top.resolved.unresolved), translate("Silo", "{n} without a part number")),
+        (sum(entry.missing for entry in preview.top.resolved.entries), translate("Silo", "{n} missing")),
     )
     told = [text.replace("{n}", str(count)) for count, text in parts if count]
     if not told:

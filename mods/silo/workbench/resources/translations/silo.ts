@@ -538,6 +538,16 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../pane/entries.py" />
+            <source>Incomplete: {n} component is missing; its known line stays as it is.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <source>Incomplete: {n} components are missing; their known lines stay as they are.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
             <source>The file is in Silo. The BOM waits until these are mended:</source>
             <translation type="unfinished" />
         </message>
@@ -813,6 +823,16 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../preview/rows.py" />
+            <source>its file is missing: the line stays as it is</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>missing: {file}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
             <source>{n} to add</source>
             <translation type="unfinished" />
         </message>
@@ -834,6 +854,11 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../preview/rows.py" />
             <source>{n} without a part number</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/rows.py" />
+            <source>{n} missing</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -990,6 +1015,11 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../register/rows.py" />
             <source>Tool</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Standard part: {name}</source>
             <translation type="unfinished" />
         </message>
         <message>
