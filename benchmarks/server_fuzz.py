@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Schemathesis against a server of its own for ten minutes: all phases, valid and invalid data, stateful.
+
+    python benchmarks/server_fuzz.py [sqlite] [postgres] [--seconds S] [--seed N]
+
+No answer may be a 5xx but an honest 503, and every answer must be one that the OpenAPI document has, with its
+type and its body. What it calls valid and is refused, and the other way round, is listed at the end
+(``positive_data_acceptance``, ``negative_data_rejection``). The stream, which never ends, the mode and the
+caller's own account are left out: a run that closes its own server finds nothing more.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
+
+from server_testing import Api, Databases, ServerProcess, bom
+
+TOKEN = "silo_benchmark_fuzz"
+CHECKS = (
+    "not_a_server_error,status_code_conformance,content_type_conformance,response_schema_conformance,"
+    "positive_data_acceptance,negative_data_rejection"
+)
+LEFT_OUT = ("/api/events", "/api/admin/mode", "/api/auth/logout", "/api/auth/tokens/{token_id}")
+
+
+def main() -> int:
+    """Both databases, or the one that is named."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("kinds", nargs="*", help="sqlite, postgres; both where none is named")
+    parser.add_argument("--seconds", type=int, default=600)
+    parser.add_argument("--seed", type=int, default=1)
+    args = parser.parse_args()
+    bad = 0
+    for kind in args.kinds or ["sqlite", "postgres"]:
+        with tempfile.TemporaryDirectory() as folder:
+            databases = Databases(Path(folder))
+            with (
+                ServerProcess(databases.new(kind), Path(folder) / "files", TOKEN) as server,
+                Api(server.base_url, TOKEN) as api,
+            ):
+                top, sub, leaf = (api.item(number) for number in ("TOP", "SUB", "LEAF"))
+                api.merge(top, {sub: 2, leaf: 1})
+                api.good("POST", bom(sub), {"child_part_number": leaf})
+                print(f"{kind}: {args.seconds} s", flush=True)
+                command = [
+                    *[str(Path(sys.executable).with_name("schemathesis")), "run"],
+                    f"{server.base_url}/api/openapi.json",
+                    *["-H", f"Authorization: Bearer {TOKEN}", "--mode", "all", "--checks", CHECKS],
+                    *["--phases", "examples,coverage,fuzzing,stateful", "--max-time", str(args.seconds)],
+                    *["--continue-on-failure", "--seed", str(args.seed), "--generation-database", "none"],
+                    *["--request-timeout", "30", "--suppress-health-check", "all", "--no-color"],
+                    *[word for path in LEFT_OUT for word in ("--exclude-path", path)],
+                ]
+                bad += subprocess.run(command, cwd=folder, check=False).returncode != 0
+            databases.close()
+    return 1 if bad else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
