@@ -67,7 +67,7 @@ class Desk:
             schema = client.find_schema("kindred-rd")
             proposals = proposals_for(extraction, client, schema)
             options = {"ask": ask} if ask else {}
-            done = register_all(proposals, extraction, client, schema=schema, **options)
+            done = register_all(proposals, client, schema=schema, **options)
         return [result.error for result in done if result.error is not None]
 
     def take(self) -> list[SiloError]:
