@@ -31,6 +31,7 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(DBAPIError, _database_error)
     app.add_exception_handler(TimeoutError, _database_error)
     app.add_exception_handler(UnicodeEncodeError, _unicode_error)
+    app.add_exception_handler(OSError, _disk_error)
     app.add_exception_handler(ClientDisconnect, _disconnected)
     app.add_exception_handler(Exception, _fault)
 
@@ -115,6 +116,13 @@ async def _fault(request: Request, error: Exception) -> Response:
     return error_answer(
         500, "server_fault", f"the server made a mistake; its log says more about the request {number}"
     )
+
+
+async def _disk_error(request: Request, error: Exception) -> Response:
+    assert isinstance(error, OSError)
+    logger.error("request %s: the disk: %s", info_of(request.scope).id, error)
+    busy = BusyError("a file cannot be written or read at the moment; nothing was changed, try again later")
+    return await _silo_error(request, busy)
 
 
 async def _disconnected(request: Request, error: Exception) -> Response:

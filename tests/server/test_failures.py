@@ -31,6 +31,7 @@ def server(tmp_path: Path) -> Iterator[RunningServer]:
         (OperationalError("SELECT secret inside", {}, Exception("x")), 503, "busy"),
         (DataError("INSERT secret inside", {}, Exception("x")), 400, "rejected"),
         (IntegrityError("INSERT secret inside", {}, Exception("x")), 409, "conflict"),
+        (OSError(28, "No space left on secret"), 503, "busy"),
         (UnicodeEncodeError("utf-8", "secret inside", 0, 1, "lone"), 400, "rejected"),
     ],
 )

@@ -173,14 +173,16 @@ def _postgres_engine(settings: Settings, connections: int, seconds: float | None
     """``seconds``: how long one statement may take, None = as long as it takes."""
     from silo_server.db.patience import connect
 
-    arguments: dict[str, Any] = {"connect_timeout": CONNECT_SECONDS}
+    # Compiling a query costs more than any of ours takes.
+    options = ["-c jit=off"]
     if seconds is not None:
         milliseconds = {
             "statement_timeout": seconds,
             "lock_timeout": WAIT_SECONDS,
             "idle_in_transaction_session_timeout": seconds,
         }
-        arguments["options"] = " ".join(f"-c {k}={int(v * 1000)}" for k, v in milliseconds.items())
+        options += [f"-c {k}={int(v * 1000)}" for k, v in milliseconds.items()]
+    arguments = {"connect_timeout": CONNECT_SECONDS, "options": " ".join(options)}
     engine = create_engine(
         settings.sqlalchemy_url,
         pool_size=connections,

