@@ -6,13 +6,13 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
 from silo.platform import patiently, sync_folder
 
-__all__ = ["replace_patiently", "replacing", "sync_folder"]
+__all__ = ["remove_patiently", "replace_patiently", "replacing", "sync_folder"]
 
 
 @contextmanager
@@ -34,7 +34,8 @@ def replacing(path: Path | str, *, mode: int | None = None) -> Iterator[BinaryIO
             os.chmod(temporary, mode)
         replace_patiently(temporary, target)
     except BaseException:
-        Path(temporary).unlink(missing_ok=True)
+        with suppress(OSError):  # the first error is the one to report
+            remove_patiently(temporary)
         raise
     sync_folder(target.parent)
 
@@ -42,3 +43,8 @@ def replacing(path: Path | str, *, mode: int | None = None) -> Iterator[BinaryIO
 def replace_patiently(source: Path | str, target: Path | str) -> None:
     """``os.replace``, which on Windows waits for a program that has the target open. Raises OSError."""
     patiently(lambda: os.replace(source, target))
+
+
+def remove_patiently(path: Path | str) -> None:
+    """Delete a file, which on Windows waits for a program that has it open; none there is fine. OSError."""
+    patiently(lambda: Path(path).unlink(missing_ok=True))

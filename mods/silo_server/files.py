@@ -12,11 +12,12 @@ import tempfile
 import zipfile
 import zlib
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import IO
 
 from silo.bom.errors import NotFoundError
-from silo.durable import replace_patiently, sync_folder
+from silo.durable import remove_patiently, replace_patiently, sync_folder
 from silo_server.services.revisions import StoredFile
 
 CHUNK = 1024 * 1024
@@ -87,14 +88,14 @@ class FileStore:
         os.close(handle)
         aside = Path(name)
         try:
-            os.replace(path, aside)
+            replace_patiently(path, aside)
         except FileNotFoundError:
-            aside.unlink()
+            remove_patiently(aside)
             return False
         if _came_before(aside, before):
-            aside.unlink()
+            remove_patiently(aside)
             return True
-        os.replace(aside, path)
+        replace_patiently(aside, path)
         return False
 
     def state(self, wanted: int) -> str:
@@ -144,7 +145,8 @@ class FileStore:
                     raise
             sync_folder(target.parent)
         finally:
-            temporary.unlink(missing_ok=True)
+            with suppress(OSError):  # what is left over is collected later
+                remove_patiently(temporary)
         return digest.hexdigest(), size
 
 

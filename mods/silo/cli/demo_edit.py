@@ -12,6 +12,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from silo.bom.errors import DocumentError
+from silo.durable import replace_patiently
 
 DOCUMENT_XML = "Document.xml"
 
@@ -77,4 +78,4 @@ def _edit(path: Path, edit: Callable[[ElementTree.Element], None]) -> None:
                 edit(document)
                 content = ElementTree.tostring(document, encoding="utf-8", xml_declaration=True)
             archive.writestr(info, content)
-    new.replace(path)
+    replace_patiently(new, path)

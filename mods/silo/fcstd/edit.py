@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable
 from typing import BinaryIO
 
 from silo.bom.errors import DocumentError
-from silo.durable import replace_patiently, sync_folder
+from silo.durable import remove_patiently, replace_patiently, sync_folder
 from silo.fcstd.container import DOCUMENT_XML, ContainerFile, Entry, FileState
 from silo.fcstd.inflate import Inflater
 from silo.fcstd.limits import Limits
@@ -96,7 +96,7 @@ def _write(path: str, state: FileState, content: Iterable[Piece], check: Callabl
         replace_patiently(temporary, path)
     except BaseException:
         with contextlib.suppress(OSError):
-            os.unlink(temporary)
+            remove_patiently(temporary)
         raise
     sync_folder(folder)
 

@@ -29,7 +29,7 @@ from typing import Any
 from silo.api.address import canonical
 from silo.bom.errors import ConflictError, DocumentError, InputError
 from silo.bom.snapshot import to_plain
-from silo.durable import replacing
+from silo.durable import remove_patiently, replacing
 from silo.files import content_hash
 from silo.folders import data_folder
 from silo.outbox.database import Database, insert
@@ -279,7 +279,7 @@ class Store(Database):
             for file in files:
                 if file.name.split(".")[0] not in keys:
                     with suppress(OSError):
-                        file.unlink()
+                        remove_patiently(file)
             for folder in held:
                 if folder.name not in keys and self.clock() - folder.stat().st_mtime > _HELD_AGE:
                     shutil.rmtree(folder, ignore_errors=True)
@@ -299,7 +299,7 @@ class Store(Database):
         """Remove what the row had; what cannot be removed now is swept up later."""
         if entry.copy:
             with suppress(OSError):
-                (self.copies / entry.copy).unlink(missing_ok=True)
+                remove_patiently(self.copies / entry.copy)
         shutil.rmtree(self._held / entry.key, ignore_errors=True)
 
     def _one(self, where: str, *values: Any) -> Entry | None:

@@ -22,7 +22,7 @@ from typing import Any
 
 from silo.bom.errors import InputError
 from silo.bom.report import relative
-from silo.durable import replacing
+from silo.durable import remove_patiently, replacing
 from silo.files import content_hash
 from silo.folders import cache_folder
 from silo.inertia.geometry import store
@@ -128,7 +128,7 @@ class Cache:
         for _, one, path in sorted(kept):
             if size <= self.max_bytes:
                 return
-            path.unlink(missing_ok=True)
+            remove_patiently(path)
             size -= one
 
     def _path(self, key: str) -> Path:
