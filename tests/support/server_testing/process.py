@@ -32,6 +32,11 @@ class ServerProcess:
         assert first.startswith("Silo server: "), f"the server did not start: {first!r}"
         self.base_url = first.removeprefix("Silo server: ").strip()
 
+    @property
+    def pid(self) -> int:
+        """Its process id."""
+        return self._process.pid
+
     def __enter__(self) -> Self:
         return self
 

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""A server under mixed load for hours: does anything grow that should not?
+
+    python benchmarks/server_soak.py [sqlite|postgres] [--minutes 30] [--restarts 2]
+
+Editors merge, edit, undo, import, upload and search; listeners come and go; the server is restarted now and
+then. Twelve times in each third memory, descriptors, threads, the write-ahead log, rows of what housekeeping
+bounds, and latencies are taken. Ends with an error where the last third's median is above the first's by more
+than a quarter (and by more than a noise that is named below), or where an answer was no honest one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import random
+import re
+import statistics
+import sys
+import tempfile
+import threading
+import time
+from collections import defaultdict
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
+
+from server_testing import Api, Databases, ServerProcess, bom, form_body, merge_body
+
+TOKEN = "silo_soak"
+EDITORS = 4
+HONEST = {200, 201, 204, 409, 412, 503}
+# What a measure may differ by without meaning anything: MB, files, threads, MB, rows, ms.
+NOISE = {"memory": 20.0, "descriptors": 10, "threads": 5, "wal": 8.0, "events": 300, "latency": 20.0}
+
+
+def main() -> None:
+    """Load, sample, compare the thirds."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("kind", nargs="?", default="sqlite", choices=["sqlite", "postgres"])
+    parser.add_argument("--minutes", type=float, default=30.0)
+    parser.add_argument("--restarts", type=int, default=2)
+    args = parser.parse_args()
+    samples: dict[str, list[float]] = defaultdict(list)
+    bad: list[str] = []
+    with tempfile.TemporaryDirectory() as name:
+        databases = Databases(Path(name))
+        url = databases.new(args.kind)
+        lives = args.restarts + 1
+        for _ in range(lives):
+            # Each life is judged by itself: a restart frees what a process had taken.
+            life(url, Path(name) / "files", args.minutes * 60 / lives, samples, bad)
+        databases.close()
+    for what, values in samples.items():
+        per_life = len(values) // lives
+        for number in range(lives):
+            one = values[number * per_life : (number + 1) * per_life]
+            third = max(1, len(one) // 3)
+            first, last = statistics.median(one[:third]), statistics.median(one[-third:])
+            print(f"{what:12} life {number + 1}: first third {first:10.1f}, last third {last:10.1f}")
+            if last > first * 1.25 and last - first > NOISE[what]:
+                bad.append(f"{what} grows: {first:.1f} to {last:.1f}")
+    if bad:
+        sys.exit("\n".join(sorted(set(bad))))
+
+
+def life(url: str, files: Path, seconds: float, samples: dict[str, list[float]], bad: list[str]) -> None:
+    """One process under load for so long."""
+    bounds = {"SILO_EVENT_LOG_SIZE": "500", "SILO_HOUSEKEEPING_SECONDS": "5"}
+    ending = threading.Event()
+    times: list[float] = []
+    with ServerProcess(url, files, TOKEN, **bounds) as server, Api(server.base_url, TOKEN) as api:
+        items = api.items(60)
+        threads = [
+            threading.Thread(target=edit, args=(server.base_url, items, ending, times, bad, n))
+            for n in range(EDITORS)
+        ]
+        threads += [threading.Thread(target=listen, args=(server.base_url, ending)) for _ in range(3)]
+        for thread in threads:
+            thread.start()
+        # The caches of the first moments are no leak.
+        time.sleep(seconds * 0.1)
+        for _ in range(36):
+            time.sleep(seconds * 0.9 / 36)
+            look(server, api, samples)
+            recent, times[:] = list(times), []
+            samples["latency"].append(statistics.median(recent) * 1000 if recent else 0.0)
+        ending.set()
+        for thread in threads:
+            thread.join()
+
+
+def look(server: ServerProcess, api: Api, samples: dict[str, list[float]]) -> None:
+    """Take one sample."""
+    process = Path("/proc") / str(server.pid)
+    status = (process / "status").read_text()
+    samples["memory"].append(int(status.partition("VmRSS:")[2].split()[0]) / 1024)
+    samples["threads"].append(int(status.partition("Threads:")[2].split()[0]))
+    samples["descriptors"].append(len(os.listdir(process / "fd")))
+    text = api.call("GET", "/metrics").body.decode()
+    samples["events"].append(number_in(text, "silo_events_kept"))
+    samples["wal"].append(number_in(text, "silo_database_wal_bytes") / 1e6)
+
+
+def number_in(text: str, name: str) -> float:
+    """A gauge of the metrics; 0 where it is not there."""
+    found = re.search(rf"^{name} (\S+)$", text, re.MULTILINE)
+    return float(found[1]) if found else 0.0
+
+
+def edit(
+    url: str, items: list[str], ending: threading.Event, times: list[float], bad: list[str], seed: int
+) -> None:
+    """What an editor does all day."""
+    chance = random.Random(seed)
+    with Api(url, TOKEN) as api:
+        while not ending.is_set():
+            parent, *children = chance.sample(items, 12)
+            started = time.perf_counter()
+            what = chance.randrange(6)
+            if what < 2:
+                entries = {child: chance.randint(1, 9) for child in children if child > parent}
+                answer = api.call("POST", bom(parent, "merge"), merge_body(entries))
+            elif what == 2:
+                answer = api.call("GET", f"/api/items/search?q={parent[:6]}")
+            elif what == 3:
+                answer = api.call("GET", bom(parent, "expanded"))
+            elif what == 4:
+                body, headers = form_body({"file": ("a.FCStd", chance.randbytes(2000)), "comment": "soak"})
+                answer = api.call("POST", f"/api/items/{parent}/file", body=body, headers=headers)
+            else:
+                answer = api.call("PUT", f"/api/items/{parent}", {"name": f"name {chance.random()}"})
+            times.append(time.perf_counter() - started)
+            if answer.status not in HONEST:
+                bad.append(f"status {answer.status}: {answer.body[:200]!r}")
+
+
+def listen(url: str, ending: threading.Event) -> None:
+    """Come, hear some events, go, come again."""
+    with Api(url, TOKEN) as api:
+        while not ending.is_set():
+            with api.events() as stream:
+                for _ in range(20):
+                    if ending.is_set():
+                        break
+                    stream.next()
+
+
+if __name__ == "__main__":
+    main()
