@@ -67,6 +67,12 @@ def own(obj: object, name: str, default: Any = None) -> Any:
     return value if names is None or name in names else default
 
 
+def property_names(obj: object) -> frozenset[str] | tuple[str, ...] | None:
+    """The names of the object's own properties, to be used as a key; None where it does not say."""
+    names: Sequence[str] | frozenset[str] | None = getattr(obj, "PropertiesList", None)
+    return names if names is None or isinstance(names, tuple | frozenset) else tuple(names)
+
+
 def same_document(a: object, b: object) -> bool:
     """True where both are one document: the same object, or two objects of one file."""
     # Not by ==, which plain objects that hold each other do for ever; FreeCAD has one object per document.

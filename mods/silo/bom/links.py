@@ -114,6 +114,8 @@ class _Walker:
         self._rings = Rings({})
         self._memo: dict[tuple[Key, int, Key], tuple[BomEntry, ...]] = {}
         self._heads: dict[Key, BomEntry] = {}
+        # Kept with their objects, so that ids stay theirs.
+        self._components: dict[int, tuple[Any, Key]] = {}
         self._containers: dict[Key, bool] = {}
         self._nameless: dict[int, list[Any]] = {}
 
@@ -129,6 +131,13 @@ class _Walker:
         """
         if isinstance(obj, Lost):
             return (self._canonical_path(obj.file), obj.name)
+        if (known := self._components.get(id(obj))) is not None:
+            return known[1]
+        key = self._component(obj)
+        self._components[id(obj)] = (obj, key)
+        return key
+
+    def _component(self, obj: Any) -> Key:
         path, name = key = self._reader.component(obj)
         if not path or not name.startswith(NAMELESS):
             return key

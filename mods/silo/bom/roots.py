@@ -248,11 +248,14 @@ def loose_hardware(container: Any, reader: Reader, whole: Whole = as_it_is) -> l
         return []
     document = whole(container.Document)
     objects = list(getattr(document, "Objects", ()) or ())
-    if not any(kind_of(obj) is Kind.STANDARD for obj in objects):
+    if not any(getattr(obj, "TypeId", "").endswith("FeaturePython") for obj in objects):
         return []
-    spares = [obj for obj in objects if object_name(obj) == "Parts" and kind_of(obj) is Kind.FOLDER]
+    kinds = [(obj, kind_of(obj)) for obj in objects]
+    if not any(kind is Kind.STANDARD for _, kind in kinds):
+        return []
+    spares = [obj for obj, kind in kinds if kind is Kind.FOLDER and object_name(obj) == "Parts"]
     inside = _members_of(objects, _CONTAINERS) | _members_of(spares, _FOLDERS) | _sources_of(objects)
-    loose = [obj for obj in objects if kind_of(obj) in _HARDWARE and object_name(obj) not in inside]
+    loose = [obj for obj, kind in kinds if kind in _HARDWARE and object_name(obj) not in inside]
     loose = [obj for obj in loose if _is_hardware(obj, reader)]
     if not loose:
         return []

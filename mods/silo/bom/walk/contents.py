@@ -85,13 +85,13 @@ class Reader:
             self._not_components[key] = no_component(target)
         return self._not_components[key]
 
-    def standard(self, obj: Any) -> tuple[str, bool]:
+    def standard(self, obj: Any, key: Key | None = None) -> tuple[str, bool]:
         """The designation of a standard part, "" for anything else; and whether it is an item of its own.
 
         It is where somebody registered that very object. What identifies the document it lies in is that of
         the part beside it, except where there is none.
         """
-        key = self.key(obj)
+        key = key or self.key(obj)
         known = self._designations.get(key)
         if known is None:
             text = designation(obj)
@@ -100,8 +100,9 @@ class Reader:
 
     def component(self, obj: Any) -> Key:
         """What tells one component from another: of standard parts their designation, of others the key."""
-        text, registered = self.standard(obj)
-        return (STANDARD_PARTS, text) if text and not registered else self.key(obj)
+        key = self.key(obj)
+        text, registered = self.standard(obj, key)
+        return (STANDARD_PARTS, text) if text and not registered else key
 
 
 def _is_registered(fastener: Any) -> bool:

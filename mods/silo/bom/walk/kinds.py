@@ -9,9 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from enum import Enum, auto
+from functools import lru_cache
 from typing import Any, TypeVar
 
-from silo.bom.document import derived, object_name, own
+from silo.bom.document import derived, object_name, own, property_names
 from silo.bom.walk.standard import fastener_type, is_tool
 from silo.bom.walk.targets import first_of, is_assembly_link, is_link
 
@@ -50,6 +51,8 @@ _NO_FOLDERS = (
 )
 # Draft arrays without links have no count before FreeCAD 1.0, those along paths and points have no type.
 _ARRAY_MARKS = ("Count", "ArrayType", "PathObject", "PointObject")
+_ASSEMBLY3 = ("BuildShape", "Freeze", "Group")
+_ASKED_FOR = (*_ARRAY_MARKS, *_ASSEMBLY3, "Base", "sourceFile", "a2p_Version", "Objects", "Fuse", "Scale")
 _NO_GEOMETRY = ("Part::Part2DObject", "Part::Datum", "PartDesign::SubShapeBinder", "App::DatumElement")
 _GEOMETRY = ("Part::Feature", "Mesh::Feature", "Points::Feature")
 # What a link may point at without meaning a component, in words for people. (A binder has a shape.)
@@ -107,15 +110,25 @@ def kind_of(obj: object) -> Kind:
 
 
 def _python_kind(obj: object) -> Kind:
-    if has_own(obj, "Base") and any(has_own(obj, name) for name in _ARRAY_MARKS):
+    names = property_names(obj)
+    if names is None:
+        names = tuple(name for name in _ASKED_FOR if hasattr(obj, name))
+    return _kind_by_names(names) or _standard_kind(obj) or Kind.LOCAL
+
+
+@lru_cache(maxsize=1024)
+def _kind_by_names(names: frozenset[str] | tuple[str, ...]) -> Kind | None:
+    """What a Python object with these properties is; None for one that they do not tell."""
+    has = frozenset(names).issuperset
+    if has(("Base",)) and not frozenset(names).isdisjoint(_ARRAY_MARKS):
         return Kind.DRAFT_ARRAY
-    if has_own(obj, "sourceFile", "a2p_Version"):
+    if has(("sourceFile", "a2p_Version")):
         return Kind.FOREIGN
-    if is_assembly3(obj):
+    if has(_ASSEMBLY3):
         return Kind.CONTAINER
-    if has_own(obj, "Objects") and (has_own(obj, "Fuse") or has_own(obj, "Scale")):
+    if has(("Objects", "Fuse")) or has(("Objects", "Scale")):
         return Kind.COPY  # a Draft clone
-    return _standard_kind(obj) or Kind.LOCAL
+    return None
 
 
 def _standard_kind(obj: object) -> Kind | None:
@@ -136,7 +149,7 @@ def sources(repeater: object) -> list[Any]:
 
 def is_assembly3(obj: object) -> bool:
     """An Assembly3 container: ``Group`` = [constraints, elements, parts]; only its parts are components."""
-    return derived(obj, "Part::FeaturePython") and has_own(obj, "BuildShape", "Freeze", "Group")
+    return derived(obj, "Part::FeaturePython") and has_own(obj, *_ASSEMBLY3)
 
 
 def no_component(obj: object) -> str:

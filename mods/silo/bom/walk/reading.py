@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 from silo.bom.document import label_of, same_document
 from silo.bom.findings import FindingCode
-from silo.bom.walk.arrays import draft_count, elements
+from silo.bom.walk.arrays import draft_count, elements, is_array
 from silo.bom.walk.consumed import consumed
 from silo.bom.walk.copies import own_parts, stale_copies
 from silo.bom.walk.counts import Contents, Count, Key, Leaves, Lost, Worth, add
@@ -56,6 +56,7 @@ class Reading:
         self._local: dict[Key, Any] = {}
         self._eaten: dict[Key, Any] = {}
         self._holds_components = False
+        self._met_hardware = False
 
     def of(self, container: Any) -> Contents:
         """The contents of an assembly."""
@@ -133,7 +134,7 @@ class Reading:
 
     def _bought(self, key: Key, obj: Any, worth: Worth) -> Worth:
         """Without the standard parts that a feature consumes."""
-        if all(name[0] != STANDARD_PARTS for name in worth):
+        if not self._met_hardware or all(name[0] != STANDARD_PARTS for name in worth):
             return worth
         if self._members.features:
             self._eaten |= consumed(self._members.features, self._key)
@@ -174,6 +175,7 @@ class Reading:
         if not self._reader.hardware:
             self._notes.no_hardware(fastener)
             return {}
+        self._met_hardware = True
         return {self._reader.component(fastener): (fastener, 1)}
 
     def _repeater(self, obj: Any, kind: Kind) -> Worth:
@@ -198,8 +200,9 @@ class Reading:
         if self._members.report_left_out(link):
             self._holds_components = True
             return {}
-        for element in elements(link):
-            self._members.report_left_out(element)
+        if is_array(link):
+            for element in elements(link):
+                self._members.report_left_out(element)
         target = self._reader.resolve(link)
         if target.obj is None:
             self._holds_components = True
@@ -232,24 +235,20 @@ class Reading:
         if words := self._reader.no_component(name, target.obj):
             self._notes.no_component(link, target.obj, words)
             return {}
-        worth = self._elsewhere(target.obj)
+        # An object of another file is a component, whatever it is.
+        text, _ = self._reader.standard(target.obj, name)
+        worth = self._standard(target.obj) if text else {name: (target.obj, 1)}
         if not worth:
             return {}
         if is_link(link):
             self._links.add(key)
             self._notes.link_type(link)
         self._remarks(link, target)
-        whole: Worth = {}
-        add(whole, worth, target.instances)
+        whole = {brought: (obj, count * target.instances) for brought, (obj, count) in worth.items()}
         if is_assembly_link(link):
             for part in own_parts(link, target.obj, self._key):
                 add(whole, self._worth(self._key(part), part, kind_of(part)))
         return whole
-
-    def _elsewhere(self, obj: Any) -> Worth:
-        """An object of another file is a component, whatever it is."""
-        text, _ = self._reader.standard(obj)
-        return self._standard(obj) if text else {self._key(obj): (obj, 1)}
 
     def _in_document(self, link: Any, target: Target) -> Worth:
         """A link within the file brings what its target brings, which may be nothing."""

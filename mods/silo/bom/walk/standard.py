@@ -18,7 +18,7 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import Any
 
-from silo.bom.document import derived, own
+from silo.bom.document import derived, own, property_names
 
 # The namespace of standard parts; it never changes, or every screw would become a new item.
 NAMESPACE = uuid.UUID("5d8d3a1e-6f0b-5c7a-9a54-2f1d7c0e4b36")
@@ -75,7 +75,7 @@ def is_tool(designated_type: str) -> bool:
 
 def fastener_type(obj: Any) -> str:
     """The type of a fastener (``ISO4762``, ``ScrewTap``, …) as it is called today; "" for anything else."""
-    if not any(derived(obj, name) for name in _TYPES):
+    if not (derived(obj, _TYPES[0]) or derived(obj, _TYPES[1])):
         return ""
     diameter = _property(obj, "Diameter")
     if not isinstance(diameter, str) or not diameter:
@@ -121,7 +121,15 @@ def designation(obj: Any) -> str:
     kind = fastener_type(obj)
     if not kind or is_tool(kind):
         return ""
-    return designated(kind, {name: _property(obj, name) for name in _MAKING})
+    names = property_names(obj)
+    known = _MAKING if names is None else [name for name in _MAKING if name in _spelling(names)]
+    given = ((name, _property(obj, name)) for name in known)
+    return _designated(kind, tuple((name, getattr(value, "Value", value)) for name, value in given))
+
+
+@lru_cache(maxsize=4096)
+def _designated(kind: str, properties: tuple[tuple[str, Any], ...]) -> str:
+    return designated(kind, dict(properties))
 
 
 # The properties that make the article, under their names of today.
@@ -171,8 +179,26 @@ def _standard_name(kind: str) -> str:
 
 def _property(obj: Any, name: str) -> Any:
     """A property in either spelling; None where the object has neither."""
+    names = property_names(obj)
+    if names is not None:
+        spelt = _spelling(names).get(name)
+        return getattr(obj, spelt, None) if spelt else None
     value = own(obj, name)
     return own(obj, name[0].lower() + name[1:]) if value is None else value
+
+
+# Thousands of screws have the same few lists of properties.
+@lru_cache(maxsize=1024)
+def _spelling(names: frozenset[str] | tuple[str, ...]) -> dict[str, str]:
+    """How an object with these properties spells those of a fastener: name of today → its own."""
+    listed = frozenset(names)
+    found = {}
+    for name in ("Type", *_MAKING, *_TRAITS):
+        if name in listed:
+            found[name] = name
+        elif (old := name[0].lower() + name[1:]) in listed:
+            found[name] = old
+    return found
 
 
 def _size(value: Any) -> str:
