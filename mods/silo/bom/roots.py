@@ -37,7 +37,7 @@ NAME_ONE = "Name the one that is meant (--assembly NAME)."
 # The rank of a part that holds no components; what it holds makes it likelier.
 _HOLDS_NOTHING = 4
 # What may show components of other files, standard parts or declared ones.
-_SHOWING = COMPONENTS | REPEATERS | {Kind.STANDARD, Kind.ELEMENT, Kind.LOCAL, Kind.FOREIGN, Kind.CONTAINER}
+_SHOWING = COMPONENTS | REPEATERS | {Kind.ELEMENT, Kind.LOCAL, Kind.FOREIGN, Kind.CONTAINER}
 _LOOSE = COMPONENTS | REPEATERS | {Kind.LINK_GROUP, Kind.FOREIGN, Kind.STANDARD}
 _HARDWARE = REPEATERS | {Kind.LINK, Kind.LINK_GROUP, Kind.STANDARD}
 _BESIDE = COMPONENTS | REPEATERS | {Kind.LINK_GROUP, Kind.STANDARD, Kind.CONTAINER, Kind.LOCAL, Kind.FOREIGN}
@@ -62,11 +62,19 @@ class DocumentRoot:
         return False
 
 
-def _members_of(objects: Iterable[Any], kinds: frozenset[Kind]) -> set[str]:
+_Known = Sequence[tuple[Any, Kind]]
+
+
+def _known(document: Any) -> _Known:
+    """The objects of a document with their kinds."""
+    return [(obj, kind_of(obj)) for obj in getattr(document, "Objects", None) or ()]
+
+
+def _members_of(objects: _Known, kinds: frozenset[Kind]) -> set[str]:
     """Names of the objects that lie in some container of these kinds, or are copies such a container made."""
     names: set[str] = set()
-    for obj in objects:
-        if kind_of(obj) in kinds:
+    for obj, kind in objects:
+        if kind in kinds:
             for property_name in ("Group", "ElementList"):
                 names.update(object_name(member) for member in own(obj, property_name) or ())
     return names
@@ -86,16 +94,17 @@ def _rank(obj: Any, reader: Reader) -> int | None:
 
 def _holds(container: Any, reader: Reader) -> int:
     """2 for components of other files, 1 for standard or declared parts only, 0 for neither."""
-    shows_others = False
+    hardware, shows_others = False, False
     for _, obj, kind in flattened(container, id):
         if kind in COMPONENTS:
             target = first_of(getattr(obj, "LinkedObject", None))
             # A broken link stands for a component as well.
             if target is None or not same_document(target.Document, container.Document):
                 return 2
+        hardware = hardware or (kind is Kind.STANDARD and not left_out_by(obj))
         shows_others = shows_others or kind in _SHOWING
     if not shows_others:
-        return 0
+        return 1 if hardware else 0
     brought = reader.contents(container).counts
     far = any(_is_far(count.target, container) for count in brought)
     return 2 if far else 1 if brought else 0
@@ -112,12 +121,12 @@ def find_assemblies(document: Any) -> list[Any]:
 
 
 def _candidates(document: Any) -> list[tuple[tuple[int, bool], Any]]:
-    objects = list(getattr(document, "Objects", ()) or ())
+    objects = _known(document)
     inner = _members_of(objects, _CONTAINERS)
     in_folders = _members_of(objects, _FOLDERS)
     reader = _silent_reader()
     found = []
-    for obj in objects:
+    for obj, _ in objects:
         name = object_name(obj)
         if name in inner or (rank := _rank(obj, reader)) is None:
             continue
@@ -200,20 +209,14 @@ def _named(document: Any, name: str) -> Any:
 
 def _loose(document: Any, kinds: frozenset[Kind]) -> list[Any]:
     """The objects of these kinds that lie in no container, no Body and no feature."""
-    objects = list(getattr(document, "Objects", ()) or ())
+    objects = _known(document)
     inner = _members_of(objects, _CONTAINERS)
-    found = [obj for obj in objects if object_name(obj) not in inner and kind_of(obj) in kinds]
-    if kinds.isdisjoint({Kind.LOCAL, Kind.STANDARD}):
-        return found
-    local = [obj for obj in objects if kind_of(obj) is Kind.LOCAL]
-    eaten = consumed(local, object_name)
-    inside = {object_name(one) for obj in local for one in own(obj, "Group") or ()}
-    return [
-        obj
-        for obj in found
-        if kind_of(obj) is not Kind.LOCAL
-        or (object_name(obj) not in eaten and object_name(obj) not in inside)
-    ]
+    used: set[str] = set()
+    if Kind.LOCAL in kinds:
+        local = [obj for obj, kind in objects if kind is Kind.LOCAL]
+        used.update(consumed(local, object_name))
+        used.update(object_name(one) for obj in local for one in own(obj, "Group") or ())
+    return [obj for obj, kind in objects if kind in kinds and object_name(obj) not in inner | used]
 
 
 def as_it_is(document: Any) -> Any:
@@ -221,11 +224,10 @@ def as_it_is(document: Any) -> Any:
     return document
 
 
-def _sources_of(objects: Sequence[Any]) -> set[str]:
+def _sources_of(objects: _Known) -> set[str]:
     """Names of the objects that links, arrays and compounds of the document show."""
     names = set()
-    for obj in objects:
-        kind = kind_of(obj)
+    for obj, kind in objects:
         if kind in COMPONENTS:
             shown = [first_of(getattr(obj, "LinkedObject", None))]
         elif kind in (Kind.DRAFT_ARRAY, Kind.COMPOUND):
@@ -250,13 +252,15 @@ def loose_hardware(container: Any, reader: Reader, whole: Whole = as_it_is) -> l
     objects = list(getattr(document, "Objects", ()) or ())
     if not any(getattr(obj, "TypeId", "").endswith("FeaturePython") for obj in objects):
         return []
-    kinds = [(obj, kind_of(obj)) for obj in objects]
-    if not any(kind is Kind.STANDARD for _, kind in kinds):
+    known = _known(document)
+    inner = _members_of(known, _CONTAINERS)
+    loose = [obj for obj, kind in known if kind in _HARDWARE and object_name(obj) not in inner]
+    if not loose:
         return []
-    spares = [obj for obj, kind in kinds if kind is Kind.FOLDER and object_name(obj) == "Parts"]
-    inside = _members_of(objects, _CONTAINERS) | _members_of(spares, _FOLDERS) | _sources_of(objects)
-    loose = [obj for obj, kind in kinds if kind in _HARDWARE and object_name(obj) not in inside]
-    loose = [obj for obj in loose if _is_hardware(obj, reader)]
+    spares = [(obj, kind) for obj, kind in known if kind is Kind.FOLDER and object_name(obj) == "Parts"]
+    aside = _members_of(spares, _FOLDERS) | _sources_of(known)
+    aside.update(consumed([obj for obj, kind in known if kind is Kind.LOCAL], object_name))
+    loose = [obj for obj in loose if object_name(obj) not in aside and _is_hardware(obj, reader)]
     if not loose:
         return []
     likely = _likely(document)
@@ -277,15 +281,15 @@ def beside(top: Any, reader: Reader) -> list[Any]:
     It is not counted, and nobody may have noticed. What lies in folders are spares; what other objects of the
     document show are their sources; another assembly has a BOM of its own.
     """
-    objects = list(getattr(getattr(top, "Document", None), "Objects", ()) or ())
-    if not objects or isinstance(top, DocumentRoot) or is_assembly3(top):
+    if isinstance(top, DocumentRoot) or is_assembly3(top):
         return []
+    objects = _known(getattr(top, "Document", None))
     inside = _members_of(objects, _CONTAINERS | _FOLDERS)
     loose = [
         obj
-        for obj in objects
-        if object_name(obj) not in inside
-        and kind_of(obj) in _BESIDE
+        for obj, kind in objects
+        if kind in _BESIDE
+        and object_name(obj) not in inside
         and not (object_name(obj) == object_name(top) or is_named_assembly(obj))
     ]
     if not loose:

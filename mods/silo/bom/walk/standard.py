@@ -82,11 +82,16 @@ def fastener_type(obj: Any) -> str:
         return ""
     kind = _property(obj, "Type")
     if isinstance(kind, str) and kind:
-        known = kind in _NAMES or kind in _RENAMED or kind.startswith(_TOOLS) or _STANDARD.match(kind)
-        if known or any(_property(obj, name) is not None for name in _TRAITS):
+        if _is_known(kind) or any(_property(obj, name) is not None for name in _TRAITS):
             return _RENAMED.get(kind, kind)
         return ""
     return _type_of_old(obj)
+
+
+@lru_cache(maxsize=1024)
+def _is_known(kind: str) -> bool:
+    named = kind in _NAMES or kind in _RENAMED or kind.startswith(_TOOLS)
+    return named or _STANDARD.match(kind) is not None
 
 
 def _type_of_old(obj: Any) -> str:
