@@ -7,6 +7,7 @@ import argparse
 from collections.abc import Mapping
 from dataclasses import replace
 
+from silo.bom.errors import SiloError
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.report import base_of, bom_json, flat_json
 from silo.bom.resolve import consolidation_findings
@@ -27,6 +28,11 @@ def register(commands: Commands) -> None:
     parser.add_argument(
         "--flat", action="store_true", help="quantities multiplied down the tree, each part once"
     )
+    parser.add_argument(
+        "--verify",
+        action="store_true",
+        help="have freecadcmd compare the BOM with the solids that FreeCAD shows; 1 where they differ",
+    )
     parser.add_argument("--resolve", action="store_true", help="ask the server for part numbers and names")
     common.add_json_option(parser)
     common.add_server_options(parser)
@@ -35,6 +41,8 @@ def register(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the BOM; 1 where an error says that it is not the whole one."""
+    if args.verify:
+        return _verify(args)
     extraction = common.read_assembly(args.top, args.assembly, hardware=not args.no_hardware)
     if args.resolve:
         with common.client_of(args) as client:
@@ -57,6 +65,28 @@ def run(args: argparse.Namespace) -> int:
         out.print()
         out.print(show.findings_text(extraction.findings, base_of(extraction)))
     return 1 if extraction.blocked else 0
+
+
+def _verify(args: argparse.Namespace) -> int:
+    """The geometry as witness: the BOM as live FreeCAD has it, against the solids shown."""
+    from silo.freecadcmd.run import verify_in_freecad
+
+    ((_, found),) = verify_in_freecad([args.top], args.assembly, hardware=not args.no_hardware)
+    if isinstance(found, SiloError):
+        raise found
+    fine = found.agrees and not found.extraction.blocked
+    if args.json:
+        common.print_json({**bom_json(found.extraction), "witness": list(found.accounts)})
+        return 0 if fine else 1
+    from silo.cli import show
+
+    out = show.console()
+    for account in found.accounts:
+        mark = "✓" if account["agrees"] else "✗"
+        out.print(f"{mark} {show.plain(account['sentence'])}", markup=False)
+    if found.extraction.blocked:
+        out.print(show.findings_text(found.extraction.findings, base_of(found.extraction)))
+    return 0 if fine else 1
 
 
 def _whole(entry: BomEntry, unresolved: Mapping[tuple[str, str], BomEntry]) -> BomEntry:

@@ -89,6 +89,49 @@ def run_freecad(
             yield told[failed], run.failure(failed)
 
 
+@dataclass(frozen=True)
+class Witnessed:
+    """A BOM as live FreeCAD has it, and for each assembly the solids shown and those explained."""
+
+    extraction: Extraction
+    accounts: tuple[Mapping[str, Any], ...]
+
+    @property
+    def agrees(self) -> bool:
+        """True where every assembly's solids are explained."""
+        return all(account["agrees"] for account in self.accounts)
+
+
+def verify_in_freecad(
+    tops: Sequence[str],
+    assembly: str | None = None,
+    *,
+    command: str | None = None,
+    timeout_s: float = TIMEOUT_S,
+    env: Mapping[str, str] | None = None,
+    hardware: bool = True,
+) -> Iterator[tuple[str, Witnessed | SiloError]]:
+    """As :func:`run_freecad`, with the geometry as witness (``silo.workbench.freecad.witness``)."""
+    freecadcmd = find_freecadcmd(command)
+    rest = [os.path.abspath(top) for top in tops]
+    told = dict(zip(rest, tops, strict=True))
+    while rest:
+        job: dict[str, Any] = {"tops": rest, "verify": True, "no_hardware": not hardware}
+        if assembly is not None:
+            job["assembly"] = assembly
+        with FreeCADRun(freecadcmd, HEADLESS, job, timeout_s, env or {}) as run:
+            for line in run.lines():
+                found = _result(line)
+                path = rest.pop(0)
+                if isinstance(found, Extraction):
+                    yield told[path], Witnessed(found, tuple(line["witness"]))
+                else:
+                    yield told[path], found
+        if rest:
+            failed = rest.pop(0)
+            yield told[failed], run.failure(failed)
+
+
 def _result(line: Mapping[str, Any]) -> Extraction | SiloError:
     error = line.get("error")
     return from_plain(line["extraction"]) if error is None else told_error(error)

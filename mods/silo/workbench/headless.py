@@ -19,7 +19,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from silo.batch import TopResult
     from silo.bom.model import Extraction
     from silo.bom_sync import Outcome
+    from silo.workbench.freecad.witness import Account
 
 OK, UNDONE, BAD_INPUT, REMOTE = 0, 1, 2, 3
 
@@ -57,6 +58,7 @@ class Job:
     dry_run: bool = False
     allow_missing: bool = False
     no_hardware: bool = False
+    verify: bool = False
 
     @classmethod
     def from_text(cls, text: str | None) -> Job:
@@ -107,13 +109,16 @@ def _tell(error: Exception, code: int) -> int:
     return code
 
 
-def _extractions(tops: list[str], job: Job) -> Iterator[tuple[str, Extraction | SiloError]]:
+def _extractions(
+    tops: list[str], job: Job, look: Callable[[Extraction], None] = lambda _found: None
+) -> Iterator[tuple[str, Extraction | SiloError]]:
     from silo.workbench.freecad import host, live
 
     for top in tops:
         found: Extraction | SiloError
         try:
             found = live.read_checked(top, job.assembly, hardware=not job.no_hardware)
+            look(found)
         except SiloError as error:
             found = error
         # The next file starts from nothing: no half loaded parts of this one, and no memory held. Before the
@@ -128,7 +133,14 @@ def _write_lines(job: Job, out: TextIO) -> int:
 
     fine = True
     tops = documents_in(job.tops)
-    found = _extractions(tops, job)
+    seen: list[Account] = []
+
+    def look(extraction: Extraction) -> None:
+        from silo.workbench.freecad import witness
+
+        seen[:] = witness.accounts(extraction) if job.verify else []
+
+    found = _extractions(tops, job, look)
     for top in tops:
         _line(out, {"begun": top})
         _, result = next(found)
@@ -136,7 +148,8 @@ def _write_lines(job: Job, out: TextIO) -> int:
             fine = False
             _line(out, {"top": top, "error": error_json(result)})
         else:
-            _line(out, {"top": top, "extraction": to_plain(result)})
+            told = {"witness": [account.as_dict() for account in seen]} if job.verify else {}
+            _line(out, {"top": top, "extraction": to_plain(result), **told})
     return OK if fine else UNDONE
 
 

@@ -85,6 +85,19 @@ def save_parameters() -> None:
     FreeCAD.saveParameter()
 
 
+def solids(obj: Any) -> int:
+    """How many solids FreeCAD shows for an object, with all that it links to; hidden ones have no shape."""
+    import Part
+
+    def count(shape: Any) -> int:
+        # shape.Solids has those only once that lie in one place.
+        if shape.isNull():
+            return 0
+        return 1 if shape.ShapeType == "Solid" else sum(map(count, shape.SubShapes))
+
+    return count(Part.getShape(getattr(obj, "real", obj)))
+
+
 # --- documents -------------------------------------------------------------------------------------------
 
 

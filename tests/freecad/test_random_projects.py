@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Random projects, built anew by each FreeCAD: what its geometry shows = our reader = our live walker.
+
+``SILO_RANDOM_PROJECTS`` projects per FreeCAD (12; more for a thorough run), the first with the seed
+``SILO_RANDOM_SEED``, which otherwise changes from run to run and is printed.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import secrets
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import pytest
+from freecad_cases import machines
+from freecad_cases.machines import WANTED, FreeCAD
+
+from silo.bom.errors import SiloError
+from silo.bom.links import extract
+from silo.bom.model import Extraction
+from silo.bom.report import flat_lines
+from silo.bom.roots import choose_assembly
+from silo.fcstd import Library
+from silo.freecadcmd.run import run_freecad
+
+pytestmark = pytest.mark.freecad
+
+SCRIPT = Path(__file__).parent / "freecad_cases" / "random_projects.py"
+PROJECTS = int(os.environ.get("SILO_RANDOM_PROJECTS", "12"))
+BATCH = 50
+# The volumes in mm³ that the projects' parts and articles have, and nothing else has.
+VOLUMES = {
+    **{f"Part{number}": str(number + 1) for number in range(3)},
+    **{f"ISO 4762 M4×{size}": str(10 + number) for number, size in enumerate((8, 12, 16))},
+}
+
+
+def counted(found: Extraction) -> dict[str, int]:
+    """Volume → pieces, of all components without components of their own."""
+    pieces: Counter[str] = Counter()
+    for entry, count in flat_lines(found.entries):
+        name = entry.standard or entry.object_name
+        if name in VOLUMES:
+            pieces[VOLUMES[name]] += count
+    return dict(pieces)
+
+
+def read(top: Path) -> Extraction | SiloError:
+    try:
+        with Library() as library:
+            return extract(choose_assembly(library.open(top)))
+    except SiloError as error:
+        return error
+
+
+def build(freecad: FreeCAD, folder: Path, seeds: list[int]) -> dict[int, dict[str, int]]:
+    """Build projects; seed → what the geometry shows."""
+    folder.mkdir()
+    env = freecad.profile(folder.parent / f"{folder.name}-profile")
+    job = json.dumps({"out": str(folder), "seeds": seeds})
+    done = freecad.run(SCRIPT, {**env, "SILO_RANDOM": job}, cwd=folder)
+    assert done.returncode == 0, done.stdout[-3000:]
+    return dict(json.loads(line) for line in (folder / "truth.jsonl").read_text().splitlines())
+
+
+def judge(seed: int, shown: dict[str, int], file: Any, live: Any) -> list[str]:
+    """What is wrong with one project; a finding that blocks is an honest answer."""
+    if isinstance(file, SiloError) or isinstance(live, SiloError):
+        return [] if str(file) == str(live) else [f"seed {seed}: file {file}; live {live}"]
+    wrong = []
+    if counted(file) != counted(live) or file.blocked != live.blocked:
+        wrong.append(f"seed {seed}: the file gives {counted(file)}, live FreeCAD {counted(live)}")
+    if not file.blocked and counted(file) != shown:
+        wrong.append(f"seed {seed}: FreeCAD shows {shown}, the BOM has {counted(file)}")
+    return wrong
+
+
+@pytest.mark.parametrize("version", WANTED)
+def test_the_bom_is_what_freecad_shows(version: str, tmp_path: Path) -> None:
+    """Nested arrays, arrays without links, groups in groups, fasteners, cuts, several roots."""
+    freecad = machines.need(version)
+    first = int(os.environ.get("SILO_RANDOM_SEED") or secrets.randbelow(10**6))
+    print(f"SILO_RANDOM_SEED={first}")
+    wrong: list[str] = []
+    blocked = 0
+    for start in range(0, PROJECTS, BATCH):
+        seeds = list(range(first + start, first + min(start + BATCH, PROJECTS)))
+        folder = tmp_path.resolve() / f"from-{seeds[0]}"
+        truth = build(freecad, folder, seeds)
+        tops = {seed: folder / str(seed) / "top.FCStd" for seed in seeds}
+        env = freecad.profile(tmp_path / "reader")
+        live = dict(run_freecad([str(top) for top in tops.values()], command=freecad.command, env=env))
+        for seed, top in tops.items():
+            file = read(top)
+            blocked += isinstance(file, Extraction) and file.blocked
+            wrong += judge(seed, truth[seed], file, live[str(top)])
+    print(f"FreeCAD {version}: {PROJECTS} projects, {blocked} blocked, {len(wrong)} wrong")
+    assert wrong == [], f"first seed {first}"
