@@ -200,6 +200,10 @@ def group_of(obj: Any) -> list[Any]:
 def shown(path: Path) -> dict[str, int]:
     """Volume in mm³ → how many solids of it the assembly shows."""
     doc = App.openDocument(str(path))
+    for one in App.listDocuments().values():
+        for folder in one.findObjects("App::DocumentObjectGroup"):
+            # A container lists what lies in its folders as well; its shape would have that twice.
+            folder.Visibility = False
     shape = Part.getShape(doc.getObject("Root"))
     return dict(Counter(str(round(solid.Volume)) for solid in solids(shape) if solid.Volume < 1000))
 

@@ -96,6 +96,8 @@ def _account(obj: Any, head: BomEntry, entries: Sequence[BomEntry]) -> Account:
     beside = [obj.Document.getObject(name) for name in sorted(counted - set(members))]
     roots = list(obj.Group) if getattr(obj, "is_document_root", False) else [obj]
     shown = sum(host.solids(one) for one in (*roots, *(one for one in beside if one is not None)))
+    # A container lists what lies in its folders as well, and its shape has that twice.
+    shown -= sum(host.solids(member) for member, kind in members.values() if kind is Kind.FOLDER)
     local = [
         member
         for name, (member, kind) in members.items()
