@@ -13,8 +13,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from silo.bom.document import LinkProblem as Problem
+from silo.bom.errors import DocumentError
 from silo.fcstd.properties import Properties
-from silo.fcstd.typetree import ancestors
+from silo.fcstd.typetree import ancestors, is_listed
 from silo.fcstd.values import ABSENT, LocalList, Ref, RefList, SideEntry, Style, Vector
 
 if TYPE_CHECKING:
@@ -60,6 +61,17 @@ class FcstdObject:
         self.TypeId = type_id
         # A walker asks this most of all; so the set itself answers, in place of the method below.
         self.__dict__["isDerivedFrom"] = ancestors(type_id).__contains__
+        if not is_listed(type_id) and self._looks_like_a_link():
+            self.__dict__["isDerivedFrom"] = (ancestors("App::Link") | {type_id}).__contains__
+
+    def _looks_like_a_link(self) -> bool:
+        """A type that a later FreeCAD added, with the properties of a link array."""
+        try:
+            self._load()
+        except DocumentError:  # whoever asks for a property of it gets the error
+            return False
+        numbers = self.properties.numbers
+        return "LinkedObject" in numbers and "ElementCount" in numbers
 
     def isDerivedFrom(self, type_name: str, /) -> bool:
         """As FreeCAD: the type of the object itself, never of a link's target; False for unknown names."""

@@ -26,7 +26,7 @@ App::GeoFeature: GeometryPython InventorObject OriginFeature Part Placement VRML
 App::GeoFeature: LocalCoordinateSystem ImagePlane Mesh::Feature Part::Feature Points::Feature Path::Feature
 App::GeoFeature: Image::ImagePlane Fem::FemMeshObject Fem::FemPostObject Robot::RobotObject
 App::GeoFeature: Robot::TrajectoryObject
-App::Link: LinkPython
+App::Link: LinkPython Part::LinkArray
 App::LinkElement: LinkElementPython
 App::LinkGroup: LinkGroupPython
 App::LocalCoordinateSystem: Origin Part::LocalCoordinateSystem
@@ -56,6 +56,7 @@ Part::Feature: Revolution RuledSurface Scale Spline SubShapeBinder Sweep Thickne
 Part::Feature: PartDesign::ShapeBinder PartDesign::SubShapeBinder Surface::Cut Surface::Sewing
 Part::Feature: Path::FeatureArea Path::FeatureAreaView TechDraw::FeatureProjection
 Part::FilletBase: Chamfer Fillet
+Part::LinkArray: LinkArrayLinear LinkArrayPolar LinkArrayCircular LinkArrayPath LinkArrayPoint
 Part::Offset: Offset2D
 Part::Part2DObject: Part2DObjectPython Sketcher::SketchObject Sketcher::SketchObjectSF
 Part::Primitive: Box Circle Cone Cylinder Ellipse Ellipsoid Helix Line Plane Prism RegularPolygon Sphere
@@ -111,6 +112,11 @@ def _parents() -> dict[str, list[str]]:
 
 
 _PARENTS = _parents()
+
+
+def is_listed(type_name: str) -> bool:
+    """True for a type of the table, and for the Python form of one."""
+    return type_name in _PARENTS or type_name.removesuffix("Python") in _PARENTS
 
 
 def listed_types() -> tuple[str, ...]:

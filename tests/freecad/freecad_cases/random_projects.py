@@ -136,6 +136,8 @@ class Project:
         if kind != "App::DocumentObjectGroup":
             self.place(container)
         if kind == "App::LinkGroup":
+            # A link group shows also what is hidden elsewhere: the operands of a cut, the base of an array.
+            inner = [obj for obj in inner if obj.Visibility]
             container.ElementList = inner
             if self.random.random() < 0.3:
                 other = self.place(doc.addObject(kind, "Other"))
