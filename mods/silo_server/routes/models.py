@@ -26,8 +26,12 @@ def _no_nul(text: str) -> str:
     return text
 
 
-Text = Annotated[str, StringConstraints(max_length=10_000), AfterValidator(_no_nul)]
-Short = Annotated[str, StringConstraints(max_length=200), AfterValidator(_no_nul)]
+def _text(longest: int) -> WithJsonSchema:
+    return WithJsonSchema({"type": "string", "maxLength": longest, "pattern": "^[^\\u0000]*$"})
+
+
+Text = Annotated[str, StringConstraints(max_length=10_000), AfterValidator(_no_nul), _text(10_000)]
+Short = Annotated[str, StringConstraints(max_length=200), AfterValidator(_no_nul), _text(200)]
 
 
 # What may be in it is one rule for all ways in, which the services keep (silo_server.json_values).
@@ -46,8 +50,16 @@ def _amount(value: object) -> object:
     return value
 
 
-# JSON's true and false are no numbers, and 1.5 or "2" no whole one.
-Whole = Annotated[int, Field(strict=True)]
+def _whole(value: object) -> object:
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+# JSON's true and false are no numbers, and 1.5 or "2" no whole one; 2.0 is.
+_WHOLE = BeforeValidator(_whole)
+RevisionNumber = Annotated[int, Field(strict=True, ge=0, le=1_000_000), _WHOLE]
+# A JSON number is exact up to 2**53. Change 0 is the empty BOM before everything.
+ChangeId = Annotated[int, Field(strict=True, ge=1, le=2**53 - 1), _WHOLE]
+ChangeIdOrNone = Annotated[int, Field(strict=True, ge=0, le=2**53 - 1), _WHOLE]
 # A quantity: a number, or text as people type it.
 Amount = Annotated[
     float,
@@ -232,7 +244,7 @@ class NewLineBody(Body):
     reference_designators: list[Short] = Field(default_factory=list, max_length=10_000)
     find_number: Short | None = None
     notes: Text | None = None
-    child_revision: Annotated[Whole, Field(ge=0, le=1_000_000)] | None = None
+    child_revision: RevisionNumber | None = None
     source: Short = "manual"
     metadata: Properties = Field(default_factory=dict)
 
@@ -246,6 +258,6 @@ class LineChangeBody(Body):
     reference_designators: list[Short] | None = Field(None, max_length=10_000)
     find_number: Short | None = None
     notes: Text | None = None
-    child_revision: Annotated[Whole, Field(ge=0, le=1_000_000)] | None = None
+    child_revision: RevisionNumber | None = None
     source: Short | None = None
     metadata: Properties | None = None

@@ -13,6 +13,7 @@ from starlette.responses import Response
 from silo.bom.errors import RejectedError
 from silo_server.clock import stamp, wire
 from silo_server.db.engine import Tx
+from silo_server.routes import models
 from silo_server.routes.context import (
     READ_ERRORS,
     WRITE_ERRORS,
@@ -23,7 +24,7 @@ from silo_server.routes.context import (
     etag_of,
     json_answer,
 )
-from silo_server.routes.models import Body, Short, Text, Whole
+from silo_server.routes.models import Body, Short, Text
 from silo_server.services import history
 from silo_server.services import review as service
 from silo_server.services.items import get_item
@@ -56,14 +57,14 @@ class ResolveBody(Body):
 class RestoreBody(Body):
     """``POST …/bom/restore``: the change whose state comes back (0 = the empty BOM)."""
 
-    change_id: Annotated[Whole, Field(ge=0, le=2**62)]
+    change_id: models.ChangeIdOrNone
     reason: Text | None = None
 
 
 class UndoBody(Body):
     """``POST …/bom/undo``."""
 
-    change_id: Annotated[Whole, Field(ge=1, le=2**62)]
+    change_id: models.ChangeId
 
 
 @router.get("/review", responses=READ_ERRORS)
