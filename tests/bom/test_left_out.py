@@ -3,9 +3,12 @@
 
 from __future__ import annotations
 
+from silo.bom.diff import diff_bom
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.left_out import LeftOut, Reason, components_of, in_words, left_out_of, remembered
+from silo.bom.merge import apply_merge, plan_merge
 from silo.bom.model import BomEntry
+from silo.bom_sync import Resolved
 
 LOST = BomEntry("/v/parts/Lid.FCStd", object_name="Body", quantity=3, missing=True, instances=("L1", "L2"))
 
@@ -67,3 +70,29 @@ def test_in_words() -> None:
         "2 missing, 1 unregistered, 1 odd"
     )
     assert in_words([]) == ""
+
+
+def test_another_object_of_the_missing_file_keeps_nothing() -> None:
+    """A line stands for a file and an object, never for the file alone."""
+    line = {"child_part_number": "P", "quantity": 2, "components": [{"file": "kit.FCStd", "object": "Nut"}]}
+    assert [c.part_number for c in diff_bom([], [line], [("kit.FCStd", "Bolt")]).removed] == ["P"]
+    kept = diff_bom([], [line], [("kit.FCStd", "Nut")])
+    assert (kept.removed, [c.part_number for c in kept.kept]) == ((), ["P"])
+
+
+def test_a_kept_line_keeps_its_flag_too() -> None:
+    """Whatever it was, it stays; a merge neither flags nor clears it."""
+    component = {"file": "kit.FCStd", "object": "Nut"}
+    line = {"child_part_number": "P", "quantity": 2, "unreferenced_since": "2026", "components": [component]}
+    plan = plan_merge([], [line], [("kit.FCStd", "Nut")])
+    assert (plan.flag, plan.unflag, plan.news) == ((), (), False)
+    assert apply_merge([line], plan, "now") == [line]
+
+
+def test_the_first_sync_is_news_even_where_nothing_differs() -> None:
+    """Else an assembly whose lines somebody had typed in would read as never synced for ever."""
+    head = BomEntry("/v/top.FCStd", "u-top", part_number="A-1")
+    plan = plan_merge([], [])
+    assert Resolved(head, (), (), (), {"u-top": {"at": None}}).is_news(plan)
+    assert not Resolved(head, (), (), (), {"u-top": {"at": "2026-11-22T00:00:00Z"}}).is_news(plan)
+    assert not Resolved(head, (), (), ()).is_news(plan), "a server that keeps no syncs"
