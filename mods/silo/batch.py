@@ -90,6 +90,8 @@ def sync_top(top: str, found: Extraction | SiloError, api: SyncApi, options: Opt
     base = base_of(found)
     if options.skip_parts and not found.entries and not found.blocked:
         return TopResult(top, base, skipped="no components of other files: a part, not an assembly")
+    if options.skip_parts and not found.blocked and _is_library(found):
+        return TopResult(top, base, skipped="only parts of its own, and no item: a library of parts")
     try:
         whole = resolve(found, api)
         outcomes = tuple(_outcomes(whole, api, options))
@@ -104,6 +106,12 @@ def stopped_by(result: TopResult, api: object = None) -> SiloError | None:
 
     errors = (result.error, *(outcome.error for outcome in result.outcomes))
     return next((error for error in errors if error is not None and ends_run(error, api)), None)
+
+
+def _is_library(found: Extraction) -> bool:
+    """A file of screws or of several parts for others to link: unregistered, and nothing of other files."""
+    path = found.assembly.doc_path
+    return found.assembly.silo_uuid is None and all(entry.doc_path == path for entry in found.entries)
 
 
 def _outcomes(whole: Resolved, api: SyncApi, options: Options) -> Iterable[Outcome]:
