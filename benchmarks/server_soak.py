@@ -66,7 +66,11 @@ def main() -> None:
 
 def life(url: str, files: Path, seconds: float, samples: dict[str, list[float]], bad: list[str]) -> None:
     """One process under load for so long."""
-    bounds = {"SILO_EVENT_LOG_SIZE": "500", "SILO_HOUSEKEEPING_SECONDS": "5"}
+    bounds = {
+        "SILO_EVENT_LOG_SIZE": "500",
+        "SILO_HOUSEKEEPING_SECONDS": "5",
+        "SILO_HEARTBEAT_SECONDS": "1",
+    }
     ending = threading.Event()
     times: list[float] = []
     with ServerProcess(url, files, TOKEN, **bounds) as server, Api(server.base_url, TOKEN) as api:
