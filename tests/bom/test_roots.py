@@ -222,3 +222,13 @@ def test_thousands_of_nested_parts_are_searched(doc: Doc, bolt: Any) -> None:
     for number in range(3000):
         inner = doc.part(f"P{number}", inner)
     assert choose_assembly(doc) is inner
+
+
+def test_the_likeliest_assembly_comes_first_whatever_the_order() -> None:
+    """An assembly, a part that is called one, a part with other files' components, a bare part."""
+    doc, far = Doc("/v/top.FCStd"), Doc("/v/bolt.FCStd").body()
+    bare = doc.part("Bare", doc.body("Own"))
+    far_part = doc.part("Far", doc.link("L", far))
+    named = doc.part("Named", Type="Assembly")
+    real = doc.assembly(name="Real")
+    assert [obj.Name for obj in find_assemblies(doc)] == [real.Name, named.Name, far_part.Name, bare.Name]

@@ -419,3 +419,13 @@ def test_findings_read_the_same_in_any_order(top: Doc) -> None:
         return set(found.findings)
 
     assert told(extract(there)) == told(extract(back))
+
+
+def test_a_long_path_through_many_links_is_no_loop(top: Doc, bolt: Any) -> None:
+    """Twenty links one after another, each followed and left again; only links within links are bounded."""
+    container = Doc("/v/innermost.FCStd")
+    shown = container.part("P", container.link("B", bolt))
+    for number in range(20):
+        doc = Doc(f"/v/{number}.FCStd")
+        shown = doc.part("P", doc.link("S", shown))
+    assert end(top.link("L", (shown, "S." * 20 + "B."))) == (bolt, 1)
