@@ -105,7 +105,7 @@ def test_an_entry_that_reaches_into_the_directory_is_damage(tmp_path: Path) -> N
     fields[8] = at - begin + 1
     CENTRAL.pack_into(raw, last, *fields)
     path.write_bytes(raw)
-    with pytest.raises(DocumentError, match=r"outside its place|damaged"):
+    with pytest.raises(DocumentError, match="outside its place"):
         stamp(path, "u-1")
 
 
