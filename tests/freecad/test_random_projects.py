@@ -91,7 +91,7 @@ def test_the_bom_is_what_freecad_shows(version: str, tmp_path: Path) -> None:
         folder = tmp_path.resolve() / f"from-{seeds[0]}"
         truth = build(freecad, folder, seeds)
         tops = {seed: folder / str(seed) / "top.FCStd" for seed in seeds}
-        env = freecad.profile(tmp_path / "reader")
+        env = freecad.profile(tmp_path / f"reader-{start}")
         live = dict(run_freecad([str(top) for top in tops.values()], command=freecad.command, env=env))
         for seed, top in tops.items():
             file = read(top)

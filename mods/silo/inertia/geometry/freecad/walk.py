@@ -24,7 +24,7 @@ from silo.bom.document import derived, label_of, object_name, own, same_document
 from silo.bom.model import BomEntry
 from silo.bom.naming import display_name
 from silo.bom.report import relative
-from silo.bom.walk.kinds import Kind, is_container, is_named_assembly, kind_of
+from silo.bom.walk.kinds import REPEATERS, Kind, is_container, is_named_assembly, kind_of
 from silo.bom.walk.targets import is_assembly_link, is_link
 from silo.inertia.geometry.freecad.facts import Facts, element_places, file_of, link_placement, scale
 from silo.inertia.geometry.freecad.members import MODELLED, child_named, counted, steps_of
@@ -84,7 +84,8 @@ class Walk:
             self.note("cycle", f"“{label_of(obj)}” contains itself; it is left out where the ring closes")
             return self._nothing(obj, "it contains itself")
         self._open.append(key)
-        if is_container(obj) or getattr(obj, "is_document_root", False):
+        holds = is_container(obj) and kind_of(obj) not in REPEATERS
+        if holds or getattr(obj, "is_document_root", False):
             self._container(key, obj, self._moved(copies))
         else:
             self._leaf(key, obj, [(obj, np.eye(4))])
