@@ -73,7 +73,7 @@ def find_items(
         return {}
     memory = memory or Memory()
     found = dict(_remembered(wanted, api, memory))
-    # A server that tells of its last syncs keeps the UUIDs that it is given: it has told all already.
+    # A server that reports its last syncs keeps the UUIDs that it is given, so nothing more is asked.
     if any(item is not None and item.get("last_sync") is not None for item in known.values()):
         return found
     searched = {}

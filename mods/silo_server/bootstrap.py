@@ -23,7 +23,7 @@ START_TOKEN_DAYS = 30.0
 
 @dataclass(frozen=True, slots=True)
 class Welcome:
-    """What the person who starts the server is told. ``login_secret`` belongs behind ``/login/link/``.
+    """What the person who starts the server sees. ``login_secret`` belongs behind ``/login/link/``.
 
     Without an active admin there is no user, no token and no link.
     """

@@ -103,7 +103,7 @@ def test_links_are_built_from_the_configured_address(api: Api, server: RunningSe
 
 
 def test_two_admins_who_demote_each_other_leave_one(kind: str, databases: Databases, tmp_path: Path) -> None:
-    """Both begin at the same moment; one of them is told that the other is the last."""
+    """Both begin at the same moment; one of them learns that the other is the last."""
     db = Database(Settings(database_url=databases.new(kind), files_dir=tmp_path))
     prepare(db)
     for number in range(8):

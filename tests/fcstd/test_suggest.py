@@ -67,7 +67,7 @@ def test_a_file_in_use_is_not_taken_for_a_renamed_one(tmp_path: Path) -> None:
 
 
 def test_the_date_that_the_link_recorded(tmp_path: Path) -> None:
-    """The same file, moved and renamed, is told from another with equal objects."""
+    """The same file, moved and renamed, is distinguished from another with equal objects."""
     doc = part("Body")
     doc.extra["LastModifiedDate"] = STAMP
     save(doc, tmp_path / "moved.FCStd")

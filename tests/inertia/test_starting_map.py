@@ -101,7 +101,7 @@ def test_flat_exports_are_cut_by_position(assemble: Fixture, tmp_path: Path) -> 
     "name", ["bolt *", "M?", "product:x", "path:y", "a: b", "#1", "é\u2028\n", "'\"", "/x/"]
 )
 def test_names_with_meaning_to_yaml_or_patterns(assemble: Fixture, tmp_path: Path, name: str) -> None:
-    """They are told as they are."""
+    """They are reported as they are."""
     asm = Assembly(
         "asm",
         {"p": PART},

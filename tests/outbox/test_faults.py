@@ -165,7 +165,7 @@ def test_a_disk_that_takes_nothing_is_told_and_loses_nothing(
             path.chmod(0o700)
         store = Store(folder / "data" / "outbox.sqlite3")
         waiting = store.entries()
-        # With a second name it waits and says why; without, the person was told at once.
+        # With a second name it waits and says why; without, the person saw it at once.
         assert len(waiting) == said.count("kept")
         assert all(entry.reason for entry in waiting)
         assert "commit" in said[1]

@@ -92,7 +92,7 @@ def test_killed_before_the_copy_was_made(store: Store, document: Path) -> None:
 
 
 def test_killed_without_a_second_name(store: Store, document: Path) -> None:
-    """What the document says by then may be another thing: a person is told, and nothing is sent."""
+    """What the document says by then may be another thing: a person is asked, and nothing is sent."""
     store.stage(commit(document))
     after = Store(store.path)
     send_all(after, FakeSilo())

@@ -115,7 +115,7 @@ def test_a_file_that_is_no_bom_is_not_read_to_its_end() -> None:
 
 
 def test_guesses_that_come_at_once_are_all_counted(url: str, tmp_path: Path) -> None:
-    """Twenty-four wrong passwords at the same moment: five are looked at, the others are told to wait."""
+    """Twenty-four wrong passwords at the same moment: five are looked at, the others get "try later"."""
     guesses = 24
     with running_server(url, token="silo_guess", files_dir=tmp_path) as server:
         with Api(server.base_url, "silo_guess") as api:

@@ -3,7 +3,7 @@
 
 A server without merge (the real Silo's first phase) gets the same plan as single calls: added lines are
 added, changed quantities changed, nothing is removed and no line of a person is touched. That is not one
-step: what breaks off half-way goes on with the next run, which plans from the lines as they are then.
+step: what breaks off half-way continues with the next run, which plans from the lines as they are then.
 """
 
 from __future__ import annotations
@@ -211,7 +211,7 @@ def merge_by_lines(
 
 
 def _try(refused: list[str], child: str, call: Callable[[], object]) -> None:
-    """Collect what concerns this line alone; all else ends the run, and the next one goes on from there."""
+    """Collect what concerns this line alone; all else ends the run, and the next one continues from there."""
     try:
         call()
     except (CycleError, RouteMissingError):

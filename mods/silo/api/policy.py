@@ -19,7 +19,7 @@ cancelled                                  all            retry when a person wa
 =========================================  =============  ==================================================
 
 1. ``alive`` finds out: where the server answers a plain question, only this entry has trouble.
-2. A run that sends one kind of request stops. A queue goes on: rights may differ between items.
+2. A run that sends one kind of request stops. A queue continues: rights may differ between items.
 """
 
 from __future__ import annotations

@@ -37,7 +37,7 @@ AGREE = 1e-6
 """The volumes of the kernel's integration and ours differ by less: then our tensor is the better one."""
 
 STATED = 5e-5
-"""Integrations that have converged and differ by more are told: no tensor is farther off in silence."""
+"""Integrations that have converged and differ by more are reported: no tensor is farther off in silence."""
 
 PLAIN_ERROR = 1e-12
 """Of the plain integration of a plain solid, relative to its volume."""
