@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from silo.files import documents_in
-from silo.freecads import commands, exchange_folder, material_folders
+from silo.freecads import cache_folders, commands, exchange_folder, material_folders
 
 
 def program(path: Path) -> str:
@@ -104,3 +104,25 @@ def test_a_pattern_that_the_shell_left_alone_is_taken_here(tmp_path: Path) -> No
     # A file whose name looks like a pattern is that file; a pattern that fits nothing is named in the error.
     assert documents_in([names[0]]) == names[:1]
     assert documents_in([str(tmp_path / "*.stl")]) == [str(tmp_path / "*.stl")]
+
+
+def test_cache_folders_of_each_platform(tmp_path: Path) -> None:
+    """The user's own settings first; only folders that are there."""
+    home, moved = tmp_path / "home", tmp_path / "moved"
+    end = Path("FreeCAD", "Cache")
+    env = {"HOME": str(home), "LOCALAPPDATA": str(tmp_path / "Local"), "TEMP": str(tmp_path / "Temp")}
+    windows = [folder(tmp_path / "Local" / "cache" / end), folder(tmp_path / "Temp" / end)]
+    assert list(cache_folders(env, "win32")) == windows
+    macos = [folder(home / "Library" / "Caches" / end)]
+    assert list(cache_folders(env, "darwin")) == macos
+    linux = [
+        folder(home / ".cache" / end),
+        folder(home / ".var" / "app" / "org.freecad.FreeCAD" / "cache" / end),
+        folder(home / "snap" / "freecad" / "common" / ".cache" / end),
+    ]
+    assert list(cache_folders(env, "linux")) == linux
+    own = [folder(moved / "temp"), folder(tmp_path / "xdg" / end)]
+    env |= {"FREECAD_USER_HOME": str(moved), "XDG_CACHE_HOME": str(tmp_path / "xdg")}
+    assert list(cache_folders(env, "linux")) == [*own, *linux]
+    env |= {"FREECAD_USER_TEMP": str(folder(tmp_path / "temp"))}
+    assert list(cache_folders(env, "linux")) == [tmp_path / "temp", *own, *linux]

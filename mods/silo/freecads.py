@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Where FreeCADs lie on Windows, macOS and Linux: the command, the material cards, a folder they can read.
+"""Where FreeCADs lie on Windows, macOS and Linux: the command, material cards, caches, folders they read.
 
 Gathered from FreeCAD's installers and packages (the Windows installer for all users or for one, the bundle
 for macOS, Debian, conda, Snap, Flatpak). Of several versions the newest comes first. Standard library only.
@@ -18,6 +18,8 @@ from silo.platform import NAME
 _COMMANDS = ("freecadcmd", "FreeCADCmd", "freecadcmd-daily", "freecad.cmd")
 _FLATPAK = "org.freecad.FreeCAD"
 _ROOT = Path("/")
+_MOVED_CACHES = (("FREECAD_USER_TEMP", ""), ("FREECAD_USER_HOME", "temp"))
+_WINDOWS_CACHES = (("LOCALAPPDATA", "/cache"), ("TEMP", ""))
 _BUNDLES = ("/Applications", "~/Applications")
 
 
@@ -67,6 +69,23 @@ def material_folders(
     yield from _matching(env, root, *shipped)
     # FreeCAD 1.1 keeps a folder of the user for each version.
     yield from _matching(env, root, *(f"{folder}/{part}Material" for folder in own for part in ("", "v*/")))
+
+
+def cache_folders(
+    env: Mapping[str, str] = os.environ, platform: str = NAME, root: Path = _ROOT
+) -> Iterator[Path]:
+    """The cache folders of this user's FreeCADs. ``root``: of the disk."""
+    # Both are used as they are; the others get a folder for the program (App/ApplicationDirectories).
+    moved = [Path(env[name], part) for name, part in _MOVED_CACHES if env.get(name)]
+    yield from (folder for folder in moved if folder.is_dir())
+    if platform == "win32":
+        bases = [f"{{{name}}}{part}" for name, part in _WINDOWS_CACHES if env.get(name)]
+    elif platform == "darwin":
+        bases = ["~/Library/Caches"]
+    else:
+        bases = ["{XDG_CACHE_HOME}"] if env.get("XDG_CACHE_HOME") else []
+        bases += ["~/.cache", f"~/.var/app/{_FLATPAK}/cache", "~/snap/freecad/common/.cache"]
+    yield from _matching(env, root, *(f"{base}/FreeCAD/Cache" for base in bases))
 
 
 def exchange_folder(command: str, env: Mapping[str, str] = os.environ) -> str | None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from running_freecad import opened
 
 from silo.cli.demo_edit import remove_from_assembly, set_element_count
 from silo.cli.main import build_parser
@@ -117,6 +118,27 @@ def test_register_twice_creates_nothing_twice(run: Any, silo: Any, gearbox: Path
     assert len(run("register", gearbox, "--yes", "--json").json()["registered"]) == 9
     assert run("register", gearbox, "--yes", "--json").json()["registered"] == []
     assert len(silo.client.search_items()) == 9
+
+
+def test_register_leaves_alone_what_freecad_has_open(
+    run: Any, silo: Any, gearbox: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Saving there would undo it. Nothing is made on the server for it, and the others are registered."""
+    pytest.importorskip("fcntl")
+    monkeypatch.setenv("FREECAD_USER_TEMP", str(tmp_path / "cache"))
+    before = gearbox.read_bytes()
+    with opened(tmp_path / "cache", gearbox):
+        ran = run("register", gearbox, "--yes", "--json")
+        assert ran.code == 1
+        assert len(ran.json()["registered"]) == 8
+        (failed,) = ran.json()["failed"]
+        assert failed["doc_path"] == gearbox.name
+        assert "open in FreeCAD" in failed["error"]["message"]
+        assert "--even-if-open" in failed["error"]["message"]
+        assert gearbox.read_bytes() == before
+        assert len(silo.client.search_items()) == 8
+        ran = run("register", gearbox, "--yes", "--json", "--even-if-open")
+        assert (ran.code, len(ran.json()["registered"])) == (0, 1)
 
 
 def test_register_without_anybody_to_ask_says_so(run: Any, silo: Any, gearbox: Path) -> None:

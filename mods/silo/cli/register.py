@@ -5,23 +5,29 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from silo.bom.errors import ConflictError, InputError, SiloError
+from silo.bom.errors import ConflictError, DocumentError, InputError, SiloError
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.naming import Proposal, propose_all
 from silo.bom.report import base_of, relative
 from silo.bom_sync import resolve
 from silo.cli import common
 from silo.cli.common import Commands
+from silo.open_in_freecad import open_in_any
 from silo.registration import Ask, Journal, Registration, unclear
 from silo.registration import register as register_component
 from silo.standard_items import register_standard
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
+
+_OPEN = (
+    "it is open in FreeCAD, and saving it there would undo the registration. Close it there, or register it "
+    "from there (Silo, Register Parts), then run this again; --even-if-open registers it all the same"
+)
 
 
 def register(commands: Commands) -> None:
@@ -46,6 +52,11 @@ def register(commands: Commands) -> None:
         help="an interrupted run may have made the item, and the server does not show for which part: "
         "ask (default), take it where only one fits, or make a new one",
     )
+    parser.add_argument(
+        "--even-if-open",
+        action="store_true",
+        help="also files that a running FreeCAD has open; whoever saves them there undoes the registration",
+    )
     parser.add_argument("--category", help="this category for every part (assemblies keep theirs)")
     common.add_json_option(parser)
     common.add_server_options(parser)
@@ -62,8 +73,9 @@ def run(args: argparse.Namespace) -> int:
         proposals = proposals_for(extraction, client, schema)
         if args.category:
             proposals = [p if p.entry.is_assembly else replace(p, category=args.category) for p in proposals]
+        is_open = _never if args.even_if_open else _now
         chosen = proposals if args.yes else _ask(proposals, base_of(extraction))
-        done = register_all(chosen, client, schema=schema, ask=_asker(args.unclear))
+        done = register_all(chosen, client, schema=schema, ask=_asker(args.unclear), is_open=is_open)
     skipped = [p for p in proposals if p not in chosen]
     _tell(args, extraction, done, skipped)
     return 1 if skipped or any(r.error for r in done) else 0
@@ -76,14 +88,28 @@ def proposals_for(extraction: Extraction, client: SiloClient, schema: str) -> li
     return propose_all(wanted, tree, client.categories(schema)) if wanted else []
 
 
+def _never(_path: str) -> bool:
+    return False
+
+
+def _now(path: str) -> bool:
+    # Looked at anew for each file: people open files while a long run is under way.
+    return open_in_any().has_file(path)
+
+
 def register_all(
     proposals: Sequence[Proposal],
     client: SiloClient,
     *,
     schema: str,
     ask: Ask = unclear,
+    is_open: Callable[[str], bool] = _never,
 ) -> list[Registration]:
-    """Register each; one failure does not stop the rest, unless it concerns all of them."""
+    """Register each; one failure does not stop the rest, unless it concerns all of them.
+
+    is_open
+        True for a file that a running FreeCAD has open; it is left alone, and its component is an error.
+    """
     from silo.api.policy import ends_run
     from silo.fcstd import check_stampable, stamp
 
@@ -98,6 +124,8 @@ def register_all(
 
     def check(entry: BomEntry) -> None:
         item = entry.object_name or None
+        if is_open(entry.doc_path):
+            raise DocumentError(entry.doc_path, _OPEN)
         check_stampable(entry.doc_path, object_name=own_name(entry), item_object=item)
 
     journal, done = Journal(), []

@@ -9,8 +9,8 @@ from dataclasses import replace
 from typing import Any
 
 from silo.bom.errors import DocumentError
+from silo.open_in_freecad import open_in_others
 from silo.workbench.freecad import host, live, saving
-from silo.workbench.freecad.open_in_others import OpenInOthers
 from silo.workbench.register.registering import Candidate, Seen, State
 
 
@@ -18,7 +18,7 @@ def look_at(paths: Iterable[str]) -> dict[str, Seen]:
     """How the files of components stand. GUI thread; what needs the disk's content is left to the worker."""
     known = host.documents_by_path()
     own = next((str(doc.TransientDir) for doc in known.values()), "")
-    elsewhere = OpenInOthers(own)
+    elsewhere = open_in_others(own)
     seen = {}
     for path in dict.fromkeys(paths):
         seen[path] = _look_at(path, known)
