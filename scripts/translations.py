@@ -5,7 +5,8 @@
     scripts/translations.py            bring the files up to date
     scripts/translations.py --check    change nothing; exit code 1 where one is out of date
 
-A text is what stands in ``translate("Silo", "…")`` in mods/silo/workbench; both arguments must be literals.
+A text is what stands in ``translate("Silo", "…")`` in mods/silo/workbench or in a module of SHARED;
+both arguments must be literals.
 What is translated already stays; a translation whose text is gone is marked as vanished, as Qt Linguist does.
 FreeCAD loads compiled files: ``lrelease silo_de.ts`` makes ``silo_de.qm``.
 """
@@ -14,6 +15,7 @@ from __future__ import annotations
 
 import argparse
 import ast
+import os
 import sys
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping
@@ -22,6 +24,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCES = ROOT / "mods" / "silo" / "workbench"
+# Words that the command line shows too.
+SHARED = (ROOT / "mods" / "silo" / "api" / "activity.py",)
 FOLDER = SOURCES / "resources" / "translations"
 TEMPLATE = FOLDER / "silo.ts"
 CONTEXT = "Silo"
@@ -56,11 +60,11 @@ def _text(call: ast.Call, path: Path) -> str:
     raise NotLiteral(f'{path.name}:{call.lineno}: wanted translate("{CONTEXT}", "a text"), both as literals')
 
 
-def collect(folder: Path = SOURCES) -> dict[str, list[str]]:
+def collect(folder: Path = SOURCES, also: Iterable[Path] = ()) -> dict[str, list[str]]:
     """Text → the files that use it, in the order of files and lines. All mistakes at once."""
     found: dict[str, list[str]] = {}
     mistakes = []
-    for path in sorted(folder.rglob("*.py")):
+    for path in (*sorted(folder.rglob("*.py")), *also):
         # words.py defines `translate`; its own call there passes variables on.
         if path.name == "words.py":
             continue
@@ -71,7 +75,7 @@ def collect(folder: Path = SOURCES) -> dict[str, list[str]]:
             continue
         for text in texts:
             files = found.setdefault(text, [])
-            name = path.relative_to(folder).as_posix()
+            name = Path(os.path.relpath(path, folder)).as_posix()
             if name not in files:
                 files.append(name)
     if mistakes:
@@ -119,9 +123,9 @@ def _add(context: ET.Element, text: str, files: Iterable[str], known: Translatio
     made.text = known.text
 
 
-def wanted(folder: Path = FOLDER, sources: Path = SOURCES) -> dict[Path, str]:
+def wanted(folder: Path = FOLDER, sources: Path = SOURCES, also: Iterable[Path] = SHARED) -> dict[Path, str]:
     """What each .ts file should hold."""
-    texts = collect(sources)
+    texts = collect(sources, also)
     paths = [folder / TEMPLATE.name, *sorted(folder.glob("silo_*.ts"))]
     return {path: ts(texts, *read(path)) for path in paths}
 

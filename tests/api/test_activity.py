@@ -56,7 +56,7 @@ def test_conflicts_are_counted() -> None:
     assert activity_text("A", merge).counts == "⚡1 in conflict"
 
 
-@pytest.mark.parametrize(("count", "words"), [(0, ""), (1, "⚠ 1 component has no Silo part number")])
+@pytest.mark.parametrize(("count", "words"), [(0, ""), (1, "1 component has no Silo part number")])
 def test_one_and_none(count: int, words: str) -> None:
     """Grammar."""
     assert unregistered_text(count) == words

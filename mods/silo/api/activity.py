@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""A merge in the words of the Activity pane (spec bom-sync §6); plain text, never markup."""
+"""A merge in the words of the Activity pane (spec bom-sync §6); plain text, never markup.
+
+The command line shows them in English, the pane in the user's language: it passes its ``translate``.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
+from enum import StrEnum
 
 from silo.api.wire import MergeDiff, MergeEvent, MergeResult, MergeWarning
 
@@ -25,42 +28,68 @@ class ActivityText:
         return tuple(line for line in (self.headline, self.counts, link, self.unregistered) if line)
 
 
-class Counts(NamedTuple):
+class Count(StrEnum):
     """What a merge counts, in the order in which it is shown."""
 
-    added: int
-    changed: int
-    unreferenced: int
-    in_conflict: int
+    ADDED = "added"
+    CHANGED = "changed"
+    UNREFERENCED = "unreferenced"
+    IN_CONFLICT = "in conflict"
 
 
-def counts(diff: MergeDiff, warnings: Iterable[MergeWarning] = ()) -> Counts:
-    """The counts of a merge; the pane has its own, translated words for them."""
+# As ``FreeCAD.Qt.translate``: (context, text) -> the text in the user's language.
+Translate = Callable[[str, str], str]
+
+
+def english(_context: str, text: str) -> str:
+    """The text as it stands here."""
+    return text
+
+
+def headline(item: str, translate: Translate = english) -> str:
+    """``BOM Updated: ASM-001``."""
+    return translate("Silo", "BOM Updated: {number}").replace("{number}", item)
+
+
+def count_texts(
+    diff: MergeDiff, warnings: Iterable[MergeWarning] = (), translate: Translate = english
+) -> dict[Count, str]:
+    """Each count of a merge in words, such as ``+1 added``, without those that are zero."""
     conflicts = sum(1 for warning in warnings if warning.type == "conflict")
-    return Counts(len(diff.added), len(diff.quantity_changed), len(diff.removed), conflicts)
+    counted = (
+        (Count.ADDED, len(diff.added), translate("Silo", "+{n} added")),
+        (Count.CHANGED, len(diff.quantity_changed), translate("Silo", "~{n} qty changed")),
+        (Count.UNREFERENCED, len(diff.removed), translate("Silo", "⚠{n} unreferenced")),
+        (Count.IN_CONFLICT, conflicts, translate("Silo", "⚡{n} in conflict")),
+    )
+    return {kind: text.replace("{n}", str(count)) for kind, count, text in counted if count}
+
+
+def no_changes(translate: Translate = english) -> str:
+    """What stands there instead of counts."""
+    return translate("Silo", "no changes")
 
 
 def counts_text(diff: MergeDiff, warnings: Iterable[MergeWarning] = ()) -> str:
-    """``+1 added  ~1 qty changed  ⚠1 unreferenced``, leaving out what is zero."""
-    words = ("+{} added", "~{} qty changed", "⚠{} unreferenced", "⚡{} in conflict")
-    parts = zip(words, counts(diff, warnings), strict=True)
-    return "  ".join(text.format(count) for text, count in parts if count) or "no changes"
+    """``+1 added  ~1 qty changed  ⚠1 unreferenced``, without what is zero."""
+    return "  ".join(count_texts(diff, warnings).values()) or no_changes()
 
 
-def unregistered_text(count: int) -> str:
+def unregistered_text(count: int, translate: Translate = english) -> str:
     """``2 components have no Silo part number``; "" for none."""
-    if not count:
-        return ""
-    return f"⚠ {count} {'component has' if count == 1 else 'components have'} no Silo part number"
+    one = translate("Silo", "{n} component has no Silo part number")
+    many = translate("Silo", "{n} components have no Silo part number")
+    return (one if count == 1 else many).replace("{n}", str(count)) if count else ""
 
 
 def activity_text(
     item: str, merge: MergeEvent | MergeResult, *, resolve_url: str = "", unregistered: int = 0
 ) -> ActivityText:
     """The box of one merge; ``resolve_url`` overrides the event's (made absolute by the caller)."""
+    without = unregistered_text(unregistered)
     return ActivityText(
-        headline=f"BOM Updated: {item}",
+        headline=headline(item),
         counts=counts_text(merge.diff, tuple(merge.warnings)),
         resolve_url=resolve_url or merge.resolve_url,
-        unregistered=unregistered_text(unregistered),
+        unregistered=f"⚠ {without}" if without else "",
     )

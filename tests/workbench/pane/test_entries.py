@@ -4,15 +4,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from silo.api.activity import counts_text, english
 from silo.api.sse import ServerEvent
+from silo.api.wire import MergeDiff, MergeWarning
 from silo.bom.errors import InputError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
+from silo.workbench import words
 from silo.workbench.pane.activity import Activity, Do, Entry, entry_text
-from silo.workbench.pane.entries import MOST_IN_CONSOLE, console_lines, of_event, of_sent
+from silo.workbench.pane.entries import MOST_IN_CONSOLE, badges, console_lines, of_event, of_sent
 
 if TYPE_CHECKING:
     from vault import Vault
@@ -40,6 +43,29 @@ def test_a_merge_is_the_box_of_the_spec(vault: Vault) -> None:
     ]
     (view,) = box(vault).actions
     assert view.target == page(f"/items/{vault.number}/bom")
+
+
+LINE = {"part_number": "P", "quantity": 1}
+CHANGE = {"part_number": "P", "old_quantity": 1, "new_quantity": 2}
+LISTS = (
+    {},
+    {"added": [LINE] * 12},
+    {"added": [LINE], "quantity_changed": [CHANGE] * 2, "removed": [LINE] * 3},
+)
+
+
+@pytest.mark.parametrize("lists", LISTS)
+def test_pane_and_command_line_count_in_the_same_words(lists: dict[str, Any]) -> None:
+    """A conflict too; the pane has them in the user's language."""
+    diff = MergeDiff.model_validate(lists)
+    for warnings in ((), (MergeWarning(type="conflict", part_number="P", message="CAD 4, Silo 6"),)):
+        told = counts_text(diff, warnings)
+        assert "  ".join(line.text for line in badges(diff, warnings)) == told
+        words.use(lambda _context, text: text.swapcase().replace("{N}", "{n}"))
+        try:
+            assert "  ".join(line.text for line in badges(diff, warnings)) == told.swapcase()
+        finally:
+            words.use(english)
 
 
 def test_however_much_is_broken_registering_stays_within_reach(vault: Vault) -> None:

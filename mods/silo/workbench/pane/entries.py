@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from datetime import datetime
 from typing import Any
 
-from silo.api.activity import counts
+from silo.api.activity import Count, count_texts, headline, no_changes, unregistered_text
 from silo.api.sse import MERGE, RESET, ServerEvent
 from silo.api.wire import MergeDiff, MergeEvent, MergeWarning
 from silo.bom.errors import SiloError
@@ -58,13 +58,12 @@ _WEIGHT = {
 
 
 def _title(sent: Sent) -> str:
+    item = " ".join(filter(None, (sent.part_number, _name(sent))))
     if sent.status is Status.MERGED:
-        text = translate("Silo", "BOM Updated: {number}")
-    elif sent.status is Status.BLOCKED:
-        text = translate("Silo", "BOM not synced: {number}")
-    else:
-        text = translate("Silo", "Committed: {number}")
-    return text.replace("{number}", " ".join(filter(None, (sent.part_number, _name(sent)))))
+        return headline(item, translate)
+    if sent.status is Status.BLOCKED:
+        return translate("Silo", "BOM not synced: {number}").replace("{number}", item)
+    return translate("Silo", "Committed: {number}").replace("{number}", item)
 
 
 def _name(sent: Sent) -> str:
@@ -83,15 +82,18 @@ def _badges(sent: Sent) -> tuple[Line, ...]:
 
 def badges(diff: MergeDiff, warnings: Iterable[MergeWarning] = ()) -> tuple[Line, ...]:
     """The counts of a merge, as the spec's box has them; what is zero is left out."""
-    words = (
-        (translate("Silo", "+{n} added"), Tone.GOOD),
-        (translate("Silo", "~{n} qty changed"), Tone.CHANGED),
-        (translate("Silo", "⚠{n} unreferenced"), Tone.WARNING),
-        (translate("Silo", "⚡{n} in conflict"), Tone.WARNING),
-    )
-    parts = zip(words, counts(diff, warnings), strict=True)
-    told = tuple(Line(text.replace("{n}", str(count)), tone) for (text, tone), count in parts if count)
-    return told or (Line(translate("Silo", "no changes"), Tone.QUIET),)
+    told = count_texts(diff, warnings, translate)
+    if not told:
+        return (Line(no_changes(translate), Tone.QUIET),)
+    return tuple(Line(text, _TONES[kind]) for kind, text in told.items())
+
+
+_TONES = {
+    Count.ADDED: Tone.GOOD,
+    Count.CHANGED: Tone.CHANGED,
+    Count.UNREFERENCED: Tone.WARNING,
+    Count.IN_CONFLICT: Tone.WARNING,
+}
 
 
 def _revision_lines(sent: Sent) -> tuple[Line, ...]:
@@ -195,13 +197,11 @@ def unregistered_lines(resolved: Resolved) -> tuple[Line, ...]:
     count = len(resolved.unresolved)
     if not count:
         return ()
-    one = translate("Silo", "{n} component has no Silo part number")
-    many = translate("Silo", "{n} components have no Silo part number")
     register = Action(Do.REGISTER, translate("Silo", "Register Parts…"), document=resolved.assembly.doc_path)
     names = ", ".join(plain(display_name(entry), 40) for entry in resolved.unresolved[:5])
     more = ", …" if count > 5 else ""
     return (
-        Line(counted(count, one, many), Tone.WARNING, (register,)),
+        Line(unregistered_text(count, translate), Tone.WARNING, (register,)),
         Line(f"{names}{more}", Tone.QUIET),
     )
 
@@ -262,7 +262,7 @@ def of_merge(merge: MergeEvent, page: Page, when: float, event_id: str | None = 
     told = badges(merge.diff, merge.warnings)
     return Entry(
         key=f"sync:{merge.sync_id}" if merge.sync_id else f"event:{event_id}:{MERGE}",
-        title=translate("Silo", "BOM Updated: {number}").replace("{number}", merge.item),
+        title=headline(merge.item, translate),
         when=_moment(merge.timestamp, when),
         tone=Tone.WARNING if any(badge.tone is Tone.WARNING for badge in told) else Tone.PLAIN,
         who=merge.user,

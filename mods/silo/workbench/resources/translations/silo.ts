@@ -473,11 +473,6 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../pane/entries.py" />
-            <source>BOM Updated: {number}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
             <source>BOM not synced: {number}</source>
             <translation type="unfinished" />
         </message>
@@ -489,31 +484,6 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../pane/entries.py" />
             <source>BOM unchanged</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>+{n} added</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>~{n} qty changed</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>⚠{n} unreferenced</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>⚡{n} in conflict</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>no changes</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -570,16 +540,6 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../pane/entries.py" />
             <source>{number}: the assembly has {cad}, a manual line in Silo says {silo}</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>{n} component has no Silo part number</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/entries.py" />
-            <source>{n} components have no Silo part number</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1330,6 +1290,46 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../settings/page_work.py" />
             <source>Token: none.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../api/activity.py" />
+            <source>BOM Updated: {number}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../api/activity.py" />
+            <source>+{n} added</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../api/activity.py" />
+            <source>~{n} qty changed</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../api/activity.py" />
+            <source>⚠{n} unreferenced</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../api/activity.py" />
+            <source>⚡{n} in conflict</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../api/activity.py" />
+            <source>no changes</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../api/activity.py" />
+            <source>{n} component has no Silo part number</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../api/activity.py" />
+            <source>{n} components have no Silo part number</source>
             <translation type="unfinished" />
         </message>
     </context>
