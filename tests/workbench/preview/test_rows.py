@@ -261,3 +261,16 @@ def test_a_missing_component_is_a_row_of_its_own_kind(tmp_path: Path) -> None:
     assert (Kind.UNCHANGED, "Pin", "2", "2") in kinds
     assert next(row.note for row in rows(preview)) == "missing: Lid.FCStd#Body"
     assert summary(preview) == "1 missing"
+
+
+def test_what_a_sync_would_not_send_is_not_offered_below(story: GearboxStory) -> None:
+    """The sync's own decision: the server knows already that a line of the gearbox is unreferenced.
+
+    The last test of the module, since it syncs.
+    """
+    story.sync()
+    preview = preview_of(story)
+    (gearbox,) = preview.compared[:-1]
+    assert gearbox.diff.removed
+    assert preview.drifted_below == 0
+    assert [Path(taken.path).name for taken in to_sync(preview, below=True)] == ["TopAssembly.FCStd"]

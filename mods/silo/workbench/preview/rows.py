@@ -67,11 +67,16 @@ class Row:
 
 @dataclass(frozen=True)
 class Compared:
-    """One assembly against the server's lines."""
+    """One assembly against the server's lines.
+
+    to_send
+        a sync of it would be sent: the server has something to learn from it.
+    """
 
     resolved: Resolved
     lines: tuple[Mapping[str, Any], ...]
     diff: BomDiff
+    to_send: bool
 
 
 @dataclass(frozen=True)
@@ -108,8 +113,8 @@ class Preview:
 
     @property
     def drifted_below(self) -> int:
-        """Sub-assemblies that differ from the server."""
-        return sum(1 for one in self.compared[:-1] if one.diff.drifted)
+        """Sub-assemblies whose sync has something to send."""
+        return sum(1 for one in self.compared[:-1] if one.to_send)
 
 
 def ask(snapshot: Snapshot, api: Any, control: Control) -> Preview:
@@ -125,11 +130,20 @@ def ask(snapshot: Snapshot, api: Any, control: Control) -> Preview:
         control.check()
         control.progress(one.assembly.part_number or one.assembly.label)
         lines = server_lines(one, api)
-        compared.append(Compared(one, lines, one.diff(lines)))
+        compared.append(_compared(one, lines))
     all_lines = [line for one in compared for line in one.lines]
     number = whole.assembly.part_number
     page = api.web_url(f"/items/{number}/bom") if number else ""
     return Preview(snapshot, tuple(compared), names_of(whole, all_lines), blocking(whole), page)
+
+
+def _compared(one: Resolved, lines: tuple[Mapping[str, Any], ...]) -> Compared:
+    from silo.bom_sync import Status, decide
+
+    # Whether what is missing may be left out is asked in the window, so it does not count here.
+    outcome = decide(one, lines, allow_missing=True)
+    diff = one.diff(lines) if outcome.plan is None else outcome.plan.diff
+    return Compared(one, lines, diff, outcome.status is Status.MERGED)
 
 
 # Nested assemblies share their lines: some dozen small files can stand for more rows than memory holds.
@@ -312,7 +326,7 @@ def to_sync(preview: Preview, *, below: bool) -> tuple[Snapshot, ...]:
     """Snapshots whose BOMs a sync sends, children before parents; without ``below`` the top one only."""
     found = []
     for one in preview.compared[:-1] if below else ():
-        if one.resolved.assembly.part_number and one.diff.drifted:
+        if one.to_send:
             found.append(_part_of(preview.snapshot, one.resolved))
     return (*found, preview.snapshot)
 
