@@ -170,7 +170,7 @@ def test_a_sync_with_its_sub_assemblies_sends_those_that_differ_first(
     story: GearboxStory, preview: Preview
 ) -> None:
     """The gearbox differs too; without the wish the top assembly only."""
-    assert preview.drifted_below == 1
+    assert preview.to_send_below == 1
     paths = [Path(taken.path).name for taken in to_sync(preview, below=True)]
     assert paths == ["Gearbox.FCStd", "TopAssembly.FCStd"]
     assert [Path(t.path).name for t in to_sync(preview, below=False)] == ["TopAssembly.FCStd"]
@@ -272,5 +272,5 @@ def test_what_a_sync_would_not_send_is_not_offered_below(story: GearboxStory) ->
     preview = preview_of(story)
     (gearbox,) = preview.compared[:-1]
     assert gearbox.diff.removed
-    assert preview.drifted_below == 0
+    assert preview.to_send_below == 0
     assert [Path(taken.path).name for taken in to_sync(preview, below=True)] == ["TopAssembly.FCStd"]

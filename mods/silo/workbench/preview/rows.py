@@ -112,7 +112,7 @@ class Preview:
         return self.top.resolved.unregistered
 
     @property
-    def drifted_below(self) -> int:
+    def to_send_below(self) -> int:
         """Sub-assemblies whose sync has something to send."""
         return sum(1 for one in self.compared[:-1] if one.to_send)
 
