@@ -19,6 +19,7 @@ from typing import Any
 import pytest
 from freecad_cases import corpora, machines
 from freecad_cases.machines import REPOSITORY, WANTED, FreeCAD
+from real_silo import TOKEN, Moods, RealSilo, real_silo
 
 from silo.api.client import SiloClient
 from silo.cli.main import main
@@ -191,6 +192,48 @@ def test_freecadcmd_alone_syncs_and_reports(vault: Vault, version: str, tmp_path
     (vault.folder / "zzz.FCStd").unlink()
     again = headless(freecad, vault, args, tmp_path, dependencies=True)
     assert again.returncode == 0, again.stdout
+
+
+@pytest.mark.parametrize(
+    ("moods", "code", "words"),
+    [
+        (Moods(), 0, ("merged",)),
+        (Moods(merge="missing"), 0, ("merged", "has no merge", "one by one")),
+        (Moods(merge="fails"), 3, ("failed", "deadlock detected")),
+    ],
+    ids=["default", "no merge", "merge fails"],
+)
+def test_freecadcmd_syncs_with_the_real_silo(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, moods: Moods, code: int, words: tuple[str, ...]
+) -> None:
+    """Both assemblies arrive in each mood, a second run changes nothing, and a failure is printed."""
+    freecad = machines.need(WANTED[0])
+    corpus = corpora.unpack(corpora.ARCHIVES / "corpus-0.20.zip", tmp_path / "corpus")
+    folder = tmp_path / "vault"
+    shutil.copytree(corpus.base("asm4/link_to_assembly"), folder)
+    for name in ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_CACHE_HOME"):
+        monkeypatch.setenv(name, str(tmp_path / "home"))
+    with real_silo() as silo, SiloClient(silo.url, TOKEN) as client:
+        env = {"SILO_API_URL": silo.url, "SILO_API_TOKEN": TOKEN}
+        for name, value in env.items():
+            monkeypatch.setenv(name, value)
+        assert main(["register", "--yes", str(folder / "top.FCStd")]) == 0
+        silo.moods = moods
+        vault, args = Vault(folder, client, env), {"tops": ["vault/top.FCStd"], "recursive": True}
+        done = headless(freecad, vault, args, tmp_path, dependencies=True)
+        assert done.returncode == code, done.stdout
+        assert [word for word in words if word not in done.stdout] == [], done.stdout
+        wanted = [1, 1, 2] if code == 0 else []
+        assert quantities(silo) == wanted
+        if code == 0:
+            again = headless(freecad, vault, args, tmp_path, dependencies=True)
+            assert (again.returncode, again.stdout.count("unchanged")) == (0, 2), again.stdout
+            assert quantities(silo) == wanted
+
+
+def quantities(silo: RealSilo) -> list[float]:
+    """Of all BOM lines that the server holds."""
+    return sorted(line["quantity"] for item in silo.items.values() for line in item.lines)
 
 
 @pytest.mark.parametrize("version", WANTED)

@@ -48,6 +48,12 @@ NOT_ATOMIC = "not_atomic"
 """The warning of a merge that was made of single calls."""
 
 
+def unusual(result: MergeResult | None) -> list[str]:
+    """What a person must know about a merge that was not a usual one, in sentences."""
+    warnings = result.warnings if result is not None else ()
+    return [warning.message for warning in warnings if warning.type in (UNCLEAR, NOT_ATOMIC)]
+
+
 class Lines(Protocol):
     """What is needed of a Silo."""
 

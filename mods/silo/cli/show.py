@@ -14,7 +14,7 @@ from rich.text import Text
 from rich.tree import Tree
 
 from silo.api.activity import ActivityText
-from silo.api.merging import NOT_ATOMIC, UNCLEAR
+from silo.api.merging import unusual
 from silo.bom.findings import Finding, Severity
 from silo.bom.model import BomDiff, BomEntry, Extraction
 from silo.bom.naming import display_name
@@ -185,9 +185,8 @@ def outcome_text(outcome: Outcome) -> Text:
     text = Text().append(f"{mark} ", style).append(plain(who), "bold").append(f": {words}")
     if outcome.error is not None:
         text.append(f": {plain(str(outcome.error))}")
-    for warning in outcome.result.warnings if outcome.result is not None else ():
-        if warning.type in (UNCLEAR, NOT_ATOMIC):
-            text.append(f"\n  ⚠ {plain(warning.message)}", "yellow")
+    for message in unusual(outcome.result):
+        text.append(f"\n  ⚠ {plain(message)}", "yellow")
     return text
 
 

@@ -234,12 +234,14 @@ def _in_words(result: TopResult) -> str:
 
 
 def _outcome_words(outcome: Outcome) -> str:
+    from silo.api.merging import unusual
     from silo.bom_sync import blocking
 
     text = f"{outcome.assembly.part_number or outcome.assembly.label} {outcome.status.value}"
     reasons = [str(outcome.error)] if outcome.error is not None else []
     if outcome.status.value == "blocked":
         reasons += [finding.message for finding in blocking(outcome.resolved)]
+    reasons += unusual(outcome.result)
     return f"{text} ({'; '.join(reasons)})" if reasons else text
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from silo.api.activity import counts_text, english
+from silo.api.merging import NOT_ATOMIC
 from silo.api.sse import ServerEvent
 from silo.api.wire import MergeDiff, MergeWarning
 from silo.bom.errors import InputError
@@ -109,6 +110,18 @@ def test_the_report_view_is_not_flooded(vault: Vault) -> None:
     assert lines[-1] == f"[Silo BOM] … and {300 - MOST_IN_CONSOLE} more of these; the preview lists them all."
     few = console_lines(replace(sent, resolved=replace(sent.resolved, findings=tuple(many[:3]))))
     assert few == tuple(f"[Silo BOM] P{n} has 2 individual links." for n in range(3))
+
+
+def test_a_merge_line_by_line_is_told(vault: Vault) -> None:
+    """A server without the merge route took single calls: not one step, and people know it."""
+    vault.commit(vault.snapshot(vault.part("Bolt", 4)))
+    vault.send()
+    (sent,) = vault.told
+    assert sent.result is not None
+    warning = MergeWarning(type=NOT_ATOMIC, part_number=vault.number, message="written one by one")
+    told = replace(sent, result=sent.result.model_copy(update={"warnings": [warning]}))
+    assert "written one by one" in [line.text for line in of_sent(told, page).lines]
+    assert "written one by one" not in [line.text for line in of_sent(sent, page).lines]
 
 
 def test_a_page_of_another_server_is_not_offered() -> None:

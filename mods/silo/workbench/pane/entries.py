@@ -10,6 +10,7 @@ from datetime import datetime
 from typing import Any
 
 from silo.api.activity import Count, count_texts, headline, no_changes, unregistered_text
+from silo.api.merging import unusual
 from silo.api.sse import MERGE, RESET, ServerEvent
 from silo.api.wire import MergeDiff, MergeEvent, MergeWarning
 from silo.bom.errors import SiloError
@@ -110,6 +111,7 @@ def _status_lines(sent: Sent) -> tuple[Line, ...]:
     lines = []
     if sent.entry.remark:
         lines.append(Line(sent.entry.remark, Tone.WARNING))
+    lines += [Line(plain(message, 300), Tone.WARNING) for message in unusual(sent.result)]
     removed = len(sent.result.diff.removed) if sent.result is not None else 0
     if sent.status is Status.UNCHANGED and sent.plan is not None:
         removed = len(sent.plan.diff.removed)
