@@ -326,6 +326,41 @@ def test_what_is_rejected_stays_visible_and_holds_up_nobody(
         outbox.discard(left.id)
 
 
+def test_a_half_that_went_alone_is_told(outbox: Outbox, silo: FakeSilo, model: Path) -> None:
+    """A refused file does not keep its BOM, nor the other way round; the entry says which one went."""
+    fail(silo, "upload_file", ConflictError("held by a colleague"))
+    outbox.put(silo.base_url, TOP, file=model, bom=bom(2))
+    outbox.put(silo.base_url, OTHER, file=model, bom=bom(1, "no-such-part"))
+    outbox.put(silo.base_url, BOLT, bom=bom(1, "no-such-part"))
+    outbox.send(silo)
+    file, lines, only = (entry.reason.splitlines() for entry in outbox.entries())
+    assert file == ["held by a colleague", "Its BOM is in Silo; only the file is not"]
+    assert lines[-1] == "Its file is in Silo; only the BOM is not"
+    assert len(only) == 1
+    fail(silo, "upload_file", ConflictError("still held"))
+    outbox.retry(outbox.entries()[0].id)
+    outbox.send(silo)
+    assert outbox.entries()[0].reason == "still held\nIts BOM is in Silo; only the file is not"
+
+
+def test_messages_name_the_users_file(outbox: Outbox, silo: FakeSilo, model: Path) -> None:
+    """Not the copy that is kept for sending, of which people know nothing."""
+    spoil = {
+        "shorter": lambda copy: fail(silo, "upload_file", DocumentError(str(copy), "became shorter")),
+        "gone": Path.unlink,
+        "damaged": lambda copy: copy.write_bytes(b"x"),
+    }
+    for name, harm in spoil.items():
+        entry = outbox.put(silo.base_url, TOP, file=model)
+        copy = outbox.copies / entry.copy
+        harm(copy)
+        outbox.send(silo)
+        said = outbox.entries()[-1].reason
+        assert said.startswith(f"{model}: "), name
+        assert entry.key not in said, name
+        outbox.discard(entry.id)
+
+
 def test_an_old_state_is_not_brought_back_by_a_retry(outbox: Outbox, silo: FakeSilo) -> None:
     """The newer BOM arrived; retrying the rejected older one would undo it."""
     old = outbox.put(silo.base_url, TOP, bom=bom(1, "no-such-part"))

@@ -233,8 +233,18 @@ class _Run:
             self.report.stopped_by = error
 
     def _hold(self, entry: Entry, errors: Sequence[SiloError]) -> None:
-        self.store.update(entry.id, state=State.HELD, reason="\n".join(map(str, errors)))
+        reasons = [*map(str, errors), *self._went_alone(entry)]
+        self.store.update(entry.id, state=State.HELD, reason="\n".join(reasons))
         self.report.held.append(self.store.entry(entry.id) or entry)
+
+    def _went_alone(self, entry: Entry) -> list[str]:
+        """Says which half of a commit the server has, where the other one was refused."""
+        now = self.store.entry(entry.id) or entry
+        if not now.has_file or not any(self.store.bom(entry.id)) or now.file_left == now.bom_left:
+            return []
+        if now.file_left:
+            return ["Its BOM is in Silo; only the file is not"]
+        return ["Its file is in Silo; only the BOM is not"]
 
     # -- one entry --------------------------------------------------------------------------------------
 
@@ -317,7 +327,8 @@ class _Run:
             path = self.store.verified(entry)
         except OSError as error:
             raise _PassingError(
-                f"{entry.file_name}: the copy kept for sending cannot be read ({error.strerror or error})"
+                f"{entry.path or entry.file_name}: the copy kept for sending cannot be read "
+                f"({error.strerror or error})"
             ) from error
         progress = self.on_progress
         try:
@@ -333,8 +344,9 @@ class _Run:
                 cancelled=self.cancelled,
             )
         except DocumentError as error:
-            # The copy was whole a moment ago, so this is the disk, and not damage.
-            raise _PassingError(str(error)) from error
+            # The copy was whole a moment ago, so this is the disk, and not damage. People know their own
+            # file, not our copy.
+            raise _PassingError(f"{entry.path or entry.file_name}: {error.reason}") from error
 
     def _revisions(
         self, part_number: str, *, newest: int | None = None, after: int = 0

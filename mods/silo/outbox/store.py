@@ -138,7 +138,7 @@ class Store(Database):
         except OSError as error:
             told = f"cannot be copied for sending ({error.strerror or error})"
             if held is not None or origin is copy:
-                self.update(entry.id, reason=f"{origin.name}: {told}; it is tried again")
+                self.update(entry.id, reason=f"{entry.path or entry.file_name}: {told}; it is tried again")
                 return
             self.discard(entry.id)
             raise DocumentError(str(origin), f"{told}; nothing was kept, commit it again") from error
@@ -262,9 +262,8 @@ class Store(Database):
         path = self.copies / entry.copy
         if content_hash(path) != entry.sha256:
             raise InputError(
-                f"{entry.file_name}: the copy kept for sending is damaged ({path}), so it was not sent. "
-                f"Commit "
-                "the document again, then discard this"
+                f"{entry.path or entry.file_name}: the copy kept for sending is damaged, so it was not sent. "
+                "Commit the document again, then discard this"
             )
         return path
 
