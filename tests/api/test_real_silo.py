@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 from real_silo import FAULTS, TOKEN, Moods, RealSilo, real_silo
 
 from silo.api.client import SiloClient
-from silo.api.events import EventListener
+from silo.api.events import Connection, ConnectionState, EventListener
 from silo.api.policy import Retries
 from silo.api.sse import ServerEvent
 from silo.batch import Options, TopResult, sync_top
@@ -30,7 +30,7 @@ from silo.bom_sync import Status, compare, resolve
 from silo.cli.common import read_assembly
 from silo.cli.register import proposals_for, register_all
 from silo.inertia.push import PushItem, PushPlan, push
-from silo.outbox.entry import Commit
+from silo.outbox.entry import Commit, State
 from silo.outbox.send import send_all
 from silo.outbox.store import Store
 
@@ -309,6 +309,79 @@ def test_the_live_connection_reads_both_dialects(tmp_path: Path) -> None:
                 finally:
                     listener.stop()
             assert (event.type, event.merge.item) == ("bom_merge", event.item)
+
+
+# -- waiting ---------------------------------------------------------------------------------------
+
+
+def waiting(desk: Desk, clock: Callable[[], float]) -> None:
+    """A file that waits to be sent."""
+    desk.outbox.clock = clock
+    path = next(desk.top.parent.rglob("Housing.FCStd"))
+    number = desk.silo.named("Housing").part_number
+    desk.outbox.add(Commit(str(path), 0.0, part_number=number, comment="c", file=path), desk.silo.url)
+
+
+@pytest.mark.parametrize(("fault", "seconds"), [("429", 40), ("503 later", 70)])
+def test_the_queue_keeps_the_pause_that_the_server_named(tmp_path: Path, fault: str, seconds: int) -> None:
+    """At whichever request; the entry names the time, and nothing is asked before it has passed."""
+    with real_silo() as silo:
+        desk, now = registered(tmp_path, silo), [1000.0]
+        waiting(desk, lambda: now[0])
+        with desk.client() as client:
+            for request in range(LENGTHS["queue"]):
+                silo.faults[len(silo.seen) + request] = fault
+                report = send_all(desk.outbox, client)
+                (entry,) = desk.outbox.entries()
+                assert report.failed == [entry]
+                assert f"in {seconds} s" in entry.reason
+                assert entry.next_attempt == now[0] + seconds
+                asked = len(silo.seen)
+                now[0] += seconds - 1
+                send_all(desk.outbox, client)
+                assert len(silo.seen) == asked
+                now[0] += 1
+                silo.faults.clear()
+            assert len(send_all(desk.outbox, client).sent) == 1
+        assert len(silo.named("Housing").files) == 1
+
+
+@pytest.mark.parametrize(("fault", "seconds"), [("429", 40), ("503 later", 70)])
+def test_the_listener_keeps_the_pause_that_the_server_named(fault: str, seconds: int) -> None:
+    """And names it to the person; then it listens."""
+    with real_silo() as silo, SiloClient(silo.url, TOKEN, retries=Retries(tries=1)) as client:
+        silo.faults[0] = fault
+        states: queue.Queue[ConnectionState] = queue.Queue()
+        pauses: list[float] = []
+        listener = EventListener(
+            client, lambda _event: None, states.put, wait=lambda _event, seconds: pauses.append(seconds)
+        )
+        listener.start()
+        try:
+            said = [states.get(timeout=20) for _ in range(4)]
+        finally:
+            listener.stop()
+        kinds = [Connection.CONNECTING, Connection.OFFLINE, Connection.CONNECTING, Connection.ONLINE]
+        assert [state.kind for state in said] == kinds
+        assert (said[1].retry_in, pauses) == (seconds, [seconds])
+        assert f"in {seconds} s" in str(said[1])
+
+
+def test_what_waits_for_a_newer_silo_is_sent_by_itself_after_the_upgrade(tmp_path: Path) -> None:
+    """Nobody presses Retry; what was remembered of the old server does not stand in the way."""
+    with real_silo(Moods(upload="missing")) as silo:
+        desk, now = registered(tmp_path, silo), [1000.0]
+        waiting(desk, lambda: now[0])
+        with SiloClient(silo.url, TOKEN, memory=tmp_path / "servers.json") as client:
+            for _ in range(12):  # for hours
+                assert send_all(desk.outbox, client).sent == []
+                (entry,) = desk.outbox.entries()
+                assert entry.state is State.WAITING
+                assert now[0] < entry.next_attempt <= now[0] + 900
+                now[0] = entry.next_attempt
+            silo.moods = Moods()
+            assert len(send_all(desk.outbox, client).sent) == 1
+        assert len(silo.named("Housing").files) == 1
 
 
 # -- each fault of each request --------------------------------------------------------------------

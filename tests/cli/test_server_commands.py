@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from real_silo import TOKEN, Moods, real_silo
 
 from silo.api.config import config_path
 
@@ -154,3 +155,15 @@ def test_watch_prints_events_as_lines_of_json(run: Any, silo: Any, gearbox: Path
     assert ran.code == 0
     [line] = ran.out.splitlines()
     assert set(json.loads(line)) == {"id", "type", "event", "data"}
+
+
+@pytest.mark.parametrize("mode", ["normal", "read-only", "degraded"])
+def test_watch_shows_the_mode_of_the_server(run: Any, monkeypatch: pytest.MonkeyPatch, mode: str) -> None:
+    """A person who waits for a merge sees why none comes."""
+    with real_silo(Moods(mode=mode)) as server:
+        monkeypatch.setenv("SILO_API_URL", server.url)
+        monkeypatch.setenv("SILO_API_TOKEN", TOKEN)
+        server.announce("revision.created", {"part_number": "A01-0001"})
+        ran = run("watch", "--count", 1)
+    assert (ran.code, "A01-0001" in ran.out) == (0, True)
+    assert f": {mode}]" in ran.err

@@ -51,7 +51,7 @@ class Moods:
     strict: bool = False  # 400 for an unknown key
     checksums: bool = True
     sizes: bool = True
-    upload: str = "multipart"  # or "presigned"
+    upload: str = "multipart"  # or "presigned", or "missing"
     schemas: tuple[str, ...] = ("kindred-rd",)
     errors: str = "code"  # {"error": code, "message"}, or "text": {"error": text}, or "bare"
     event: str = "bom.merged"  # or "bom_merge"
@@ -308,6 +308,8 @@ def _revision(silo: RealSilo, _query: dict[str, str], _body: Any, number: str, r
 
 def _upload(silo: RealSilo, _query: dict[str, str], body: Any, number: str) -> Answer:
     item = silo.one(number)
+    if silo.moods.upload == "missing":
+        raise PlainError("404 page not found")
     if isinstance(body, dict):  # associate what was uploaded to the store before
         content = silo.uploads.pop(body["object_key"])
         return 201, silo.revise(item, body.get("comment", ""), body.get("properties"), content)
@@ -328,6 +330,8 @@ def _download(silo: RealSilo, _query: dict[str, str], _body: Any, number: str, r
 
 
 def _presign(silo: RealSilo, _query: dict[str, str], body: Any) -> Answer:
+    if silo.moods.upload == "missing":
+        raise PlainError("404 page not found")
     if silo.moods.upload != "presigned":
         raise Refused(501, "not_implemented")
     key = f"uploads/tmp/{uuid.uuid4()}/{body['filename']}"
@@ -493,6 +497,7 @@ class _Handler(BaseHTTPRequestHandler):
             "429": (429, {"error": "slow down"}, {"Retry-After": "40"}),
             "502 before": (502, "<html><title>502 Bad Gateway</title></html>", {"Content-Type": "text/html"}),
             "503": (503, "", {}),
+            "503 later": (503, "", {"Retry-After": "70"}),
             "login": (302, "", {"Location": f"/login?next={parts.path}"}),
         }
         if fault in early:
