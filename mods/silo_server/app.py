@@ -12,7 +12,6 @@ import anyio.to_thread
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 
-from silo.api.wire import MergeRequest
 from silo_server import failures
 from silo_server.background import Probe, TokenUses
 from silo_server.clock import Clock, utc_now
@@ -25,6 +24,7 @@ from silo_server.operation.metrics import Metrics
 from silo_server.operation.requests import Observed
 from silo_server.routes import auth, bom, items, review, revisions, system, transfer
 from silo_server.routes.context import Server
+from silo_server.routes.document import complete
 from silo_server.settings import Settings, settings_from_environment
 from silo_server.web import pages
 
@@ -100,15 +100,5 @@ def observed(app: FastAPI, settings: Settings) -> Observed:
 
 def _openapi(app: FastAPI) -> dict[str, Any]:
     if app.openapi_schema is None:
-        document = get_openapi(title=app.title, version=app.version, routes=app.routes)
-        for operations in document["paths"].values():
-            for operation in operations.values():
-                # We answer 400 where FastAPI by itself would answer 422.
-                operation.get("responses", {}).pop("422", None)
-        for name in ("HTTPValidationError", "ValidationError"):
-            document.get("components", {}).get("schemas", {}).pop(name, None)
-        # The merge reads its body by itself (services.merge_request); its form is the wire model's.
-        merge = MergeRequest.model_json_schema(ref_template="#/components/schemas/{model}")
-        document["components"]["schemas"].update(merge.pop("$defs"), MergeRequest=merge)
-        app.openapi_schema = document
+        app.openapi_schema = complete(get_openapi(title=app.title, version=app.version, routes=app.routes))
     return app.openapi_schema

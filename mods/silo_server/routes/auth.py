@@ -6,11 +6,12 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Request
-from pydantic import Field
+from pydantic import Field, WithJsonSchema
 from starlette.responses import Response
 
 from silo.api.wire import ErrorBody
 from silo_server.clock import wire
+from silo_server.routes import document
 from silo_server.routes.context import (
     READ_ERRORS,
     SESSION_COOKIE,
@@ -36,6 +37,9 @@ LOGIN_ERRORS: dict[int | str, dict[str, Any]] = {
 }
 
 
+NewPassword = Annotated[Text, WithJsonSchema(document.PASSWORD)]
+
+
 class LoginBody(Body):
     """``POST /api/auth/login``."""
 
@@ -52,7 +56,7 @@ class TokenBody(Body):
         ``read``, ``write``, ``admin``, each with those before it; absent = all that the caller may.
     """
 
-    name: Annotated[str, Field(min_length=1, max_length=200)]
+    name: Annotated[Short, Field(min_length=1), WithJsonSchema(document.text(200, minLength=1))]
     expires_in_days: Annotated[float, Field(gt=0, le=3650, strict=True)] | None = None
     scopes: Annotated[list[Scope], Field(min_length=1, max_length=3)] | None = None
 
@@ -60,10 +64,10 @@ class TokenBody(Body):
 class NewUserBody(Body):
     """``POST /api/users``; without a password only tokens and login links let the user in."""
 
-    username: Short
+    username: Annotated[Short, WithJsonSchema(document.USERNAME)]
     role: Role = Role.VIEWER
     display_name: Short = ""
-    password: Text | None = None
+    password: NewPassword | None = None
 
 
 class UserChangeBody(Body):
@@ -72,13 +76,13 @@ class UserChangeBody(Body):
     role: Role | None = None
     display_name: Short | None = None
     active: bool | None = None
-    password: Text | None = None
+    password: NewPassword | None = None
 
 
 class PasswordBody(Body):
     """``PUT /api/auth/password``: the new password, and the old one but after a login link."""
 
-    password: Text
+    password: NewPassword
     current_password: Text | None = None
 
 

@@ -11,6 +11,7 @@ from starlette.responses import Response
 
 from silo.api.wire import MergeResult
 from silo.bom.errors import CycleError, RejectedError
+from silo_server.routes import document
 from silo_server.routes.context import (
     READ_ERRORS,
     WRITE_ERRORS,
@@ -38,10 +39,14 @@ router = APIRouter(prefix="/api/items/{part_number}/bom", tags=["bom"])
 
 Depth = Annotated[int, Query(ge=1, le=tree.MAX_DEPTH)]
 MERGE_BODY = {
+    **document.refused(
+        "an entry whose part number no item has, an assembly as its own child, and entries of one child that "
+        "add up to more than 1e9; all of them are listed and nothing is changed"
+    ),
     "requestBody": {
         "required": True,
         "content": {"application/json": {"schema": {"$ref": "#/components/schemas/MergeRequest"}}},
-    }
+    },
 }
 
 
@@ -271,9 +276,6 @@ def get_where_used(
 def line_changes(body: LineChangeBody) -> dict[str, Any]:
     """The changes that a body asks for: only what it names; null clears what may be empty."""
     changes = body.model_dump(exclude_unset=True)
-    for name in ("quantity", "rel_type", "source"):
-        if name in changes and changes[name] is None:
-            raise RejectedError(f"{name}: wanted a value, got null; leave the key out to keep it as it is")
     if "reference_designators" in changes:
         changes["reference_designators"] = tuple(changes["reference_designators"] or ())
     if "metadata" in changes:

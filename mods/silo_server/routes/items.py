@@ -6,10 +6,11 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 import anyio.to_thread
-from fastapi import APIRouter, Query, Request
+from fastapi import APIRouter, Path, Query, Request
 from starlette.responses import Response
 
 from silo.bom.errors import RejectedError
+from silo_server.routes import document
 from silo_server.routes.context import (
     READ_ERRORS,
     WRITE_ERRORS,
@@ -45,11 +46,12 @@ PATCH_BODY = {
     "requestBody": {
         "required": True,
         "content": {
-            media_type: {"schema": {"type": "object"}}
+            media_type: {"schema": document.JSON_OBJECT}
             for media_type in ("application/merge-patch+json", "application/json")
         },
     }
 }
+Uuid = Annotated[str, Path(json_schema_extra={"format": "uuid"})]
 Limit = Annotated[int, Query(ge=1, le=1000)]
 Offset = Annotated[int, Query(ge=0, le=10_000_000)]
 Word = Annotated[Short, Query()]
@@ -120,7 +122,7 @@ def create_item(server: ServerDep, caller: Editor, body: NewItemBody) -> Respons
 
 
 @router.get("/items/by-uuid/{uuid}", response_model=ItemOut, responses=READ_ERRORS)
-def get_item_by_uuid(server: ServerDep, caller: Viewer, uuid: str) -> Response:
+def get_item_by_uuid(server: ServerDep, caller: Viewer, uuid: Uuid) -> Response:
     """The item with this UUID; 404 when there is none or it is archived, 400 for no UUID."""
     with server.db.read(caller) as tx:
         item = service.get_by_uuid(tx, uuid)

@@ -16,6 +16,8 @@ from pydantic import (
 )
 
 from silo.bom.numbers import LARGEST_QUANTITY, read_quantity
+from silo_server.routes import document
+from silo_server.services.edits import REL_TYPES, SOURCES
 from silo_server.services.merge_request import quantity_problem
 
 
@@ -26,16 +28,25 @@ def _no_nul(text: str) -> str:
     return text
 
 
-def _text(longest: int) -> WithJsonSchema:
-    return WithJsonSchema({"type": "string", "maxLength": longest, "pattern": "^[^\\u0000]*$"})
-
-
-Text = Annotated[str, StringConstraints(max_length=10_000), AfterValidator(_no_nul), _text(10_000)]
-Short = Annotated[str, StringConstraints(max_length=200), AfterValidator(_no_nul), _text(200)]
+Text = Annotated[
+    str,
+    StringConstraints(max_length=10_000),
+    AfterValidator(_no_nul),
+    WithJsonSchema(document.text(10_000)),
+]
+Short = Annotated[
+    str, StringConstraints(max_length=200), AfterValidator(_no_nul), WithJsonSchema(document.text(200))
+]
+# The services check what these say; here the document learns it.
+ItemUuid = Annotated[Short, WithJsonSchema(document.UUID)]
+ItemType = Annotated[Short, WithJsonSchema(document.ITEM_TYPE)]
+RelType = Annotated[Short, WithJsonSchema({"type": "string", "enum": list(REL_TYPES)})]
+Source = Annotated[Short, WithJsonSchema({"type": "string", "enum": list(SOURCES)})]
+Brief = Annotated[Short, WithJsonSchema(document.text(32))]
 
 
 # What may be in it is one rule for all ways in, which the services keep (silo_server.json_values).
-Properties = dict[str, Any]
+Properties = Annotated[dict[str, Any], WithJsonSchema(document.JSON_OBJECT)]
 
 
 def _amount(value: object) -> object:
@@ -87,15 +98,20 @@ class NewItemBody(Body):
     An ``id`` that is no UUID is refused, as is one whose item has another part number or is archived.
     """
 
-    model_config = ConfigDict(extra="ignore", protected_namespaces=(), populate_by_name=True)
+    model_config = ConfigDict(
+        extra="ignore",
+        protected_namespaces=(),
+        populate_by_name=True,
+        json_schema_extra=document.NUMBER_OR_CATEGORY,
+    )
 
     schema_name: Short | None = Field(None, alias="schema")
-    category: Short | None = None
-    part_number: Short | None = None
-    id: Short | None = None
+    category: Annotated[Short, WithJsonSchema(document.CATEGORY_OR_EMPTY)] | None = None
+    part_number: Annotated[Short, WithJsonSchema(document.part_number(or_empty=True))] | None = None
+    id: ItemUuid | None = None
     name: Short | None = None
     description: Text | None = None
-    item_type: Short | None = None
+    item_type: ItemType | None = None
     sourcing_type: Short | None = None
     long_description: Text | None = None
     properties: Properties | None = None
@@ -104,10 +120,10 @@ class NewItemBody(Body):
 class ItemChangeBody(Body):
     """``PUT /api/items/{pn}``: what is absent or null stays. ``properties`` make a new revision."""
 
-    part_number: Short | None = None
+    part_number: Annotated[Short, WithJsonSchema(document.part_number())] | None = None
     name: Short | None = None
     description: Text | None = None
-    item_type: Short | None = None
+    item_type: ItemType | None = None
     sourcing_type: Short | None = None
     long_description: Text | None = None
     properties: Properties | None = None
@@ -126,7 +142,7 @@ class NumberBody(Body):
     model_config = ConfigDict(extra="ignore", protected_namespaces=(), populate_by_name=True)
 
     schema_name: Short | None = Field(None, alias="schema")
-    category: Short
+    category: Annotated[Short, WithJsonSchema(document.CATEGORY)]
 
 
 class NumberOut(BaseModel):
@@ -239,25 +255,37 @@ class NewLineBody(Body):
 
     child_part_number: Short
     quantity: Amount = 1
-    rel_type: Short = "component"
-    unit: Short | None = None
+    rel_type: RelType = "component"
+    unit: Brief | None = None
     reference_designators: list[Short] = Field(default_factory=list, max_length=10_000)
-    find_number: Short | None = None
+    find_number: Brief | None = None
     notes: Text | None = None
     child_revision: RevisionNumber | None = None
-    source: Short = "manual"
+    source: Source = "manual"
     metadata: Properties = Field(default_factory=dict)
 
 
-class LineChangeBody(Body):
-    """``PUT /api/items/{pn}/bom/{child}``: only the keys that are there are changed; null clears."""
+def _kept(unused: Any) -> Any:
+    # An absent key keeps what the line has; what stands here for it is never read, nor in the document.
+    return Field(unused, json_schema_extra=_without_default)
 
-    quantity: Amount | None = None
-    rel_type: Short | None = None
-    unit: Short | None = None
+
+def _without_default(schema: dict[str, Any]) -> None:
+    schema.pop("default", None)
+
+
+class LineChangeBody(Body):
+    """``PUT /api/items/{pn}/bom/{child}``: only the keys that are there are changed; null clears.
+
+    A quantity, a relation type and a source cannot be cleared: null is refused for them.
+    """
+
+    quantity: Amount = _kept(1)
+    rel_type: RelType = _kept("component")
+    unit: Brief | None = None
     reference_designators: list[Short] | None = Field(None, max_length=10_000)
-    find_number: Short | None = None
+    find_number: Brief | None = None
     notes: Text | None = None
     child_revision: RevisionNumber | None = None
-    source: Short | None = None
+    source: Source = _kept("manual")
     metadata: Properties | None = None

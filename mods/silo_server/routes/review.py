@@ -7,13 +7,13 @@ from datetime import datetime
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query
-from pydantic import Field
+from pydantic import Field, WithJsonSchema
 from starlette.responses import Response
 
 from silo.bom.errors import RejectedError
 from silo_server.clock import stamp, wire
 from silo_server.db.engine import Tx
-from silo_server.routes import models
+from silo_server.routes import document, models
 from silo_server.routes.context import (
     READ_ERRORS,
     WRITE_ERRORS,
@@ -93,7 +93,14 @@ def get_review(server: ServerDep, caller: Viewer, part_number: str) -> Response:
     return json_answer(body, headers={"ETag": etag_of(found.parent.bom_version)})
 
 
-@router.post("/resolve", responses=WRITE_ERRORS)
+@router.post(
+    "/resolve",
+    responses=WRITE_ERRORS,
+    openapi_extra=document.refused(
+        "a decision that does not fit its line, such as keep for one that is referenced, or a line that the "
+        "BOM does not have; all of them are listed and nothing is changed"
+    ),
+)
 def resolve(
     server: ServerDep, caller: Editor, part_number: str, body: ResolveBody, expected: ExpectedVersion
 ) -> Response:
@@ -156,7 +163,7 @@ def get_past_bom(
     ]
 
 
-Point = Annotated[str, Query(max_length=40, description="a change id, a time (ISO 8601), or 'now'")]
+Point = Annotated[str, Query(max_length=40), WithJsonSchema(document.POINT)]
 
 
 @router.get("/compare", responses=READ_ERRORS)
@@ -164,7 +171,7 @@ def compare(
     server: ServerDep,
     caller: Viewer,
     part_number: str,
-    from_point: Annotated[str, Query(alias="from", max_length=40)] = "0",
+    from_point: Annotated[str, Query(alias="from", max_length=40), WithJsonSchema(document.POINT)] = "0",
     to: Point = "now",
 ) -> dict[str, Any]:
     """Two points of time side by side; each a change id, a time, or ``now``."""

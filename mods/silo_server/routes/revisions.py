@@ -13,6 +13,7 @@ from starlette.datastructures import UploadFile
 from starlette.responses import FileResponse, Response
 
 from silo.bom.errors import NotFoundError, RejectedError
+from silo_server.routes import document
 from silo_server.routes.context import (
     READ_ERRORS,
     WRITE_ERRORS,
@@ -43,6 +44,7 @@ BINARY: dict[int | str, dict[str, Any]] = {
     416: {"description": "The file has no such range"},
 }
 UPLOAD = {
+    **document.refused("properties that are no JSON object, and a sha256 that is not that of the file"),
     "requestBody": {
         "required": True,
         "content": {
@@ -52,17 +54,17 @@ UPLOAD = {
                     "required": ["file"],
                     "properties": {
                         "file": {"type": "string", "format": "binary"},
-                        "comment": {"type": "string"},
+                        "comment": document.text(10_000),
                         "properties": {"type": "string", "description": "a JSON object"},
                         "sha256": {
-                            "type": "string",
+                            **document.SHA256,
                             "description": "of the file; another content is refused",
                         },
                     },
                 }
             }
         },
-    }
+    },
 }
 
 

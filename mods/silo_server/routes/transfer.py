@@ -14,6 +14,7 @@ from starlette.datastructures import UploadFile
 from starlette.responses import Response, StreamingResponse
 
 from silo.bom.errors import RejectedError
+from silo_server.routes import document
 from silo_server.routes.context import (
     FORM_TYPES,
     READ_ERRORS,
@@ -42,6 +43,10 @@ def _content(media_type: str) -> dict[int | str, dict[str, Any]]:
 
 
 IMPORT_BODY = {
+    **document.refused(
+        "what is no CSV with a header row (part number, quantity), and rows that name unknown parts or "
+        "unusable values; without dry_run a wrong row refuses the whole file"
+    ),
     "requestBody": {
         "required": True,
         "content": {
@@ -54,7 +59,7 @@ IMPORT_BODY = {
                 }
             },
         },
-    }
+    },
 }
 
 

@@ -147,20 +147,27 @@ def create_item(tx: Tx, new: NewItem) -> tuple[Item, bool]:
     Raises RejectedError for unusable values, DuplicateError for a taken part number, ConflictError for a
     UUID whose item is not the one that is asked for.
     """
+    # A repeat is judged like the first request: what is unusable is refused, whether or not the id is known.
+    schema = find_schema(new.schema)
+    category = schema.category(new.category) if new.category else None
+    item_type = _item_type(new.item_type, category)
+    number = check_number(new.part_number) if new.part_number else None
+    if number is None and category is None:
+        raise RejectedError("category: wanted one (such as F01) or an explicit part_number, got neither")
+    check_json("properties", new.properties)
     if new.uuid is not None:
         # A repeat that comes while the first request is under way waits for it, and finds its item.
         tx.lock(uuids.UUID(normal_uuid(new.uuid, "id")).int & (2**63 - 1))
     if new.uuid is not None and (known := _made_before(tx, new.uuid, new.part_number)) is not None:
         return known, False
-    schema = find_schema(new.schema)
-    category = schema.category(new.category) if new.category else None
-    number = check_number(new.part_number) if new.part_number else take_number(tx, schema, category)
+    if number is None:
+        number = take_number(tx, schema, category)
     name, description = new.name.strip(), new.description.strip()
     values = {
         "uuid": normal_uuid(new.uuid, "id") if new.uuid else str(uuids.uuid4()),
         "schema_name": schema.name,
         "category": category.code if category else None,
-        "item_type": _item_type(new.item_type, category),
+        "item_type": item_type,
         "name": name or description or number,
         "description": description or name,
         "sourcing_type": new.sourcing_type,

@@ -165,7 +165,7 @@ def _left_out_part(index: int, raw: Any) -> dict[str, Any]:
         if value:
             part[name] = value
     quantity = raw.get("quantity", 0)
-    if quantity:
+    if isinstance(quantity, bool) or quantity != 0:
         if problem := quantity_problem(quantity):
             raise RejectedError(f"left_out[{index}].quantity: {problem}")
         part["quantity"] = quantity
@@ -178,10 +178,12 @@ def _document(raw: Any) -> tuple[str | None, str | None, int | None]:
     if not isinstance(raw, Mapping):
         raise RejectedError('document: wanted {"file": …, "sha256": …, "revision": …}')
     file, sha256, revision = raw.get("file"), raw.get("sha256"), raw.get("revision")
-    if file is not None and not is_text(file, 4096):
-        raise RejectedError("document.file: wanted a file name")
+    if not is_text(file, 4096):
+        raise RejectedError("document.file: wanted a file name of at most 4096 characters")
     if sha256 is not None and not (isinstance(sha256, str) and re.fullmatch("[0-9A-Fa-f]{64}", sha256)):
         raise RejectedError("document.sha256: wanted 64 hexadecimal digits")
+    if isinstance(revision, float) and revision.is_integer():
+        revision = int(revision)  # 2.0 is a whole number in JSON
     if revision is not None and not (type(revision) is int and 0 <= revision < 2**31):
         raise RejectedError("document.revision: wanted a whole number")
     return file, sha256, revision

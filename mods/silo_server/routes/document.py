@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What the OpenAPI document says of values, so that it calls valid what the server takes and nothing else.
+
+Some requests are refused although their form is right: a CSV without a header row, a merge that names an
+unknown part number. Such an operation says why under ``x-valid-but-refused``, and so does its 400.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from silo.api.wire import MergeRequest
+from silo.bom.numbers import LARGEST_QUANTITY
+from silo_server.json_values import MAX_KEY, MAX_WHOLE
+from silo_server.schema.catalog import ITEM_TYPES, find_schema
+from silo_server.services.accounts import MAX_PASSWORD, MIN_PASSWORD, USERNAME_FORM
+from silo_server.services.numbering import NUMBER_FORM, RESERVED
+
+Schema = dict[str, Any]
+NO_NUL = "^[^\\u0000]*$"
+NOTHING: Schema = {"type": "null"}
+REFUSED = "x-valid-but-refused"
+
+
+def text(longest: int, **more: Any) -> Schema:
+    """A text that both databases can keep."""
+    return {"type": "string", "maxLength": longest, "pattern": NO_NUL, **more}
+
+
+def or_null(schema: Schema) -> Schema:
+    """The schema, or null."""
+    return {"anyOf": [schema, NOTHING]}
+
+
+def part_number(*, or_empty: bool = False) -> Schema:
+    """A part number to be given to an item; ``or_empty``: an empty text stands for none."""
+    optional = "?" if or_empty else ""
+    return {
+        "type": "string",
+        "maxLength": 200,
+        "pattern": f"^(\\s*{NUMBER_FORM.pattern}\\s*){optional}$",
+        "not": {"enum": [".", "..", *sorted(RESERVED)]},
+        "description": "1 to 64 characters, none of / \\ ? # % and no control characters; unique in any case",
+    }
+
+
+def refused(reason: str) -> Schema:
+    """``openapi_extra`` of an operation that refuses (400) what has the right form, and why."""
+    return {REFUSED: reason}
+
+
+CATEGORIES = list(find_schema(None).categories)
+CATEGORY: Schema = {
+    "type": "string",
+    "enum": CATEGORIES,
+    "description": "a category of the part-number schema; lower case is taken as well",
+}
+CATEGORY_OR_EMPTY: Schema = {**CATEGORY, "enum": [*CATEGORIES, ""]}
+ITEM_TYPE: Schema = {"type": "string", "enum": list(ITEM_TYPES)}
+UUID: Schema = {"type": "string", "format": "uuid"}
+USERNAME: Schema = {"type": "string", "pattern": f"^{USERNAME_FORM.pattern}$"}
+PASSWORD: Schema = text(MAX_PASSWORD, minLength=MIN_PASSWORD)
+SHA256: Schema = {"type": "string", "pattern": "^[0-9A-Fa-f]{64}$"}
+# An item gets its number from one or the other.
+NUMBER_OR_CATEGORY: Schema = {
+    "anyOf": [
+        {"required": ["category"], "properties": {"category": {"enum": CATEGORIES}}},
+        {"required": ["part_number"], "properties": {"part_number": {"type": "string", "minLength": 1}}},
+    ]
+}
+
+_DAY = (
+    "([0-9]{3}[1-9]-((0[1-9]|1[0-2])-(0[1-9]|1[0-9]|2[0-8])|(0[13-9]|1[0-2])-(29|30)|(0[13578]|1[02])-31)"
+    "|[0-9]{2}(0[48]|[2468][048]|[13579][26])-02-29)"
+)
+_TIME = "T([01][0-9]|2[0-3]):[0-5][0-9]:[0-5][0-9](\\.[0-9]{1,6})?(Z|[+-](0[0-9]|1[0-4]):[0-5][0-9])"
+POINT: Schema = {
+    "anyOf": [
+        {"type": "string", "enum": ["now"]},
+        {
+            "type": "string",
+            "pattern": "^[0-9]{1,18}$",
+            "description": "the id of a change, 0 = no lines",
+        },
+        {
+            "type": "string",
+            "maxLength": 40,
+            "pattern": f"^{_DAY}{_TIME}$",
+            "description": "a time with its zone (ISO 8601)",
+        },
+    ]
+}
+
+_ANY_JSON: Schema = {"title": "JsonValue"}
+_JSON = "#/components/schemas/JsonValue"
+_KEY = {"maxLength": MAX_KEY, "pattern": NO_NUL}
+# pydantic has no way to refer to a schema that it did not make; :func:`complete` puts the reference in.
+JSON_OBJECT: Schema = {"type": "object", "propertyNames": _KEY, "additionalProperties": _ANY_JSON}
+_JSON_VALUE: Schema = {
+    "description": "JSON of at most 32 levels and 256 KiB, with numbers of at most 63 bits"
+    " (send longer ones as text)",
+    "anyOf": [
+        NOTHING,
+        {"type": "boolean"},
+        {"type": "number", "minimum": -MAX_WHOLE, "exclusiveMaximum": MAX_WHOLE},
+        {"type": "string", "pattern": NO_NUL},
+        {"type": "array", "items": {"$ref": _JSON}},
+        {"type": "object", "propertyNames": _KEY, "additionalProperties": {"$ref": _JSON}},
+    ],
+}
+_NOT_BLANK = "^[^\\u0000]*[^\\s\\u0000][^\\u0000]*$"
+# What services.merge_request asks of the wire model's fields.
+_MERGE: dict[str, dict[str, Schema]] = {
+    "MergeRequest": {
+        "source": {"description": "not read: the entries are an assembly's"},
+        "sync_id": or_null(text(128, minLength=1)),
+        "dry_run": or_null({"type": "boolean", "default": False}),
+    },
+    "MergeEntry": {
+        "child_part_number": {
+            "type": "string",
+            "maxLength": 200,
+            "pattern": "^[^\\u0000]*[^\\s\\u0000][^\\u0000]*$",
+        },
+        "quantity": {"type": "number", "exclusiveMinimum": 0, "maximum": LARGEST_QUANTITY},
+        "source": {"description": "not read: the entries are an assembly's"},
+    },
+    "Component": {"file": text(4096), "object": text(1024)},
+    "SourceDocument": {
+        "file": text(4096),
+        "sha256": or_null(SHA256),
+        "revision": or_null({"type": "integer", "minimum": 0, "maximum": 2**31 - 1}),
+    },
+    "LeftOutPart": {
+        "reason": text(32, minLength=1),
+        "name": text(1024),
+        "file": text(4096),
+        "object": text(1024),
+        "message": text(4096),
+        "quantity": {"type": "number", "minimum": 0, "maximum": LARGEST_QUANTITY},
+    },
+}
+
+
+def complete(document: Schema) -> Schema:
+    """FastAPI's document with what it does not know of this server."""
+    for operations in document["paths"].values():
+        for operation in operations.values():
+            # We answer 400 where FastAPI by itself would answer 422.
+            answers = operation.get("responses", {})
+            answers.pop("422", None)
+            if REFUSED in operation:
+                answers["400"]["description"] += f". Also where the form is right: {operation[REFUSED]}"
+    schemas = document["components"]["schemas"]
+    for name in ("HTTPValidationError", "ValidationError"):
+        schemas.pop(name, None)
+    # The merge reads its body by itself (services.merge_request); its form is the wire model's.
+    merge = MergeRequest.model_json_schema(ref_template="#/components/schemas/{model}")
+    schemas.update(merge.pop("$defs"), MergeRequest=merge, JsonValue=_JSON_VALUE)
+    for model, fields in _MERGE.items():
+        schemas[model]["properties"].update(fields)
+    _refer(document)
+    return document
+
+
+def _refer(part: Any) -> None:
+    below = part.values() if isinstance(part, dict) else part if isinstance(part, list) else ()
+    if isinstance(part, dict) and part.get("additionalProperties") == _ANY_JSON:
+        part["additionalProperties"] = {"$ref": _JSON}
+    for one in below:
+        _refer(one)
