@@ -38,6 +38,15 @@ def test_register_tells_machines_what_became_of_each(run: Any, silo: Any, gearbo
     assert all(entry["part_number"] for entry in bom["entries"])
 
 
+def test_no_item_shows_how_it_was_registered(run: Any, silo: Any, gearbox: Path) -> None:
+    """Not even the first one on a new server: it says beforehand that it takes our ids."""
+    assert run("register", gearbox, "--yes").code == 0
+    items = silo.client.search_items("", limit=100)
+    assert len(items) > 5
+    shown = {key for item in items for key in silo.client.get_properties(item.part_number)}
+    assert "registration_id" not in shown
+
+
 def test_what_cannot_be_stamped_does_not_stop_the_rest(run: Any, silo: Any, gearbox: Path) -> None:
     """A part file that vanished after it was read: told, exit code 1, the others are registered."""
     parts = gearbox.parent / "parts"

@@ -9,7 +9,7 @@ What comes back are the wire models, which also read as mappings. What goes wron
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -29,7 +29,7 @@ from silo.api.sse import ServerEvent
 from silo.api.stream import SILENCE, HttpEventStream, open_stream
 from silo.api.transport import Call, Cancel, Timeouts, Transport, stop_if
 from silo.api.wire import Revision, ServerState, User
-from silo.bom.errors import RouteMissingError, ServerFaultError
+from silo.bom.errors import RouteMissingError, ServerFaultError, SiloError
 
 _PAGE = 1000  # revisions in one answer
 
@@ -77,6 +77,7 @@ class SiloClient(ItemCalls, BomCalls):
         self._address = ServerAddress.parse(base_url)
         self._silence = silence
         self._memory = memory
+        self._asked_for_item_ids = False
         self.abilities = load(memory, self.base_url) if memory is not None else Abilities()
         self._known_before = replace(self.abilities, schemas=dict(self.abilities.schemas))
         self._transport = Transport(
@@ -118,6 +119,15 @@ class SiloClient(ItemCalls, BomCalls):
     def whoami(self) -> User:
         """Who the token belongs to; raises :class:`silo.bom.errors.AuthError` where it is not accepted."""
         return self._get("who we are", "auth", "me").model(User)
+
+    @property
+    def keeps_item_ids(self) -> bool:
+        """True where the server says that a new item gets the UUID that we propose, or was seen to do it."""
+        if not self.abilities.keeps_item_ids and not self._asked_for_item_ids:
+            self._asked_for_item_ids = True
+            with suppress(SiloError):
+                self.abilities.keeps_item_ids = self.ready().takes_item_ids
+        return self.abilities.keeps_item_ids
 
     def ready(self) -> ServerState:
         """Whether the server takes changes: ``normal``, ``read-only`` or ``degraded``."""

@@ -39,11 +39,6 @@ class ItemCalls(Caller):
     _is_silo: bool | None = None
     _can_post_batch = True  # for this token and mode; the route itself is an ability
 
-    @property
-    def keeps_item_ids(self) -> bool:
-        """True where the server was seen to give a new item the UUID that we proposed."""
-        return self.abilities.keeps_item_ids
-
     def get_item_by_uuid(self, uuid: str, /) -> Item | None:
         """The item with this identity; None where the server has none (unknown, archived, or no UUID)."""
         if not uuid.strip(". ") or any(c in "/\\?#%" or c < " " for c in uuid):

@@ -360,9 +360,14 @@ class User(Record):
 
 
 class ServerState(Record):
-    """``GET /ready`` and the ``server.state`` event: ``normal``, ``read-only`` or ``degraded``."""
+    """``GET /ready`` and the ``server.state`` event: ``normal``, ``read-only`` or ``degraded``.
+
+    takes_item_ids
+        a new item gets the UUID that the client proposes.
+    """
 
     mode: str = "normal"
     status: str = ""
     version: str = ""
     sse_clients: int | None = None
+    takes_item_ids: bool = False

@@ -70,6 +70,7 @@ async def ready(server: ServerDep) -> Response:
         "database": state.database,
         "files": state.files,
         "sse_clients": server.hub.listeners,
+        "takes_item_ids": True,
     }
     return json_answer(body, 200 if state.ready else 503)
 
