@@ -53,7 +53,7 @@ def test_a_document_open_under_another_path_is_found(session: dict[str, Any]) ->
 def test_a_document_with_broken_links_is_not_reloaded(session: dict[str, Any]) -> None:
     """FreeCAD itself would close and read it again, and the edits would be lost."""
     answer = session["broken_document_is_not_reloaded"]
-    assert answer == {"bom": {"Bolt": 2}, "findings": ["missing_file"], "blocked": True}
+    assert answer == {"bom": {"Bolt": 2, "Gone": 2}, "findings": ["missing_file"], "blocked": True}
 
 
 def test_a_partly_loaded_document_is_completed_where_needed(session: dict[str, Any]) -> None:
@@ -69,16 +69,16 @@ def test_a_partly_loaded_document_is_completed_where_needed(session: dict[str, A
 
 
 def test_a_part_closed_by_hand_never_reads_as_removed(session: dict[str, Any]) -> None:
-    """The file is there, but FreeCAD dropped the link: that blocks the sync and says what happened."""
+    """The file is there, but FreeCAD dropped the link: a missing line that blocks the sync and says why."""
     answer = session["closed_part"]
-    assert (answer["bom"], answer["findings"], answer["blocked"]) == ({}, ["broken_link"], True)
+    assert (answer["bom"], answer["findings"], answer["blocked"]) == ({"Bolt": 1}, ["broken_link"], True)
     assert "bolt.FCStd" in answer["message"]
 
 
 def test_a_lost_original_of_a_changed_copy_is_named(session: dict[str, Any]) -> None:
     """FreeCAD shows the copy and says nothing; the file that a person has to bring back is told."""
     answer = session["lost_original"]
-    assert (answer["bom"], answer["findings"], answer["blocked"]) == ({}, ["missing_file"], True)
+    assert (answer["bom"], answer["findings"], answer["blocked"]) == ({"Bolt": 1}, ["missing_file"], True)
     assert "copy_on_change/bolt.FCStd is missing (it is the original of a changed copy)" in answer["message"]
 
 
