@@ -202,7 +202,8 @@ def test_what_the_server_does_not_want_stays_visible_and_holds_up_nobody(
     vault.commit(vault.snapshot(vault.part("Bolt", 1)), content=b"one")
     vault.send()
     (waiting,) = vault.waiting()
-    assert (waiting.state, waiting.reason) == (State.HELD, "entries[0]: unknown part")
+    assert waiting.state is State.HELD
+    assert waiting.reason == "entries[0]: unknown part\nIts file is in Silo; only the BOM is not"
     assert (waiting.file_left, waiting.bom_left) == (False, True)
     well(vault.silo)
     vault.commit(vault.snapshot(vault.part("Bolt", 2)), content=b"two")
@@ -330,7 +331,8 @@ def test_a_refused_file_does_not_keep_the_bom(vault: Vault) -> None:
     vault.commit(vault.snapshot(vault.part("Bolt", 3)))
     vault.send()
     (waiting,) = vault.waiting()
-    assert (waiting.file_left, waiting.bom_left, waiting.reason) == (True, False, "413: too large")
+    assert (waiting.file_left, waiting.bom_left) == (True, False)
+    assert waiting.reason == "413: too large\nIts BOM is in Silo; only the file is not"
     assert vault.lines() == {"F01-0001": 3}
     well(vault.silo)
     vault.outbox.retry(waiting.id)
