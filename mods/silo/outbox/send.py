@@ -19,8 +19,8 @@ from pydantic import ValidationError
 
 from silo.api import arrived
 from silo.api.address import canonical
-from silo.api.multipart import Progress
 from silo.api.policy import Backoff, Scope, Then, judge
+from silo.api.protocol import FilesApi
 from silo.api.revisions import is_newest, newest_number, other_name
 from silo.api.transport import Cancel, stop_if
 from silo.api.wire import MergeRequest, MergeResult, Revision, ServerState, SourceDocument
@@ -43,7 +43,7 @@ from silo.outbox.store import Store
 PAUSES = Backoff(first=5.0, longest=900.0)
 
 
-class SendApi(arrived.Downloads, Protocol):
+class SendApi(FilesApi, Protocol):
     """What sending needs of a Silo; :class:`silo.api.client.SiloClient` has it."""
 
     @property
@@ -52,24 +52,6 @@ class SendApi(arrived.Downloads, Protocol):
     def get_item_by_uuid(self, uuid: str, /) -> Mapping[str, Any] | None: ...
 
     def get_bom(self, part_number: str, /) -> Sequence[Any]: ...
-
-    def revisions(
-        self, part_number: str, /, *, newest: int | None = None, after: int = 0
-    ) -> list[Revision]: ...
-
-    def upload_file(
-        self,
-        part_number: str,
-        path: Path | str,
-        comment: str = "",
-        properties: Mapping[str, Any] | None = None,
-        on_progress: Progress | None = None,
-        *,
-        file_name: str | None = None,
-        idempotency_key: str | None = None,
-        sha256: str | None = None,
-        cancelled: Cancel | None = None,
-    ) -> Revision: ...
 
     def merge_bom(
         self, part_number: str, request: MergeRequest, /, *, cancelled: Cancel | None = None
