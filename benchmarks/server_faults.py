@@ -475,8 +475,8 @@ def kill_restores(url: str, folder: Path, kills: int) -> str:
 def quantities(url: str, parent: str) -> list[float]:
     """The BOM's quantities, read from the database itself."""
     from silo_server.db.engine import Database
+    from silo_server.services.bom.lines import lines_of
     from silo_server.services.items import get_item
-    from silo_server.services.lines import lines_of
     from silo_server.settings import Settings
 
     db = Database(Settings(database_url=url))

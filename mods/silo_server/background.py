@@ -20,7 +20,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from silo.bom.errors import SiloError
 from silo_server.db.engine import Database, mode_of
 from silo_server.files import FileStore
-from silo_server.services.credentials import note_token_uses
+from silo_server.services.access.credentials import note_token_uses
 
 logger = logging.getLogger("silo_server")
 

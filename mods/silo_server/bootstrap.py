@@ -15,7 +15,8 @@ from silo_server.db.migrate import upgrade
 from silo_server.db.tables import users
 from silo_server.files import FileStore
 from silo_server.operation.housekeeping import START_TOKEN, tidy
-from silo_server.services import accounts, credentials, logins, search
+from silo_server.services import search
+from silo_server.services.access import accounts, credentials, logins
 from silo_server.values import Role
 
 START_TOKEN_DAYS = 30.0

@@ -33,7 +33,7 @@ from silo_server.bootstrap import Welcome, prepare
 from silo_server.db.engine import Database
 from silo_server.operation.metrics import SHARED
 from silo_server.operation.requests import log_to_stderr
-from silo_server.services import credentials
+from silo_server.services.access import credentials
 from silo_server.settings import Settings, settings_from_environment
 
 START_SECONDS = 60

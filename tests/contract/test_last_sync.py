@@ -160,6 +160,6 @@ def test_an_export_with_gaps_can_be_imported_again(api: Api) -> None:
     merge(api, top, entries((part, 4, [])), left_out=[MISSING])
     text = api.call("GET", bom(top, "export.csv")).body.decode()
     assert "Cover" in text
-    from silo_server.services.imports import read_csv
+    from silo_server.services.bom.imports import read_csv
 
     assert [record["part_number"] for _, record in read_csv(text.encode(), 100)] == [part]

@@ -15,7 +15,7 @@ from silo.bom.errors import ConflictError
 from silo_server.bootstrap import prepare
 from silo_server.db.engine import Database
 from silo_server.run import Greeting, RunningServer, running_server
-from silo_server.services import accounts
+from silo_server.services.access import accounts
 from silo_server.settings import Settings
 from silo_server.values import SYSTEM, Role
 

@@ -29,12 +29,12 @@ from silo.bom.errors import ConflictError, NotFoundError, RejectedError, Version
 from silo_server.bootstrap import prepare
 from silo_server.db.engine import Database
 from silo_server.errors import DuplicateError
-from silo_server.services import edits, history
+from silo_server.services.bom import edits, history
+from silo_server.services.bom.lines import lines_of
+from silo_server.services.bom.merge import merge_bom, preview_merge
+from silo_server.services.bom.merge_json import read_merge_order
+from silo_server.services.bom.review import Action, Decision, open_conflicts, resolve
 from silo_server.services.items import NewItem, create_item, get_item
-from silo_server.services.lines import lines_of
-from silo_server.services.merge import merge_bom, preview_merge
-from silo_server.services.merge_request import read_merge_order
-from silo_server.services.review import Action, Decision, open_conflicts, resolve
 from silo_server.settings import Settings
 from silo_server.values import Actor, Role
 

@@ -23,9 +23,9 @@ from silo_server.db.engine import Database
 from silo_server.db.tables import bom_lines, items
 from silo_server.errors import TooLargeError
 from silo_server.run import running_server
-from silo_server.services import imports, tree
+from silo_server.services.bom import imports, tree
+from silo_server.services.bom.lines import state_columns
 from silo_server.services.items import NewItem, create_item, get_item
-from silo_server.services.lines import state_columns
 from silo_server.settings import Settings
 from silo_server.turnstile import Turnstile
 from silo_server.values import LineState

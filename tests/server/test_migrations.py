@@ -20,9 +20,9 @@ from silo_server.bootstrap import prepare
 from silo_server.db.engine import Database
 from silo_server.db.migrate import alembic_config, newest_revision, upgrade
 from silo_server.db.tables import events, items, metadata
-from silo_server.services.history import list_changes, state_at
+from silo_server.services.bom.history import list_changes, state_at
+from silo_server.services.bom.lines import lines_of
 from silo_server.services.items import get_item
-from silo_server.services.lines import lines_of
 from silo_server.settings import Settings
 
 FOLDER = Path(__file__).parent / "released"

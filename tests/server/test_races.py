@@ -20,10 +20,10 @@ from silo.bom.errors import CycleError
 from silo_server.bootstrap import prepare
 from silo_server.db.engine import Database, Tx
 from silo_server.run import RunningServer, running_server
-from silo_server.services import edits, history
+from silo_server.services.bom import edits, history
+from silo_server.services.bom.merge import merge_bom
+from silo_server.services.bom.merge_json import read_merge_order
 from silo_server.services.items import NewItem, create_item, get_item
-from silo_server.services.merge import merge_bom
-from silo_server.services.merge_request import read_merge_order
 from silo_server.settings import Settings
 
 PARTS = ("TOP", "SUB", "A", "B")

@@ -135,7 +135,7 @@ def callers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Api]
 
 def token_by_session(server: object, api: Api, cookie: str) -> str:
     """A token of the user whose session this is, made with the session's CSRF secret."""
-    from silo_server.services.logins import actor_by_session
+    from silo_server.services.access.logins import actor_by_session
 
     db = server.app.state.server.db  # type: ignore[attr-defined]
     actor = actor_by_session(db, cookie.partition("=")[2], "")

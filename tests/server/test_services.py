@@ -19,12 +19,12 @@ from silo_server.db.bulk import insert_rows, one_of, update_rows
 from silo_server.db.engine import Database
 from silo_server.db.tables import bom_syncs, items
 from silo_server.json_values import dumps
-from silo_server.services.edits import check_state, edited_state
-from silo_server.services.exports import _item_numbers, plain_cell, safe_cell
+from silo_server.services.bom.edits import check_state, edited_state
+from silo_server.services.bom.exports import _item_numbers, plain_cell, safe_cell
+from silo_server.services.bom.lines import state_to_json, stored_state
+from silo_server.services.bom.merge_json import quantity_problem, read_merge_order
+from silo_server.services.bom.rollup import positive_number
 from silo_server.services.items import NewItem, create_item
-from silo_server.services.lines import state_to_json, stored_state
-from silo_server.services.merge_request import quantity_problem, read_merge_order
-from silo_server.services.rollup import positive_number
 from silo_server.values import LineState, Role, number
 
 text = st.text(max_size=20)

@@ -19,7 +19,7 @@ from sqlalchemy import make_url
 
 from silo_server.db.engine import WRITERS_WAITING, Database
 from silo_server.run import running_server
-from silo_server.services import credentials
+from silo_server.services.access import credentials
 from silo_server.settings import Settings
 
 TOKEN = "silo_waiting"

@@ -39,7 +39,8 @@ from silo_server.db.state import put_state
 from silo_server.db.tables import events, items, metadata, revisions
 from silo_server.files import FileStore
 from silo_server.json_values import dumps
-from silo_server.services import audit, search
+from silo_server.services import search
+from silo_server.services.access import audit
 from silo_server.services.events import HORIZON
 from silo_server.settings import Settings
 from silo_server.values import SYSTEM

@@ -40,9 +40,9 @@ from silo_server.files import FileStore
 from silo_server.json_values import dumps
 from silo_server.services import events
 from silo_server.services import items as item_service
-from silo_server.services.changes import ChangeKind
-from silo_server.services.history import state_at
-from silo_server.services.lines import state_to_json
+from silo_server.services.bom.changes import ChangeKind
+from silo_server.services.bom.history import state_at
+from silo_server.services.bom.lines import state_to_json
 
 logger = logging.getLogger("silo_server.housekeeping")
 

@@ -24,7 +24,7 @@ from silo_server.routes.context import (
     json_answer,
 )
 from silo_server.routes.models import Body, Short, Text
-from silo_server.services import accounts, audit, credentials, logins
+from silo_server.services.access import accounts, audit, credentials, logins
 from silo_server.values import Actor, Role, Scope
 
 router = APIRouter(prefix="/api", tags=["auth"])

@@ -26,13 +26,13 @@ from silo_server.routes.context import (
 )
 from silo_server.routes.models import BomLineOut, ExpandedLineOut, LineChangeBody, LineOut, NewLineBody
 from silo_server.routes.render import render_expanded
-from silo_server.services import edits, rollup, tree
+from silo_server.services.bom import edits, rollup, tree
+from silo_server.services.bom.last_sync import last_sync, marks, remember_refusal
+from silo_server.services.bom.lines import LineId, line_to_wire, lines_of
+from silo_server.services.bom.merge import MergeOutcome, merge_bom, preview_merge
+from silo_server.services.bom.merge_json import MergeOrder, read_merge_order
+from silo_server.services.bom.review import told_quantities
 from silo_server.services.items import get_item
-from silo_server.services.last_sync import last_sync, marks, remember_refusal
-from silo_server.services.lines import LineId, line_to_wire, lines_of
-from silo_server.services.merge import MergeOutcome, merge_bom, preview_merge
-from silo_server.services.merge_request import MergeOrder, read_merge_order
-from silo_server.services.review import told_quantities
 from silo_server.values import Actor, number
 
 router = APIRouter(prefix="/api/items/{part_number}/bom", tags=["bom"])

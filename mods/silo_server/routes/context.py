@@ -21,8 +21,8 @@ from silo_server.db.engine import Database
 from silo_server.events.hub import Hub
 from silo_server.files import FileStore
 from silo_server.operation.requests import info_of
-from silo_server.services.credentials import actor_by_token
-from silo_server.services.logins import actor_by_session
+from silo_server.services.access.credentials import actor_by_token
+from silo_server.services.access.logins import actor_by_session
 from silo_server.settings import Settings
 from silo_server.values import Actor, Role
 

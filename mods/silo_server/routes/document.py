@@ -13,7 +13,7 @@ from silo.api.wire import MergeRequest
 from silo.bom.numbers import LARGEST_QUANTITY
 from silo_server.json_values import MAX_KEY, MAX_WHOLE
 from silo_server.schema.catalog import ITEM_TYPES, find_schema
-from silo_server.services.accounts import MAX_PASSWORD, MIN_PASSWORD, USERNAME_FORM
+from silo_server.services.access.accounts import MAX_PASSWORD, MIN_PASSWORD, USERNAME_FORM
 from silo_server.services.numbering import NUMBER_FORM, RESERVED
 
 Schema = dict[str, Any]
@@ -109,7 +109,7 @@ _JSON_VALUE: Schema = {
     ],
 }
 _NOT_BLANK = "^[^\\u0000]*[^\\s\\u0000][^\\u0000]*$"
-# What services.merge_request asks of the wire model's fields.
+# What services.bom.merge_json asks of the wire model's fields.
 _MERGE: dict[str, dict[str, Schema]] = {
     "MergeRequest": {
         "source": {"description": "not read: the entries are an assembly's"},
@@ -154,7 +154,7 @@ def complete(document: Schema) -> Schema:
     schemas = document["components"]["schemas"]
     for name in ("HTTPValidationError", "ValidationError"):
         schemas.pop(name, None)
-    # The merge reads its body by itself (services.merge_request); its form is the wire model's.
+    # The merge reads its body by itself (services.bom.merge_json); its form is the wire model's.
     merge = MergeRequest.model_json_schema(ref_template="#/components/schemas/{model}")
     schemas.update(merge.pop("$defs"), MergeRequest=merge, JsonValue=_JSON_VALUE)
     for model, fields in _MERGE.items():

@@ -36,7 +36,7 @@ from silo_server.routes.models import (
 from silo_server.routes.render import item_to_wire
 from silo_server.schema.catalog import describe, describe_form, find_schema, schemas
 from silo_server.services import items as service
-from silo_server.services.last_sync import NEVER, LastSync, last_sync, last_syncs
+from silo_server.services.bom.last_sync import NEVER, LastSync, last_sync, last_syncs
 from silo_server.services.numbering import preview_number
 from silo_server.values import Item
 

@@ -17,8 +17,8 @@ from pydantic import (
 
 from silo.bom.numbers import LARGEST_QUANTITY, read_quantity
 from silo_server.routes import document
-from silo_server.services.edits import REL_TYPES, SOURCES
-from silo_server.services.merge_request import quantity_problem
+from silo_server.services.bom.edits import REL_TYPES, SOURCES
+from silo_server.services.bom.merge_json import quantity_problem
 
 
 def _no_nul(text: str) -> str:

@@ -9,9 +9,9 @@ from typing import Any
 import pydantic_core
 
 from silo_server.clock import wire
-from silo_server.services.last_sync import LastSync
-from silo_server.services.lines import child_to_wire, line_state_to_wire, revisions_to_wire
-from silo_server.services.tree import Occurrence
+from silo_server.services.bom.last_sync import LastSync
+from silo_server.services.bom.lines import child_to_wire, line_state_to_wire, revisions_to_wire
+from silo_server.services.bom.tree import Occurrence
 from silo_server.values import Item, LineState, Revision, number
 
 

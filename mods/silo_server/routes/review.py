@@ -25,10 +25,10 @@ from silo_server.routes.context import (
     json_answer,
 )
 from silo_server.routes.models import Body, Short, Text
-from silo_server.services import history
-from silo_server.services import review as service
+from silo_server.services.bom import history
+from silo_server.services.bom import review as service
+from silo_server.services.bom.lines import line_to_wire, state_to_json
 from silo_server.services.items import get_item
-from silo_server.services.lines import line_to_wire, state_to_json
 from silo_server.values import Item, LineState, number
 
 router = APIRouter(prefix="/api/items/{part_number}/bom", tags=["bom review"])

@@ -26,7 +26,7 @@ from silo_server.routes.context import (
 from silo_server.routes.models import RevisionBody, RevisionOut
 from silo_server.routes.render import revision_to_wire
 from silo_server.services import items, revisions
-from silo_server.services.merge_request import is_text
+from silo_server.services.bom.merge_json import is_text
 from silo_server.values import Actor, Revision
 
 router = APIRouter(prefix="/api/items/{part_number}", tags=["revisions"])

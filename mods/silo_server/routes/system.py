@@ -27,7 +27,8 @@ from silo_server.routes.context import (
     find_actor,
     json_answer,
 )
-from silo_server.services import audit, events
+from silo_server.services import events
+from silo_server.services.access import audit
 
 router = APIRouter(tags=["system"])
 EVENT_ID = re.compile(r"(?P<number>[0-9]{1,18})(?:-(?P<tag>[0-9a-f]{8}))?")

@@ -27,8 +27,8 @@ from silo_server.routes.context import (
     json_answer,
 )
 from silo_server.routes.review import state_to_wire
-from silo_server.services import exports, imports
-from silo_server.services.exports import View
+from silo_server.services.bom import exports, imports
+from silo_server.services.bom.exports import View
 from silo_server.values import Item
 
 router = APIRouter(prefix="/api/items/{part_number}/bom", tags=["bom transfer"])

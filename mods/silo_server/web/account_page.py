@@ -12,7 +12,7 @@ from starlette.responses import Response
 from silo.bom.errors import RejectedError
 from silo_server.errors import TooManyAttemptsError
 from silo_server.routes.context import SESSION_COOKIE, Server, ServerDep
-from silo_server.services import accounts, credentials, logins
+from silo_server.services.access import accounts, credentials, logins
 from silo_server.values import Actor, Role, Scope
 from silo_server.web.forms import Form, back, text, whole
 from silo_server.web.guard import Reader

@@ -10,7 +10,7 @@ from starlette.responses import Response
 
 from silo.bom.errors import RejectedError
 from silo_server.routes.context import ServerDep
-from silo_server.services import history
+from silo_server.services.bom import history
 from silo_server.services.items import get_item
 from silo_server.web.forms import Form, back, text, whole
 from silo_server.web.guard import Reader, Writer

@@ -19,7 +19,7 @@ from starlette.responses import Response
 from silo.bom.errors import RejectedError, SiloError, VersionConflictError
 from silo_server.errors import TooLargeError
 from silo_server.routes.context import Server, ServerDep
-from silo_server.services import imports
+from silo_server.services.bom import imports
 from silo_server.services.items import get_item
 from silo_server.values import Actor
 from silo_server.web.forms import Form, back, text, whole

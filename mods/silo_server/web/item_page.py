@@ -14,10 +14,11 @@ from silo.bom.errors import ConflictError
 from silo_server.db.engine import Tx
 from silo_server.errors import TooLargeError
 from silo_server.routes.context import ServerDep
-from silo_server.services import revisions, rollup, tree
+from silo_server.services import revisions
+from silo_server.services.bom import rollup, tree
+from silo_server.services.bom.last_sync import in_sentences, last_sync
+from silo_server.services.bom.last_sync import marks as marks_of
 from silo_server.services.items import get_item
-from silo_server.services.last_sync import in_sentences, last_sync
-from silo_server.services.last_sync import marks as marks_of
 from silo_server.values import Item, Line
 from silo_server.web.guard import Reader
 from silo_server.web.render import page

@@ -13,7 +13,7 @@ from silo.bom.errors import AuthError
 from silo_server.errors import TooManyAttemptsError
 from silo_server.routes.auth import set_session_cookie
 from silo_server.routes.context import SESSION_COOKIE, ServerDep, client_address, find_actor
-from silo_server.services import logins
+from silo_server.services.access import logins
 from silo_server.web.forms import Form, back, text
 from silo_server.web.guard import Reader, own_form
 from silo_server.web.render import page

@@ -15,12 +15,13 @@ from starlette.responses import Response
 from silo.bom.errors import ConflictError, NotFoundError, RejectedError, SiloError, VersionConflictError
 from silo_server.db.engine import Tx
 from silo_server.routes.context import Server, ServerDep
-from silo_server.services import edits, events, history
-from silo_server.services import review as service
+from silo_server.services import events
+from silo_server.services.bom import edits, history
+from silo_server.services.bom import review as service
+from silo_server.services.bom.last_sync import in_sentences, last_sync
+from silo_server.services.bom.lines import LineId, line_of, lines_of
+from silo_server.services.bom.review import Action, Decision
 from silo_server.services.items import get_item
-from silo_server.services.last_sync import in_sentences, last_sync
-from silo_server.services.lines import LineId, line_of, lines_of
-from silo_server.services.review import Action, Decision
 from silo_server.values import Actor, Line
 from silo_server.web.forms import Form, amount, back, text, texts, whole
 from silo_server.web.guard import Reader, Writer

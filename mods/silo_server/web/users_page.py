@@ -13,7 +13,8 @@ from silo_server.db.engine import mode_of
 from silo_server.db.state import put_state
 from silo_server.operation.housekeeping import last_run
 from silo_server.routes.context import Server, ServerDep
-from silo_server.services import accounts, audit, credentials, events, logins
+from silo_server.services import events
+from silo_server.services.access import accounts, audit, credentials, logins
 from silo_server.values import Actor, Role
 from silo_server.web.account_page import password_of
 from silo_server.web.forms import Form, back, text

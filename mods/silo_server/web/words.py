@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from silo_server.services.history import ChangedLine
+from silo_server.services.bom.history import ChangedLine
 from silo_server.values import LineState
 from silo_server.web.render import plural, quantity
 

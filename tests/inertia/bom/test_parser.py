@@ -356,7 +356,7 @@ def test_no_cells_are_lost(rows: list[tuple[str, str, str]]) -> None:
 
 def test_the_servers_real_export_is_read() -> None:
     """What silo_server writes as CSV comes back: names like formulae, structure, exact masses."""
-    exports = pytest.importorskip("silo_server.services.exports")
+    exports = pytest.importorskip("silo_server.services.bom.exports")
     rows = [
         {
             "Item": "1",

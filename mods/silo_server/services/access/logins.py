@@ -15,8 +15,8 @@ from silo_server.clock import stamp
 from silo_server.db.engine import LOGIN_LOCK, Database, Tx
 from silo_server.db.tables import login_failures, login_links, sessions, users
 from silo_server.errors import TooManyAttemptsError
-from silo_server.services import accounts, audit
-from silo_server.services.credentials import secret_hash
+from silo_server.services.access import accounts, audit
+from silo_server.services.access.credentials import secret_hash
 from silo_server.values import Actor, Role
 
 WRONG = "user name or password is wrong"

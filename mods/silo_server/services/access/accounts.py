@@ -15,7 +15,7 @@ from silo.bom.errors import ConflictError, ForbiddenError, NotFoundError, Reject
 from silo_server.db.engine import ADMIN_LOCK, Tx
 from silo_server.db.tables import sessions, users
 from silo_server.errors import DuplicateError
-from silo_server.services import audit
+from silo_server.services.access import audit
 from silo_server.turnstile import Turnstile
 from silo_server.values import Role
 

@@ -24,7 +24,7 @@ from silo_server.db.engine import Tx
 from silo_server.db.tables import bom_conflicts, bom_syncs, items
 from silo_server.json_values import dumps
 from silo_server.services import events
-from silo_server.services.changes import (
+from silo_server.services.bom.changes import (
     ChangeKind,
     ChangeNote,
     LineChange,
@@ -33,12 +33,11 @@ from silo_server.services.changes import (
     check_version,
     new_line_id,
 )
-from silo_server.services.history import state_at
+from silo_server.services.bom.history import state_at
+from silo_server.services.bom.last_sync import LastSync, last_sync, remember
+from silo_server.services.bom.lines import lines_of
+from silo_server.services.bom.merge_json import MergeOrder, answer_of, event_of
 from silo_server.services.items import get_item
-from silo_server.services.last_sync import LastSync, last_sync, remember
-from silo_server.services.lines import lines_of
-from silo_server.services.merge_answer import answer_of, event_of
-from silo_server.services.merge_request import MergeOrder
 from silo_server.values import Item, Line, LineState, number
 
 

@@ -14,10 +14,10 @@ from silo.bom.errors import ConflictError, NotFoundError, RejectedError
 from silo_server.db.engine import Tx
 from silo_server.db.tables import bom_conflicts
 from silo_server.services import events
-from silo_server.services.changes import ChangeKind, ChangeNote, LineChange, apply_changes, check_version
-from silo_server.services.history import Change, last_merge
+from silo_server.services.bom.changes import ChangeKind, ChangeNote, LineChange, apply_changes, check_version
+from silo_server.services.bom.history import Change, last_merge
+from silo_server.services.bom.lines import LineId, component_of, lines_of
 from silo_server.services.items import get_item
-from silo_server.services.lines import LineId, component_of, lines_of
 from silo_server.values import Item, Line, LineState
 
 

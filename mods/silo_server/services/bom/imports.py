@@ -24,7 +24,7 @@ from silo_server.db.engine import Tx
 from silo_server.db.tables import items
 from silo_server.errors import TooLargeError
 from silo_server.services import events
-from silo_server.services.changes import (
+from silo_server.services.bom.changes import (
     ChangeKind,
     ChangeNote,
     LineChange,
@@ -33,17 +33,17 @@ from silo_server.services.changes import (
     check_version,
     new_line_id,
 )
-from silo_server.services.edits import check_state, edited_state
-from silo_server.services.exports import plain_cell
+from silo_server.services.bom.edits import check_state, edited_state
+from silo_server.services.bom.exports import plain_cell
+from silo_server.services.bom.lines import lines_of
 from silo_server.services.items import get_item
-from silo_server.services.lines import lines_of
 from silo_server.values import Line, LineState
 
 ROLES = (
     *(Role.PART_NUMBER, Role.QUANTITY, Role.UNIT, Role.REFERENCE_DESIGNATORS, Role.FIND_NUMBER, Role.NOTES),
     *(Role.TYPE, Role.REVISION, Role.LEVEL),
 )
-INCOMPLETE = "Incomplete"  # of silo_server.services.exports
+INCOMPLETE = "Incomplete"  # of silo_server.services.bom.exports
 NEEDED = (Role.PART_NUMBER, Role.QUANTITY)
 HEADER_WITHIN = 40
 """The header must be among this many first lines (title blocks are a few lines long)."""

@@ -21,7 +21,7 @@ from silo_server.db.bulk import insert_rows, one_of, update_rows
 from silo_server.db.engine import Tx
 from silo_server.db.tables import bom_change_lines, bom_changes, bom_lines, items
 from silo_server.json_values import dumps
-from silo_server.services.lines import state_columns, state_to_json
+from silo_server.services.bom.lines import state_columns, state_to_json
 from silo_server.values import Item, LineState
 
 

@@ -20,8 +20,8 @@ from silo_server.db.bulk import insert_rows, one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import bom_last_syncs, bom_lines
 from silo_server.json_values import dumps
-from silo_server.services.merge_request import MergeOrder
-from silo_server.services.tree import Graph
+from silo_server.services.bom.merge_json import MergeOrder
+from silo_server.services.bom.tree import Graph
 from silo_server.values import Item
 
 

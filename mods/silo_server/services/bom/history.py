@@ -18,7 +18,7 @@ from silo_server.db.engine import Tx
 from silo_server.db.tables import bom_change_lines, bom_changes, bom_conflicts
 from silo_server.json_values import loads
 from silo_server.services import events
-from silo_server.services.changes import (
+from silo_server.services.bom.changes import (
     ChangeKind,
     ChangeNote,
     LineChange,
@@ -26,8 +26,8 @@ from silo_server.services.changes import (
     check_no_cycle,
     check_version,
 )
+from silo_server.services.bom.lines import lines_of, stored_state
 from silo_server.services.items import by_ids, get_item
-from silo_server.services.lines import lines_of, stored_state
 from silo_server.values import Item, LineState
 
 

@@ -20,8 +20,8 @@ from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import bom_lines, items
 from silo_server.errors import TooLargeError
+from silo_server.services.bom.lines import select_lines, to_line
 from silo_server.services.items import by_ids
-from silo_server.services.lines import select_lines, to_line
 from silo_server.values import Item, Line
 
 MAX_DEPTH = 20

@@ -16,10 +16,10 @@ from typing import IO, Any
 
 from silo_server.clock import wire
 from silo_server.db.engine import Tx
+from silo_server.services.bom.last_sync import in_sentences, last_syncs, marks
+from silo_server.services.bom.rollup import positive_number
+from silo_server.services.bom.tree import MAX_DEPTH, Graph, expand, flatten, load_graph
 from silo_server.services.items import by_ids, get_item
-from silo_server.services.last_sync import in_sentences, last_syncs, marks
-from silo_server.services.rollup import positive_number
-from silo_server.services.tree import MAX_DEPTH, Graph, expand, flatten, load_graph
 from silo_server.values import Item, Line, number
 
 

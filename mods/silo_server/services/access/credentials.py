@@ -15,7 +15,7 @@ from silo_server.clock import stamp, wire
 from silo_server.db.bulk import update_rows
 from silo_server.db.engine import Database, Tx
 from silo_server.db.tables import api_tokens, users
-from silo_server.services import audit
+from silo_server.services.access import audit
 from silo_server.values import Actor, Role, Scope
 
 PREFIX = "silo_"

@@ -13,7 +13,7 @@ from silo_server.db.engine import Tx
 from silo_server.errors import DuplicateError
 from silo_server.json_values import json_problem
 from silo_server.services import events
-from silo_server.services.changes import (
+from silo_server.services.bom.changes import (
     ChangeKind,
     ChangeNote,
     LineChange,
@@ -22,9 +22,9 @@ from silo_server.services.changes import (
     check_version,
     new_line_id,
 )
+from silo_server.services.bom.lines import LineId, line_of, lines_of
+from silo_server.services.bom.merge_json import quantity_problem
 from silo_server.services.items import get_item
-from silo_server.services.lines import LineId, line_of, lines_of
-from silo_server.services.merge_request import quantity_problem
 from silo_server.values import Item, Line, LineState, number
 
 REL_TYPES = ("component", "alternate", "reference")

@@ -20,7 +20,7 @@ from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import items
 from silo_server.json_values import loads
-from silo_server.services.tree import Exact, Graph, added, flatten, multiplied, order_of
+from silo_server.services.bom.tree import Exact, Graph, added, flatten, multiplied, order_of
 from silo_server.values import Line
 
 DEFAULT_CURRENCY = "EUR"
