@@ -55,7 +55,7 @@ def test_from_the_assembly_to_a_quiet_sync(story: GearboxStory, visit: Visit) ->
     page.get_by_role("button", name=f"Remove {plate}").click()
     expect(page.locator(".banner.calm")).to_contain_text("Nothing to decide")
     line = page.locator("tr", has=page.get_by_role("link", name=cover, exact=True))
-    expect(line).to_contain_text("manual")
+    expect(line).to_contain_text("by hand")
     expect(line).to_contain_text("Ordered with the housing")
     expect(page.get_by_role("link", name=plate, exact=True)).to_have_count(0)
 

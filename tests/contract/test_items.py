@@ -341,3 +341,18 @@ def test_the_list_is_in_one_order_on_both_databases(api: Api) -> None:
         api.item(f"{word}{ending}")
     found = [item["part_number"].removeprefix(word) for item in api.get(f"/api/items?search={word}")]
     assert found == ["-a", "10", "9", "_c", "b", "Z", "ä"]
+
+
+@pytest.mark.parametrize(
+    "hidden", ["\u202e", "\u200b", "\u200d", "\ufeff", "\u00a0", "\u00ad", "\u2066", "\u3164", "\U000e0041"]
+)
+def test_a_part_number_has_no_character_that_nobody_sees(api: Api, hidden: str) -> None:
+    """Two numbers that look the same are the same; the answer names the character. A rename too."""
+    number = api.item()
+    for method, path, body in (
+        ("POST", "/api/items", {"part_number": f"{number}{hidden}1", "name": "x"}),
+        ("PUT", f"/api/items/{number}", {"part_number": f"{number}{hidden}1"}),
+    ):
+        problem = api.bad(400, method, path, body)
+        assert f"U+{ord(hidden):04X}" in problem["message"]
+    assert api.get(f"/api/items/{number}")["part_number"] == number

@@ -186,7 +186,7 @@ def test_a_notice_is_shown_once_and_by_nobody_else(visitors: dict[str, Visitor],
     notice = done.headers["set-cookie"].split(";")[0]
     assert "HttpOnly" in done.headers["set-cookie"]
     first = visitor.get(f"/items/{parent}/bom", Cookie=f"{visitor.cookie}; {notice}")
-    assert f"✓ {child} added." in first.body.decode()
+    assert f"✓ <bdi>{child} added.</bdi>" in first.body.decode()
     assert 'silo_notice=""' in first.headers["set-cookie"]
     assert "Send money" not in visitor.get(f"/items/{parent}/bom?notice=Send+money").body.decode()
 

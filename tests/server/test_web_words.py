@@ -10,7 +10,7 @@ import pytest
 from silo_server.services.events import DatedEvent
 from silo_server.values import LineState
 from silo_server.web.activity_page import entry_of
-from silo_server.web.render import plural, quantity, segment, size, when
+from silo_server.web.render import bdi, closed, isolate, mass, money, plural, quantity, segment, size, when
 from silo_server.web.words import changes
 
 LINE = LineState(4.0, "assembly")
@@ -45,6 +45,50 @@ def test_small_words() -> None:
     )
     assert when(None) == "–"
     assert segment("A/B 1#") == "A%2FB%201%23"
+
+
+@pytest.mark.parametrize(
+    ("kilograms", "words"),
+    [
+        (20_700.0, "20.7 t"),
+        (1_234_567.0, "1\u202f235 t"),
+        (999.96, "1 t"),
+        (123.456, "123.5 kg"),
+        (0.9999999, "1 kg"),
+        (0.5, "500 g"),
+        (1e-6, "0.001 g"),
+        (0, "0 kg"),
+        (None, "–"),
+    ],
+)
+def test_masses_read_as_people_write_them(kilograms: float | None, words: str) -> None:
+    """The unit that fits, four digits, groups of three, and never an exponent."""
+    assert mass(kilograms) == words
+
+
+@pytest.mark.parametrize(
+    ("amount", "words"),
+    [
+        (12.0, "12.00 EUR"),
+        (12_345.6, "12\u202f345.60 EUR"),
+        (0.0042, "0.0042 EUR"),
+        (0.15, "0.15 EUR"),
+        (0, "0.00 EUR"),
+        (None, "–"),
+    ],
+)
+def test_costs_have_cents_and_groups(amount: float | None, words: str) -> None:
+    """Two decimals; a screw for less than a cent keeps its digits."""
+    assert money(amount, "EUR") == words
+
+
+def test_text_that_turns_ends_where_it_ends() -> None:
+    """Overrides are left out, isolates are closed, stray ends are left out; what is left is as it was."""
+    assert closed("\u2069\u202eabc\u2067") == "abc\u2067\u2069"
+    assert closed("\u2068a\u2069 b\u202c") == "\u2068a\u2069 b"
+    assert bdi("<b>\u202e") == "<bdi>&lt;b&gt;</bdi>"
+    assert isolate("M8 bolt") == "M8 bolt"
+    assert isolate("\u05d0\u202e1") == "\u2068\u05d01\u2069"
 
 
 @pytest.mark.parametrize(

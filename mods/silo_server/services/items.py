@@ -341,9 +341,14 @@ def _item_type(given: str | None, category: Category | None) -> str:
     return given
 
 
+def _new_number(item: Item, given: str | None) -> str | None:
+    # A number from before a rule of today may stay.
+    return given if given is None or given == item.part_number else check_number(given)
+
+
 def _changed_values(item: Item, change: ItemChange) -> dict[str, Any]:
     given = {
-        "part_number": check_number(change.part_number) if change.part_number is not None else None,
+        "part_number": _new_number(item, change.part_number),
         "name": change.name,
         "description": change.description,
         "item_type": _item_type(change.item_type, None) if change.item_type is not None else None,

@@ -16,12 +16,28 @@ from silo_server.schema.catalog import Category, Schema, find_schema
 
 # Words that stand where a part number stands in a path.
 RESERVED = frozenset({"by-uuid", "search", "export.csv", "import", "new"})
-NUMBER_FORM = re.compile(r"[^\s/\\?#%\x00-\x1f\x7f](?:[^/\\?#%\x00-\x1f\x7f]{0,62}[^\s/\\?#%\x00-\x1f\x7f])?")
+# Two numbers that look the same must be the same number: what has no picture is refused. These are the
+# blanks but the plain one, the bidirectional and zero-width characters (Cf, Zl, Zp), and others that readers
+# may ignore.
+UNSEEN = (
+    "\\xa0\\xad\\u034f\\u0600-\\u0605\\u061c\\u06dd\\u070f\\u0890\\u0891\\u08e2\\u115f\\u1160\\u1680\\u17b4\\u17b5"
+    "\\u180b-\\u180f\\u2000-\\u200f\\u2028-\\u202f\\u205f-\\u206f\\u2800\\u3000\\u3164\\ufe00-\\ufe0f\\ufeff\\uffa0"
+    "\\ufff9-\\ufffb\U0001bca0-\U0001bca3\U0001d173-\U0001d17a\U000e0000-\U000e0fff"
+)
+_INSIDE = rf"/\\?#%\x00-\x1f\x7f{UNSEEN}"
+NUMBER_FORM = re.compile(rf"[^\s{_INSIDE}](?:[^{_INSIDE}]{{0,62}}[^\s{_INSIDE}])?")
+_UNSEEN = re.compile(f"[{UNSEEN}]")
 
 
 def check_number(number: str) -> str:
     """A part number as given, trimmed; RejectedError where it cannot stand in a path or a cell."""
     trimmed = number.strip()
+    unseen = sorted({f"U+{ord(c):04X}" for c in _UNSEEN.findall(trimmed)})
+    if unseen:
+        raise RejectedError(
+            f"part_number: wanted characters that can be seen, got {', '.join(unseen)} in {number!a}; "
+            "type the number by hand instead of pasting it"
+        )
     if not NUMBER_FORM.fullmatch(trimmed) or trimmed.casefold() in RESERVED or trimmed in (".", ".."):
         raise RejectedError(
             "part_number: wanted 1 to 64 characters without / \\ ? # % and control characters, "

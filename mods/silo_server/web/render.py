@@ -4,15 +4,18 @@
 from __future__ import annotations
 
 import re
+import unicodedata
+from decimal import ROUND_HALF_EVEN, Context, Decimal
 from typing import Any
 from urllib.parse import quote, unquote
 
 from fastapi import Request
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
+from markupsafe import Markup, escape
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.responses import HTMLResponse, Response
 
+from silo.bom.numbers import as_decimal
 from silo_server.clock import wire
 from silo_server.db.engine import mode_of
 from silo_server.routes.context import server_of
@@ -29,7 +32,7 @@ def quantity(value: float | None, unit: str | None = None) -> str:
     if value is None:
         return "–"
     shown = str(int(value)) if value == int(value) and abs(value) < 1e15 else f"{value:.12g}"
-    return f"{shown} {unit}" if unit else shown
+    return f"{shown} {isolate(unit)}" if unit else shown
 
 
 def when(stamp: str | None) -> Markup | str:
@@ -53,6 +56,79 @@ def size(count: int | None) -> str:
     return f"{count / 1e3:.0f} kB" if count < 1e6 else f"{count / 1e6:.1f} MB"
 
 
+# The characters that turn the direction of the text around them, up to where they are closed.
+TURNING = re.compile("[\u202a-\u202e\u2066-\u2069]")
+_TURNED = frozenset(("R", "AL", "AN", "LRI", "RLI", "FSI", "PDI"))
+_OPENING, _CLOSING = "\u2066\u2067\u2068", "\u2069"
+_FOUR_DIGITS = Context(prec=4, rounding=ROUND_HALF_EVEN)
+_GRAMS = Decimal("0.001")
+
+
+def bdi(text: object) -> Markup:
+    """What somebody typed, as text whose direction ends with it. A bare ``<bdi>`` ends at a U+2069 inside."""
+    return Markup(f"<bdi>{escape(closed(str(text)))}</bdi>")
+
+
+def isolate(text: str) -> str:
+    """As :func:`bdi`, for sentences that are no HTML; text from left to right stays as it is."""
+    plain = closed(text)
+    if any(unicodedata.bidirectional(character) in _TURNED for character in plain):
+        return f"\u2068{plain}\u2069"
+    return plain
+
+
+def closed(text: str) -> str:
+    """``text`` without characters that turn what follows it: isolates are closed, all others left out."""
+    if TURNING.search(text) is None:
+        return text
+    kept: list[str] = []
+    depth = 0
+    for character in text:
+        if character in _OPENING:
+            depth += 1
+        elif character == _CLOSING and depth:
+            depth -= 1
+        elif TURNING.match(character):
+            continue
+        kept.append(character)
+    return "".join(kept) + _CLOSING * depth
+
+
+def grouped(value: Decimal) -> str:
+    """``12 345.6``: groups of three digits with a narrow space that does not break; no exponent."""
+    return f"{value:,f}".replace(",", "\u202f")
+
+
+def mass(kilograms: float | Decimal | None) -> str:
+    """``20.7 t``, ``3 kg``, ``12.5 g``: four digits at most; a dash where there is none."""
+    if kilograms is None:
+        return "–"
+    exact = _rounded(as_decimal(kilograms))
+    size, unit = Decimal(1), "kg"
+    if abs(exact) >= 1000:
+        size, unit = Decimal(1000), "t"
+    elif 0 < abs(exact) < 1:
+        size, unit = _GRAMS, "g"
+    return f"{grouped(_rounded(exact / size))} {unit}"
+
+
+def money(amount: float | Decimal | None, currency: str | None = None) -> str:
+    """``12 345.60 EUR``; parts of a cent keep their digits (``0.0042 EUR``). A dash where there is none."""
+    if amount is None:
+        return "–"
+    exact = as_decimal(amount)
+    cents = exact.quantize(Decimal("0.01"), ROUND_HALF_EVEN)
+    small = 0 < abs(exact) < Decimal("0.1") and cents != exact
+    return f"{grouped(_rounded(exact) if small else cents)} {currency or ''}".rstrip()
+
+
+def _rounded(value: Decimal) -> Decimal:
+    """To four digits, but never less than all of the whole ones; without zeros at the end."""
+    whole = value.quantize(Decimal(1), ROUND_HALF_EVEN)
+    short = whole if abs(whole) >= 1000 else _FOUR_DIGITS.plus(value).normalize()
+    return short.quantize(Decimal(1)) if short == short.to_integral_value() else short
+
+
 def segment(text: str) -> str:
     """A part number as one segment of a path."""
     return quote(text, safe="")
@@ -66,7 +142,9 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters.update(quantity=quantity, when=when, segment=segment, size=size)
+    environment.filters.update(
+        quantity=quantity, when=when, segment=segment, size=size, bdi=bdi, mass=mass, money=money
+    )
     environment.globals.update(plural=plural)
     return environment
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from silo_server.services.bom.history import ChangedLine
 from silo_server.values import LineState
-from silo_server.web.render import plural, quantity
+from silo_server.web.render import isolate, plural, quantity
 
 # What a person fills in on a line, with its label.
 FIELDS = {
@@ -28,7 +28,7 @@ _NAMES = {
 
 def sentence(line: ChangedLine) -> tuple[str, str]:
     """(mark, words) of what one change made of one line: ``~``, ``F01-0001 M8x20 Bolt: quantity 8 → 12``."""
-    who = f"{line.child.part_number} {line.child.name}".strip()
+    who = f"{isolate(line.child.part_number)} {isolate(line.child.name)}".strip()
     if line.before is None and line.after is not None:
         return "added", f"{who}: added, quantity {quantity(line.after.quantity, line.after.unit)}"
     if line.after is None:
@@ -53,7 +53,7 @@ def changes(before: LineState, after: LineState) -> list[str]:
     if before.source != after.source:
         said.append("now a manual line" if after.source == "manual" else "owned by the assembly again")
     if before.reason != after.reason and after.reason:
-        said.append(f"reason: {after.reason}")
+        said.append(f"reason: {isolate(after.reason)}")
     for name, words in _NAMES.items():
         old, new = (_shown(getattr(state, name)) for state in (before, after))
         if old != new:
@@ -70,5 +70,5 @@ def sentences(lines: Sequence[ChangedLine], most: int = 30) -> list[tuple[str, s
 
 def _shown(value: object) -> str:
     if isinstance(value, tuple):
-        return " ".join(map(str, value)) or "none"
-    return "none" if value is None or value == "" else f"“{value}”"
+        return isolate(" ".join(map(str, value))) or "none"
+    return "none" if value is None or value == "" else f"“{isolate(str(value))}”"
