@@ -18,11 +18,6 @@ from silo.bom.walk.standard import standard_uuid
 M4 = "ISO 4762 M4×16"
 
 
-def screw(doc: Doc, name: str, length: str = "16", **properties: Any) -> Any:
-    values = {"Type": "ISO4762", "Diameter": "M4", "Length": length, **properties}
-    return doc.add("Part::FeaturePython", name, **values)
-
-
 def articles(found: Extraction) -> dict[str | None, int]:
     return {entry.standard: entry.quantity for entry in found.entries}
 
@@ -30,7 +25,7 @@ def articles(found: Extraction) -> dict[str | None, int]:
 def test_one_article_has_the_identity_of_its_designation() -> None:
     """And says where it first occurs; no file is stamped for it."""
     top = Doc("/v/top.FCStd", meta={"SiloUUID": "the assembly"})
-    (entry,) = extract(top.assembly(screw(top, "A"), screw(top, "B"))).entries
+    (entry,) = extract(top.assembly(top.screw("A"), top.screw("B"))).entries
     assert (entry.silo_uuid, entry.is_standard) == (standard_uuid(M4), True)
     assert (entry.doc_path, entry.object_name, entry.quantity) == ("/v/top.FCStd", "A", 2)
 
@@ -38,14 +33,14 @@ def test_one_article_has_the_identity_of_its_designation() -> None:
 def test_a_registered_fastener_is_an_item_of_its_own() -> None:
     """Who registered that very object meant that item."""
     top = Doc("/v/top.FCStd")
-    found = extract(top.assembly(screw(top, "A", SiloItemId="mine"), screw(top, "B")))
+    found = extract(top.assembly(top.screw("A", SiloItemId="mine"), top.screw("B")))
     assert {entry.silo_uuid: entry.quantity for entry in found.entries} == {"mine": 1, standard_uuid(M4): 1}
 
 
 def test_without_hardware_nothing_of_it_counts() -> None:
     """Neither in the assembly nor linked, and that is said."""
     top, store = Doc("/v/top.FCStd"), Doc("/v/store.FCStd")
-    asm = top.assembly(screw(top, "A"), top.link("L", screw(store, "S")), top.link("B", store.body("Bolt")))
+    asm = top.assembly(top.screw("A"), top.link("L", store.screw("S")), top.link("B", store.body("Bolt")))
     found = extract(asm, hardware=False)
     assert [entry.object_name for entry in found.entries] == ["Bolt"]
     assert found.findings_of(FindingCode.NO_HARDWARE)
@@ -85,7 +80,7 @@ def test_any_nesting_of_repetitions_is_their_product(chains: list[list[tuple[str
     top = Doc("/v/top.FCStd")
     members, wanted = [], 0
     for number, chain in enumerate(chains):
-        obj, pieces = screw(top, f"S{number}"), 1
+        obj, pieces = top.screw(f"S{number}"), 1
         for step, (how, times) in enumerate(chain):
             name = f"N{number}x{step}"
             if how == "l":
@@ -104,11 +99,35 @@ def test_any_nesting_of_repetitions_is_their_product(chains: list[list[tuple[str
     assert articles(extract(top.assembly(*members))) == {M4: wanted}
 
 
+def test_a_mirror_image_shows_its_source_once_more() -> None:
+    """Its Base is the point that the plane goes through, not what it shows."""
+    top = Doc("/v/top.FCStd")
+    screw = top.screw("A")
+    found = extract(top.assembly(screw, top.add("Part::Mirroring", "Mirror", Source=screw)))
+    assert articles(found) == {M4: 2}
+
+
+@pytest.mark.parametrize("container", ["link_group", "part"])
+def test_what_lies_in_a_folder_of_a_container_counts_once(container: str) -> None:
+    """A part lists what lies in its folders, a link group does not: it is not beside the assembly."""
+    top = Doc("/v/top.FCStd")
+    inner = top.folder("Inner", top.screw("A"), top.folder("Deeper", top.screw("B")))
+    holder = getattr(top, container)("Holder", inner)
+    found = extract(choose_assembly(_in_a_file(top, holder)))
+    assert articles(found)[M4] == 2
+    assert found.findings_of(FindingCode.COUNTED_BESIDE, FindingCode.NO_CONTAINER) == ()
+
+
+def _in_a_file(top: Doc, holder: Any) -> Doc:
+    top.assembly(holder, top.link("L", Doc("/v/bolt.FCStd").body()))
+    return top
+
+
 @pytest.mark.parametrize("operand", ["Tool", "Base"])
 def test_an_array_that_a_cut_consumes_is_no_pieces_to_buy(operand: str) -> None:
     """As the single screw is not."""
     top = Doc("/v/top.FCStd")
-    array = top.add("Part::FeaturePython", "Array", Base=screw(top, "S"), Count=6)
+    array = top.add("Part::FeaturePython", "Array", Base=top.screw("S"), Count=6)
     other = "Base" if operand == "Tool" else "Tool"
     cut = top.add("Part::Cut", "Cut", **{operand: array, other: top.body("Plate")})
-    assert articles(extract(top.assembly(array, cut, screw(top, "Bought")))) == {M4: 1}
+    assert articles(extract(top.assembly(array, cut, top.screw("Bought")))) == {M4: 1}

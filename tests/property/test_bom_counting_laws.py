@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Counting laws over random assemblies: the walker against a naive count, and against any order of a Group.
 
+Links, arrays, containers, and standard parts in the assembly's own file, each in any of the others.
+
 A plan says what a person built; from it come the fake documents that the walker sees, and, apart from that, a
 count that does nothing but go from instance to instance and add one.
 """
@@ -21,6 +23,7 @@ from silo.bom.document import LinkProblem
 from silo.bom.findings import FindingCode
 from silo.bom.model import BomEntry
 from silo.bom.report import flat_counts
+from silo.bom.walk.standard import STANDARD_PARTS
 
 Key = tuple[str, str]
 
@@ -35,6 +38,16 @@ class Link:
     target: str
     count: int = 0
     style: str = "link"
+    mark: str = ""
+
+
+@dataclass
+class Screw:
+    """``count`` standard parts in one array, or a single one; ``style`` is what shows them."""
+
+    length: str
+    count: int = 0
+    style: str = "single"
     mark: str = ""
 
 
@@ -69,8 +82,13 @@ def links(targets: list[str]) -> st.SearchStrategy[Link]:
     )
 
 
+def screws() -> st.SearchStrategy[Screw]:
+    styles = st.sampled_from(("single", "compound", "draft", "linked", "cut"))
+    return st.builds(Screw, st.sampled_from(("8", "12")), st.integers(0, 3), styles, st.sampled_from(MARKS))
+
+
 def items(targets: list[str], depth: int = 2) -> st.SearchStrategy[list[Any]]:
-    one = links(targets)
+    one: st.SearchStrategy[Any] = links(targets) | screws()
     if depth:
         kinds = st.sampled_from(["part", "assembly", "folder", "link_group"])
         one = one | st.builds(
@@ -105,7 +123,12 @@ def direct(things: list[Any]) -> Iterator[str]:
     for thing in things:
         if thing.mark:
             continue
-        if isinstance(thing, Link):
+        if isinstance(thing, Screw):
+            # Its own array shows the first one too; a link shows it once more; a cut consumes it.
+            times = {"draft": max(1, thing.count), "linked": 1 + max(1, thing.count), "cut": 0}
+            for _ in range(times.get(thing.style, 1)):
+                yield f"ISO 4762 M4×{thing.length}"
+        elif isinstance(thing, Link):
             # One element of an array is one; a chain through an array of two shows both each time.
             times = 1 if thing.style == "element" else max(1, thing.count)
             for _ in range(times * (2 if thing.style == "chain" else 1)):
@@ -146,7 +169,28 @@ class Builder:
 
     def objects(self, doc: Doc, thing: Any) -> list[Any]:
         mark = {thing.mark: True} if thing.mark else {}
-        return self.link(doc, thing, mark) if isinstance(thing, Link) else self.inside(doc, thing, mark)
+        make: Any = {Link: self.link, Screw: self.screw}.get(type(thing), self.inside)
+        found: list[Any] = make(doc, thing, mark)
+        return found
+
+    def screw(self, doc: Doc, thing: Screw, mark: dict[str, bool]) -> list[Any]:
+        # What shows a screw carries the mark; where nothing does, or it stands beside its link, itself.
+        inner = (
+            mark
+            if thing.style in ("single", "linked") or (thing.style == "draft" and not thing.count)
+            else {}
+        )
+        one = doc.screw(self.name(), thing.length, **inner)
+        if thing.style == "compound":
+            return [doc.add("Part::Compound", self.name(), Links=[one], **mark), one]
+        if thing.style == "draft" and thing.count:
+            array = doc.add("Part::FeaturePython", self.name(), Base=one, Count=thing.count, **mark)
+            return [array] if mark else [array, one]
+        if thing.style == "linked":
+            return [one, doc.array(self.name(), one, thing.count, **mark)]
+        if thing.style == "cut":
+            return [doc.add("Part::Cut", self.name(), Base=doc.body(self.name()), Tool=one), one]
+        return [one]
 
     def link(self, doc: Doc, thing: Link, mark: dict[str, bool]) -> list[Any]:
         target, count = self.target(thing.target), thing.count
@@ -165,6 +209,8 @@ class Builder:
 
     def inside(self, doc: Doc, thing: Inside, mark: dict[str, bool]) -> list[Any]:
         inner = self.members(doc, thing.items)
+        if thing.kind == "link_group":  # which does not list what lies in its folders
+            inner = _without_what_lies_in_folders(inner)
         container = getattr(doc, thing.kind)(
             *([] if thing.kind == "assembly" else [self.name()]), *inner, **mark
         )
@@ -179,11 +225,19 @@ class Builder:
         return found
 
 
+def _without_what_lies_in_folders(members: list[Any]) -> list[Any]:
+    folders = [obj for obj in members if obj.TypeId == "App::DocumentObjectGroup"]
+    inside = {id(obj) for folder in folders for obj in folder.Group}
+    return [obj for obj in members if id(obj) not in inside]
+
+
 def build(plan: Plan) -> Any:
     return Builder(plan).target(plan.top)
 
 
 def key_of(plan: Plan, name: str) -> Key:
+    if name.startswith("ISO"):
+        return (STANDARD_PARTS, name)
     return (f"/v/{name}.FCStd", "Assembly" if name in plan.assemblies else "Body")
 
 
@@ -206,6 +260,8 @@ def test_each_level_is_the_naive_count_of_its_assembly(plan: Plan) -> None:
         assert {entry.key: entry.quantity for entry in entries} == wanted
         for entry in entries:
             assert entry.level == level
+            if entry.standard:
+                continue
             below = entry.doc_path.removeprefix("/v/").removesuffix(".FCStd")
             if below in plan.assemblies:
                 check(entry.children, below, level + 1)

@@ -87,6 +87,7 @@ DEFAULTS: dict[str, dict[str, Any]] = {
     "App::DocumentObjectGroup": {"Group": []},
     "App::Part": {"Group": [], "Type": ""},
     "Assembly::AssemblyLink": {"LinkedObject": None, "Rigid": True},
+    "Part::Mirroring": {"Source": None, "Base": (0.0, 0.0, 0.0), "Normal": (0.0, 0.0, 1.0)},
     "PartDesign::Body": {"Group": []},
 }
 
@@ -160,6 +161,11 @@ class Doc:
     def folder(self, name: str, *members: Any, **properties: Any) -> Obj:
         """A plain group of the tree."""
         return self.group("App::DocumentObjectGroup", name, *members, **properties)
+
+    def screw(self, name: str, length: str = "16", **properties: Any) -> Obj:
+        """A cap screw of the Fasteners workbench: ISO 4762 M4×``length``."""
+        made_of = {"Type": "ISO4762", "Diameter": "M4", "Length": length, **properties}
+        return self.add("Part::FeaturePython", name, **made_of)
 
     def link_group(self, name: str, *members: Any, **properties: Any) -> Obj:
         """An ``App::LinkGroup``."""

@@ -70,23 +70,9 @@ def run_freecad(
     A file that FreeCAD cannot read, dies of or hangs on gives its error, and the rest goes on. ConfigError
     where there is no FreeCAD, or where it does not start.
     """
-    freecadcmd = find_freecadcmd(command)
-    rest = [os.path.abspath(top) for top in tops]
-    told = dict(zip(rest, tops, strict=True))
-    while rest:
-        job: dict[str, Any] = {"tops": rest}
-        if assembly is not None:
-            job["assembly"] = assembly
-        if not hardware:
-            job["no_hardware"] = True
-        with FreeCADRun(freecadcmd, HEADLESS, job, timeout_s, env or {}) as run:
-            for line in run.lines():
-                path = rest.pop(0)
-                yield told[path], _result(line)
-        if rest:
-            # The process is over, and this file was not finished.
-            failed = rest.pop(0)
-            yield told[failed], run.failure(failed)
+    settings = {"assembly": assembly, "no_hardware": not hardware}
+    for top, line in _each(tops, settings, command, timeout_s, env):
+        yield top, line if isinstance(line, SiloError) else _result(line)
 
 
 @dataclass(frozen=True)
@@ -112,22 +98,34 @@ def verify_in_freecad(
     hardware: bool = True,
 ) -> Iterator[tuple[str, Witnessed | SiloError]]:
     """As :func:`run_freecad`, with the geometry as witness (``silo.workbench.freecad.witness``)."""
+    settings = {"assembly": assembly, "no_hardware": not hardware, "verify": True}
+    for top, line in _each(tops, settings, command, timeout_s, env):
+        if isinstance(line, SiloError):
+            yield top, line
+        else:
+            found = _result(line)
+            yield top, Witnessed(found, tuple(line["witness"])) if isinstance(found, Extraction) else found
+
+
+def _each(
+    tops: Sequence[str],
+    settings: Mapping[str, Any],
+    command: str | None,
+    timeout_s: float,
+    env: Mapping[str, str] | None,
+) -> Iterator[tuple[str, dict[str, Any] | SiloError]]:
+    """What FreeCAD wrote of each file. It is started again for the rest where it dies or hangs."""
     freecadcmd = find_freecadcmd(command)
     rest = [os.path.abspath(top) for top in tops]
     told = dict(zip(rest, tops, strict=True))
+    given = {key: value for key, value in settings.items() if value}
     while rest:
-        job: dict[str, Any] = {"tops": rest, "verify": True, "no_hardware": not hardware}
-        if assembly is not None:
-            job["assembly"] = assembly
-        with FreeCADRun(freecadcmd, HEADLESS, job, timeout_s, env or {}) as run:
+        with FreeCADRun(freecadcmd, HEADLESS, {**given, "tops": rest}, timeout_s, env or {}) as run:
             for line in run.lines():
-                found = _result(line)
                 path = rest.pop(0)
-                if isinstance(found, Extraction):
-                    yield told[path], Witnessed(found, tuple(line["witness"]))
-                else:
-                    yield told[path], found
+                yield told[path], line
         if rest:
+            # The process is over, and this file was not finished.
             failed = rest.pop(0)
             yield told[failed], run.failure(failed)
 

@@ -22,6 +22,7 @@ import Part
 
 NEW = tuple(int(part) for part in App.Version()[:2]) >= (1, 0)
 SIZES = ("8", "12", "16")
+LINKED_FROM_OUTSIDE = ("Inner", "Array", "Compound", "Screw", "Clone", "Mirror")
 
 
 class Project:
@@ -31,6 +32,7 @@ class Project:
         self.folder, self.random = folder, random.Random(seed)
         folder.mkdir(parents=True)
         self.assemblies: list[Any] = []
+        self.inner: list[Any] = []  # what lies in assemblies and may be linked from other files
 
     def document(self, name: str) -> Any:
         doc = App.newDocument(name)
@@ -49,6 +51,8 @@ class Project:
         for doc in App.listDocuments().values():
             doc.recompute()
         for doc in App.listDocuments().values():
+            for link in doc.findObjects("Assembly::AssemblyLink") if NEW else ():
+                show_as_the_assembly_does(link)
             doc.save()
         if self.random.random() < 0.3:  # saved once more, changed and not recomputed
             top = App.getDocument("top")
@@ -68,16 +72,24 @@ class Project:
             put(root, obj)
         if self.random.random() < 0.2:
             self.link(doc, doc.addObject("App::Part", "Beside"), self.parts[0])
+        if self.random.random() < 0.03:  # nobody can know which is meant
+            second = doc.addObject("App::Part", "Second")
+            second.Type = "Assembly"
+            self.link(doc, second, self.parts[0])
         doc.recompute()
+        self.inner += [
+            obj for obj in doc.Objects if obj.Visibility and obj.Name.startswith(LINKED_FROM_OUTSIDE)
+        ]
         return root
 
     def items(self, doc: Any, root: Any, depth: int) -> list[Any]:
         made: list[Any] = []
         kinds = [self.linked, self.fastener, self.fastener, self.array_of_links]
-        kinds += [self.inside, self.again, self.draft, self.compound, self.cut] if depth else []
+        seeing = [self.inside, self.again, self.draft, self.copy, self.elements]
+        kinds += [*seeing, self.compound, self.cut] if depth else []
         for _ in range(self.random.randint(1, 4)):
             make = self.random.choice(kinds)
-            obj = make(doc, root, depth, made) if make in (self.inside, self.again, self.draft) else make(doc)
+            obj = make(doc, root, depth, made) if make in seeing else make(doc)
             made += obj if isinstance(obj, list) else [obj] if obj is not None else []
         return made
 
@@ -109,9 +121,13 @@ class Project:
         return link
 
     def linked(self, doc: Any) -> Any:
-        target = self.random.choice([*self.parts, *self.assemblies])
+        others = [obj for obj in self.inner if obj.Document is not doc]
+        target = self.random.choice(
+            [*self.parts, *self.assemblies, *(others and [self.random.choice(others)])]
+        )
         is_assembly = NEW and target.isDerivedFrom("Assembly::AssemblyObject")
-        if is_assembly and self.random.random() < 0.5:
+        # An AssemblyLink leaves out what lies in link groups.
+        if is_assembly and not target.Document.findObjects("App::LinkGroup") and self.random.random() < 0.5:
             link = doc.addObject("Assembly::AssemblyLink", "SubLink")
             link.LinkedObject = target
             return self.place(link)
@@ -133,11 +149,14 @@ class Project:
         kind = self.random.choice(["App::Part", "App::LinkGroup", "App::DocumentObjectGroup"])
         inner = self.items(doc, root, depth - 1)
         container = doc.addObject(kind, "Inner")
-        if kind != "App::DocumentObjectGroup":
+        if kind == "App::DocumentObjectGroup":
+            # A container lists what lies in its folders as well; its shape would have that twice.
+            container.Visibility = False
+        else:
             self.place(container)
         if kind == "App::LinkGroup":
             # A link group shows also what is hidden elsewhere: the operands of a cut, the base of an array.
-            inner = [obj for obj in inner if obj.Visibility]
+            inner = [obj for obj in inner if obj.Visibility or obj.isDerivedFrom("App::DocumentObjectGroup")]
             container.ElementList = inner
             if self.random.random() < 0.3:
                 other = self.place(doc.addObject(kind, "Other"))
@@ -161,13 +180,38 @@ class Project:
             return None
         base = self.random.choice(fitting)
         doc.recompute()
-        if self.random.random() < 0.5:
+        kind = self.random.random()
+        if kind < 0.5:
             steps = (App.Vector(9, 0, 0), App.Vector(0, 9, 0), App.Vector(0, 0, 9))
             array = Draft.make_ortho_array(base, *steps, 2, self.random.randint(1, 2), 1, use_link=use_link)
-        else:
+        elif kind < 0.8:
             array = Draft.make_polar_array(base, 3, 360, App.Vector(20, 0, 0), use_link=use_link)
+        else:
+            array = Draft.make_circular_array(base, 30, 25, 2, 1, use_link=use_link)
         base.Visibility = False  # as FreeCAD's window does
         return array
+
+    def copy(self, doc: Any, _root: Any, _depth: int, made: list[Any]) -> Any:
+        fitting = [obj for obj in made if obj.Name.startswith("Screw") and obj.Visibility]
+        if not fitting:
+            return None
+        doc.recompute()
+        if self.random.random() < 0.5:
+            return self.place(Draft.make_clone(self.random.choice(fitting)))
+        mirror = doc.addObject("Part::Mirroring", "Mirror")
+        mirror.Source, mirror.Base = self.random.choice(fitting), self.somewhere().Base
+        return mirror
+
+    def elements(self, doc: Any, _root: Any, _depth: int, _made: list[Any]) -> Any:
+        """Elements of an array, one by one in a group."""
+        array = doc.addObject("App::Link", "Split")
+        array.LinkedObject, array.ShowElement, array.ElementCount = self.random.choice(self.parts), True, 3
+        for element in array.ElementList:
+            self.place(element)
+        group = self.place(doc.addObject("App::LinkGroup", "Elements"))
+        group.ElementList = array.ElementList[: self.random.randint(1, 3)]
+        array.Visibility = False
+        return group
 
     def compound(self, doc: Any) -> Any:
         compound = doc.addObject("Part::Compound", "Compound")
@@ -190,6 +234,12 @@ def is_shown(obj: Any) -> bool:
     return bool(obj.InList)
 
 
+def show_as_the_assembly_does(link: Any) -> None:
+    """An AssemblyLink shows its copies also of what its assembly hides: operands, and originals of arrays."""
+    for copy in link.Group:
+        copy.Visibility = copy.LinkedObject.Visibility
+
+
 def put(container: Any, obj: Any) -> None:
     if obj not in container.Group and not any(obj in group_of(parent) for parent in obj.InList):
         container.addObject(obj)
@@ -202,10 +252,6 @@ def group_of(obj: Any) -> list[Any]:
 def shown(path: Path) -> dict[str, int]:
     """Volume in mm³ → how many solids of it the assembly shows."""
     doc = App.openDocument(str(path))
-    for one in App.listDocuments().values():
-        for folder in one.findObjects("App::DocumentObjectGroup"):
-            # A container lists what lies in its folders as well; its shape would have that twice.
-            folder.Visibility = False
     shape = Part.getShape(doc.getObject("Root"))
     return dict(Counter(str(round(solid.Volume)) for solid in solids(shape) if solid.Volume < 1000))
 
