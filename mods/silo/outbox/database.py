@@ -18,7 +18,7 @@ from typing import Any
 from silo.bom.errors import InputError
 from silo.durable import sync_folder
 
-VERSION = 2
+VERSION = 3
 
 _TABLES = """
 CREATE TABLE entry (
@@ -46,6 +46,11 @@ CREATE TABLE entry (
     next_attempt REAL NOT NULL DEFAULT 0,
     base_revision INTEGER,
     revision INTEGER,
+    origin TEXT NOT NULL DEFAULT '',
+    on_top_of INTEGER,
+    newer TEXT NOT NULL DEFAULT '',        -- JSON; "" where there is none
+    place TEXT NOT NULL DEFAULT '',
+    links TEXT NOT NULL DEFAULT '',        -- JSON; "" where nobody looked
     renamed TEXT NOT NULL DEFAULT '',      -- '', 'asked', 'same part'
     extraction TEXT NOT NULL DEFAULT '',   -- JSON; "" where there is none
     request TEXT NOT NULL DEFAULT ''       -- JSON; written before it is sent, and then sent again unchanged
@@ -56,7 +61,28 @@ CREATE TABLE sent (
     kind TEXT NOT NULL CHECK (kind IN ('file', 'bom')),
     entry_id INTEGER NOT NULL,             -- the newest entry that arrived
     PRIMARY KEY (server, item, kind)
-)
+);
+"""
+_ORIGINS = """
+CREATE TABLE derived (
+    sha256 TEXT PRIMARY KEY,               -- a file that was saved, and not committed
+    origin TEXT NOT NULL,                  -- the committed file that it was made from
+    at REAL NOT NULL
+);
+CREATE TABLE known (
+    server TEXT NOT NULL,
+    sha256 TEXT NOT NULL,
+    item TEXT NOT NULL COLLATE NOCASE,     -- its identity
+    revision INTEGER NOT NULL,
+    PRIMARY KEY (server, sha256, item)
+);
+"""
+_SINCE_2 = """
+ALTER TABLE entry ADD COLUMN origin TEXT NOT NULL DEFAULT '';
+ALTER TABLE entry ADD COLUMN on_top_of INTEGER;
+ALTER TABLE entry ADD COLUMN newer TEXT NOT NULL DEFAULT '';
+ALTER TABLE entry ADD COLUMN place TEXT NOT NULL DEFAULT '';
+ALTER TABLE entry ADD COLUMN links TEXT NOT NULL DEFAULT '';
 """
 
 
@@ -156,9 +182,8 @@ class Database:
                 if version == 1:
                     db.execute("ALTER TABLE entry RENAME TO entry1")
                     db.execute("ALTER TABLE sent RENAME TO sent1")
-                if version < VERSION:
-                    for statement in _TABLES.split(";\n"):
-                        db.execute(statement)
+                for statement in _statements(version):
+                    db.execute(statement)
                 if version == 1:
                     from silo.outbox.takeover import of_first_outbox
 
@@ -175,6 +200,12 @@ def _transaction(db: sqlite3.Connection) -> Iterator[None]:
         db.execute("ROLLBACK")
         raise
     db.execute("COMMIT")
+
+
+def _statements(version: int) -> Iterator[str]:
+    """What makes a file of this version (0: a new one) one of today."""
+    for part in (_SINCE_2 if version == 2 else _TABLES, _ORIGINS):
+        yield from filter(None, map(str.strip, part.split(";\n")))
 
 
 def insert(db: sqlite3.Connection, row: dict[str, Any]) -> None:

@@ -44,6 +44,9 @@ def new_key() -> str:
 
 ASKED, SAME_PART = "asked", "same part"
 
+UNKNOWN = "unknown"
+"""The origin of a file of which nobody knows what it was made from."""
+
 
 @dataclass(frozen=True)
 class Commit:
@@ -65,6 +68,11 @@ class Commit:
         sync the BOM although links are broken.
     remark
         why there is no BOM though there might be one; shown when the file has arrived.
+    origin
+        SHA-256 of the committed file that this one was made from, :data:`UNKNOWN`, or "": nobody asks whether
+        a colleague's newer revision is there (a file that has only just got its item).
+    on_top_of
+        the newest revision that a person saw and sends this one on top of.
     """
 
     path: str
@@ -80,6 +88,8 @@ class Commit:
     request: str = ""
     allow_missing: bool = False
     remark: str = ""
+    origin: str = ""
+    on_top_of: int | None = None
 
 
 @dataclass(frozen=True)
@@ -97,6 +107,13 @@ class Entry:
         the server's latest revision before the first attempt; None before that.
     revision
         the revision that the file became.
+    origin, on_top_of
+        see :class:`Commit`.
+    newer
+        the colleague's revision that it would undo, for a person to look at: its fields; empty where there is
+        none.
+    place, links
+        where the file is in its project, and JSON of what it links to; "" where nobody could look.
     renamed
         its file has another name than the item's: :data:`ASKED` whether it is the same part, or a person's
         word that it is :data:`SAME_PART`.
@@ -128,6 +145,11 @@ class Entry:
     next_attempt: float = 0.0
     base_revision: int | None = None
     revision: int | None = None
+    origin: str = ""
+    on_top_of: int | None = None
+    newer: Mapping[str, Any] = field(default_factory=dict)
+    place: str = ""
+    links: str = ""
     renamed: str = ""
     superseded: bool = False
 

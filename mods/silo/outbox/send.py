@@ -21,14 +21,23 @@ from silo.api import arrived
 from silo.api.address import canonical
 from silo.api.policy import Backoff, Scope, Then, judge
 from silo.api.protocol import FilesApi
-from silo.api.revisions import is_newest, newest_number, other_name
+from silo.api.revisions import Standing, is_newest, newest_number, other_name, standing
 from silo.api.transport import Cancel, stop_if
-from silo.api.wire import MergeRequest, MergeResult, Revision, ServerState, SourceDocument
+from silo.api.wire import (
+    LinkedFile,
+    MergeRequest,
+    MergeResult,
+    Origin,
+    Revision,
+    ServerState,
+    SourceDocument,
+)
 from silo.bom.errors import (
     CancelledError,
     ConflictError,
     DocumentError,
     InputError,
+    NewerRevisionError,
     NotFoundError,
     RouteMissingError,
     SiloError,
@@ -253,6 +262,10 @@ class _Run:
                 if isinstance(error, arrived.MayHaveArrivedError):
                     # A person who presses Retry has looked at these revisions.
                     self.store.update(entry.id, base_revision=error.newest)
+                if isinstance(error, NewerRevisionError):
+                    # The BOM would undo the colleague's as the file would.
+                    self.store.update(entry.id, newer=json.dumps(dict(error.revision)))
+                    return sent
         if entry.bom_left:
             try:
                 return self._send_bom(replace(sent, entry=entry), request)
@@ -283,11 +296,14 @@ class _Run:
         mine: Revision | None = None
         if entry.base_revision is None:
             # The newest one decides it nearly always; an item may have hundreds.
-            if is_newest(entry.sha256, self._revisions(sent.part_number, newest=1)):
+            newest = self._revisions(sent.part_number, newest=1)
+            if is_newest(entry.sha256, newest):
+                self._learn(entry, newest[0])
                 self.store.arrived(entry, "file")
                 return sent
             known = self._revisions(sent.part_number)
             self._check_name(entry, known)
+            base = self._base(entry, known)
             # What the server had before us. Without this note, a file that equals an older revision could
             # not be told from our own that had already arrived.
             self.store.update(entry.id, base_revision=newest_number(known))
@@ -300,11 +316,30 @@ class _Run:
                 known,
                 cancelled=self.cancelled,
             )
-        revision = mine or self._upload(entry)
+            base = self._base(entry, self._revisions(sent.part_number)) if mine is None else None
+        revision = mine or self._upload(entry, base)
+        self._learn(entry, revision)
         self.store.arrived(entry, "file", revision.revision_number)
         return replace(sent, revision=revision.revision_number)
 
-    def _upload(self, entry: Entry) -> Revision:
+    def _learn(self, entry: Entry, revision: Revision) -> None:
+        self.store.learn(entry.server, entry.sha256, entry.identity, revision.revision_number)
+
+    def _base(self, entry: Entry, known: Sequence[Revision]) -> int | None:
+        """The revision that the file was made from; None where nobody asks.
+
+        Raises :class:`NewerRevisionError` where sending it would undo a colleague's revision. The server
+        looks again, if it can: between this look and the upload somebody may commit.
+        """
+        if not entry.origin:
+            return None
+        number = self.store.known_revision(entry.server, entry.origin, entry.identity)
+        stands = standing(known, entry.origin, number, entry.on_top_of)
+        if stands.newer is not None:
+            raise newer_revision(entry.part_number, stands)
+        return max(stands.base_number, 0)
+
+    def _upload(self, entry: Entry, base: int | None) -> Revision:
         try:
             path = self.store.verified(entry)
         except OSError as error:
@@ -323,6 +358,7 @@ class _Run:
                 file_name=entry.file_name,
                 idempotency_key=entry.key,
                 sha256=entry.sha256,
+                origin=_origin(entry, base),
                 cancelled=self.cancelled,
             )
         except DocumentError as error:
@@ -369,7 +405,15 @@ class _Run:
         wanted = self._named(entry, request, sent.revision)
         # As it is sent now it is sent again: the server knows a merge by its sync_id and its content.
         self.store.update(entry.id, request=wanted.model_dump_json(by_alias=True, exclude_none=True))
-        result = self.client.merge_bom(sent.part_number, wanted, cancelled=self.cancelled)
+        try:
+            result = self.client.merge_bom(sent.part_number, wanted, cancelled=self.cancelled)
+        except NewerRevisionError as error:
+            # The colleague's file was made from this one, so their BOM has this one's changes.
+            self.store.arrived(entry, "bom", note=False)
+            remark = "Its BOM was not sent: {} has committed revision {} since, whose BOM counts".format(
+                error.revision.get("created_by") or "somebody", error.revision.get("revision_number", "?")
+            )
+            return replace(sent, status=None, entry=replace(entry, remark=remark))
         self.store.arrived(entry, "bom")
         return replace(sent, status=Status.MERGED, result=result, sync_id=wanted.sync_id or "")
 
@@ -385,6 +429,27 @@ class _Run:
         if document is not None and document.revision is None:
             document = document.model_copy(update={"revision": revision})
         return wanted.model_copy(update={"sync_id": wanted.sync_id or entry.key, "document": document})
+
+
+def newer_revision(part_number: str, stands: Standing) -> NewerRevisionError:
+    """What is said of a commit that would undo a colleague's revision."""
+    newest = stands.newest
+    assert newest is not None  # something is newer
+    made = (
+        f"revision {stands.base_number}" if stands.base is not None else "a file that is no revision in Silo"
+    )
+    return NewerRevisionError(
+        f"{newest.created_by or 'Somebody'} committed revision {newest.revision_number} of {part_number}"
+        f"{f' ({newest.comment})' if newest.comment else ''}, and this was made from {made}. "
+        "Sending it would undo that. Look at theirs; then send yours on top of it, or discard it and take "
+        "theirs",
+        newest.model_dump(mode="json", exclude={"properties", "links"}),
+    )
+
+
+def _origin(entry: Entry, base: int | None) -> Origin:
+    links = [LinkedFile.model_validate(link) for link in json.loads(entry.links)] if entry.links else None
+    return Origin(base_revision=base, file_path=entry.place, links=links)
 
 
 def _refuse(error: SiloError, refused: list[SiloError]) -> None:

@@ -21,7 +21,7 @@ import os
 import shutil
 import sqlite3
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -38,12 +38,14 @@ from silo.outbox.entry import ASKED, SAME_PART, Commit, Entry, State
 _BLOCK = 1 << 20
 # A second name that no row has is one for which a commit may just be coming.
 _HELD_AGE = 3600.0
+# What a saved file was made from is forgotten after two years.
+_REMEMBERED = 2 * 366 * 86400.0
 
 # All but what may be large.
 _COLUMNS = (
     "id, key, server, state, path, label, identity, part_number, taken_at, comment, properties, file_left,"
     " file_name, copy, sha256, size, bom_left, allow_missing, remark, reason, attempts, next_attempt,"
-    " base_revision, revision, renamed"
+    " base_revision, revision, origin, on_top_of, newer, place, links, renamed"
 )
 _SELECT = f"""SELECT {_COLUMNS}, EXISTS (
     SELECT 1 FROM sent s WHERE s.server = e.server AND s.item IN (e.identity, e.part_number) AND s.item <> ''
@@ -102,47 +104,56 @@ class Store(Database):
             "remark": commit.remark,
             "extraction": json.dumps(to_plain(commit.extraction)) if commit.extraction is not None else "",
             "request": commit.request,
+            "origin": commit.origin,
+            "on_top_of": commit.on_top_of,
         }
         with self.transaction() as db:
             insert(db, row)
 
-    def finish(self, key: str, source: Path | None = None) -> None:
+    def finish(self, key: str, source: Path | None = None, origin: str = "") -> str:
         """Make the copy of a staged commit's file; what is held under a second name is read rather than
         ``source``.
 
         Where the disk does not take it, a commit with a second name stays and is tried again later. One
         without is forgotten and :class:`DocumentError` says so: nothing could be sent that is surely what was
         committed.
+
+        ``origin`` replaces that of the commit: the commit before it may have been copied only now. Returns
+        the file's SHA-256, "" where there is no copy of it.
         """
         if key in self._finishing:
-            return
+            return ""
         self._finishing.add(key)
         try:
-            self._finish(key, source)
+            self._finish(key, source, origin)
         finally:
             self._finishing.discard(key)
+        entry = self.by_key(key)
+        return entry.sha256 if entry is not None else ""
 
-    def _finish(self, key: str, source: Path | None) -> None:
+    def _finish(self, key: str, source: Path | None, origin: str) -> None:
         entry = self.by_key(key)
         if entry is None or not entry.file_left or entry.sha256:
             return
         held, copy = next(iter((self._held / key).glob("*")), None), self.copies / entry.copy
         # A copy that has its name is whole: only its row was not written any more.
-        origin = copy if copy.exists() else held or source
-        if origin is None:
+        content = copy if copy.exists() else held or source
+        if content is None:
             text = "FreeCAD ended before its file was copied; commit it again, then discard this"
             self.update(entry.id, state=State.HELD, reason=text)
             return
         try:
-            sha256, size = self._copied(origin, copy)
+            sha256, size = self._copied(content, copy)
         except OSError as error:
             told = f"cannot be copied for sending ({error.strerror or error})"
-            if held is not None or origin is copy:
+            if held is not None or content is copy:
                 self.update(entry.id, reason=f"{entry.path or entry.file_name}: {told}; it is tried again")
                 return
             self.discard(entry.id)
-            raise DocumentError(str(origin), f"{told}; nothing was kept, commit it again") from error
-        self.update(entry.id, state=State.WAITING, sha256=sha256, size=size, reason="")
+            raise DocumentError(str(content), f"{told}; nothing was kept, commit it again") from error
+        known = {"origin": origin} if origin and entry.origin else {}
+        place = _place(copy, entry.path)
+        self.update(entry.id, state=State.WAITING, sha256=sha256, size=size, reason="", **place, **known)
         shutil.rmtree(self._held / key, ignore_errors=True)
 
     def add(self, commit: Commit, server: str = "") -> Entry:
@@ -172,9 +183,14 @@ class Store(Database):
         ready = State.WAITING if entry.sha256 or not entry.file_left else State.KEEPING
         changed: dict[str, Any] = {"state": ready, "reason": "", "next_attempt": 0.0}
         changed["renamed"] = SAME_PART if entry.renamed == ASKED else entry.renamed
+        if entry.newer:
+            changed |= {"on_top_of": entry.newer["revision_number"], "newer": ""}
+            changed["comment"] = on_top(entry.comment, entry.newer)
+        # The BOM goes at a person's word, whichever revision is the newest.
+        changed["revision"] = None
         if server is not None and canonical(server) != entry.server:
             # What was seen of the old server says nothing of the new one.
-            changed |= {"server": canonical(server), "base_revision": None}
+            changed |= {"server": canonical(server), "base_revision": None, "on_top_of": None}
         if self.bom(entry_id)[0]:
             # What was refused is made anew: the missing part may have its number now.
             changed["request"] = ""
@@ -254,6 +270,40 @@ class Store(Database):
         if kind == "file" or not left:
             self._drop_files(entry)
 
+    # -- what a file was made from ----------------------------------------------------------------------
+
+    def origin_of(self, sha256: str) -> str:
+        """SHA-256 of the committed file that a file with this content was made from, as far as is known here;
+        the content itself where it was never saved over."""
+        with self._open() as db:
+            row = db.execute("SELECT origin FROM derived WHERE sha256 = ?", (sha256,)).fetchone()
+        return str(row[0]) if row else sha256
+
+    def derived(self, sha256: str, origin: str) -> None:
+        """A file was saved without being committed; it was made from ``origin``."""
+        if not sha256 or sha256 == origin:
+            return
+        with self.transaction() as db:
+            db.execute("INSERT OR REPLACE INTO derived VALUES (?, ?, ?)", (sha256, origin, self.clock()))
+            db.execute("DELETE FROM derived WHERE at < ?", (self.clock() - _REMEMBERED,))
+
+    def known_revision(self, server: str, sha256: str, item: str) -> int | None:
+        """The revision that a file is, for servers that keep no checksums; None where that is not known."""
+        with self._open() as db:
+            row = db.execute(
+                "SELECT revision FROM known WHERE server = ? AND sha256 = ? AND item = ?",
+                (canonical(server), sha256, item),
+            ).fetchone()
+        return int(row[0]) if row else None
+
+    def learn(self, server: str, sha256: str, item: str, revision: int) -> None:
+        """This file is that revision of an item."""
+        if not (sha256 and item):
+            return
+        with self.transaction() as db:
+            row = (canonical(server), sha256, item, revision)
+            db.execute("INSERT OR REPLACE INTO known VALUES (?, ?, ?, ?)", row)
+
     # -- copies -----------------------------------------------------------------------------------------
 
     def verified(self, entry: Entry) -> Path:
@@ -313,6 +363,26 @@ class Store(Database):
         return entry
 
 
+def on_top(comment: str, newer: Mapping[str, Any]) -> str:
+    """The comment of a revision that a person sends on top of a colleague's, which says so."""
+    who = f" by {newer['created_by']}" if newer.get("created_by") else ""
+    note = f"(on top of revision {newer['revision_number']}{who}, which is not in it)"
+    return f"{comment} {note}".strip()
+
+
+def _place(copy: Path, path: str) -> dict[str, str]:
+    """Where the file is and what it links to; nothing where it is no FreeCAD file."""
+    if not path:
+        return {}
+    from silo.fcstd.linked import place_of
+
+    try:
+        place = place_of(copy, path)
+    except InputError:
+        return {}
+    return {"place": place.path, "links": json.dumps(place.as_dicts())}
+
+
 _FLAGS = ("file_left", "bom_left", "allow_missing", "superseded")
 
 
@@ -320,6 +390,7 @@ def _entry(row: sqlite3.Row) -> Entry:
     values = dict(row)
     values["state"] = State(values["state"])
     values["properties"] = json.loads(values["properties"])
+    values["newer"] = json.loads(values["newer"]) if values["newer"] else {}
     return Entry(**values | {name: bool(values[name]) for name in _FLAGS})
 
 

@@ -1,0 +1,246 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""A commit does not undo a colleague's: what is held, what passes, and what a person's word does."""
+
+from __future__ import annotations
+
+import hashlib
+import sqlite3
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from silo.api.wire import Origin, Revision
+from silo.bom.errors import UnreachableError
+from silo.outbox.entry import UNKNOWN, Commit, Entry, State
+from silo.outbox.store import Store
+from silo.testing import FakeSilo
+
+if TYPE_CHECKING:
+    from vault import Vault
+
+
+def sha(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+def mine(vault: Vault, content: bytes, origin: str, comment: str = "") -> Entry:
+    """A commit of Top with a file and one bolt, made from ``origin``."""
+    vault.clock += 1
+    vault.top.write_bytes(content)
+    taken = vault.snapshot(vault.part("Bolt", len(content)))
+    return vault.outbox.add(
+        Commit(
+            path=str(vault.top),
+            taken_at=vault.clock,
+            label="Top",
+            identity=vault.ids["Top"],
+            file=vault.top,
+            extraction=taken.extraction,
+            origin=origin,
+            comment=comment,
+        )
+    )
+
+
+def theirs(vault: Vault, content: bytes, base: int) -> Revision:
+    """A colleague's commit from another computer."""
+    path = vault.folder / "elsewhere" / "Top.FCStd"
+    path.parent.mkdir(exist_ok=True)
+    path.write_bytes(content)
+    vault.silo.user, me = "alice", vault.silo.user
+    try:
+        return vault.silo.upload_file(vault.number, path, "less", origin=Origin(base_revision=base))
+    finally:
+        vault.silo.user = me
+
+
+def contents(vault: Vault) -> list[bytes]:
+    return vault.files()
+
+
+def test_a_commit_that_would_undo_a_colleagues_is_held_with_file_and_bom(vault: Vault) -> None:
+    """The reason says who, which and what; nothing of it is in Silo."""
+    mine(vault, b"one", UNKNOWN)
+    vault.send()
+    before = vault.lines()
+    theirs(vault, b"one less", 1)
+    mine(vault, b"one other", sha(b"one"))
+    report = vault.send()
+    (held,) = vault.waiting()
+    assert (held.state, held.newer["revision_number"], held.newer["created_by"]) == (State.HELD, 2, "alice")
+    assert "alice committed revision 2" in held.reason
+    assert "(less)" in held.reason
+    assert "made from revision 1" in held.reason
+    assert (held.file_left, held.bom_left, report.sent) == (True, True, [])
+    assert (contents(vault), vault.lines()) == ([b"one", b"one less"], before)
+
+
+def test_on_top_of_it_at_a_persons_word_and_the_comment_says_so(vault: Vault) -> None:
+    """Retry takes the revision that the person saw; a still newer one is asked about again."""
+    mine(vault, b"one", UNKNOWN)
+    vault.send()
+    theirs(vault, b"one less", 1)
+    entry = mine(vault, b"one other", sha(b"one"), "longer")
+    vault.send()
+    vault.outbox.retry(entry.id)
+    theirs(vault, b"one less and less", 2)
+    vault.send()
+    (held,) = vault.waiting()
+    assert held.newer["revision_number"] == 3
+    vault.outbox.retry(entry.id)
+    vault.send()
+    assert vault.waiting() == ()
+    newest = vault.silo.revisions(vault.number)[0]
+    assert (newest.revision_number, newest.base_revision) == (4, 3)
+    assert "longer (on top of revision 2 by alice, which is not in it)" in newest.comment
+    assert "revision 3" in newest.comment
+
+
+def test_a_race_between_the_look_and_the_upload_is_caught_by_the_server(vault: Vault) -> None:
+    """The colleague commits after we looked: the 409 holds the entry as our own look does."""
+    mine(vault, b"one", UNKNOWN)
+    vault.send()
+    mine(vault, b"one other", sha(b"one"))
+
+    def hook(called: str) -> None:
+        if called == "upload_file":
+            vault.silo.before = lambda _name: None
+            theirs(vault, b"one less", 1)
+
+    vault.silo.before = hook
+    vault.send()
+    (held,) = vault.waiting()
+    assert (held.state, held.newer["revision_number"]) == (State.HELD, 2)
+    assert contents(vault) == [b"one", b"one less"]
+
+
+def test_own_commits_follow_each_other_offline(vault: Vault) -> None:
+    """Each is made from the one before, which has no number yet."""
+    mine(vault, b"one", UNKNOWN)
+    mine(vault, b"two", sha(b"one"))
+    mine(vault, b"three", sha(b"two"))
+    vault.send()
+    assert contents(vault) == [b"one", b"two", b"three"]
+    assert [r.base_revision for r in reversed(vault.silo.revisions(vault.number))] == [0, 1, 2]
+
+
+def test_what_follows_a_held_one_is_held_too_and_goes_after_it(vault: Vault) -> None:
+    """It has the first one's changes; sent alone it would undo the colleague's as well."""
+    mine(vault, b"one", UNKNOWN)
+    vault.send()
+    theirs(vault, b"one less", 1)
+    first = mine(vault, b"two", sha(b"one"))
+    second = mine(vault, b"three", sha(b"two"))
+    vault.send()
+    assert [entry.state for entry in vault.waiting()] == [State.HELD, State.HELD]
+    vault.outbox.retry(first.id)
+    vault.send()
+    vault.outbox.retry(second.id)
+    vault.send()
+    assert (vault.waiting(), contents(vault)) == ((), [b"one", b"one less", b"two", b"three"])
+
+
+def test_a_file_of_unknown_origin_is_asked_about(vault: Vault) -> None:
+    """Such as a copied folder whose file was saved without the add-on."""
+    mine(vault, b"one", UNKNOWN)
+    vault.send()
+    mine(vault, b"from somewhere", UNKNOWN)
+    vault.send()
+    (held,) = vault.waiting()
+    assert "made from a file that is no revision in Silo" in held.reason
+
+
+def test_a_lost_answer_is_no_colleague(vault: Vault) -> None:
+    """Our own revision arrived; the run after it finds that."""
+    mine(vault, b"one", UNKNOWN)
+    vault.send()
+    mine(vault, b"two", sha(b"one"))
+
+    def hook(called: str) -> None:
+        if called == "upload_file":
+            vault.silo.after = lambda _name: None
+            raise UnreachableError("no answer")
+
+    vault.silo.after = hook
+    vault.send()
+    vault.send(force=True)
+    assert (vault.waiting(), contents(vault)) == ((), [b"one", b"two"])
+
+
+def test_the_bom_of_a_file_that_a_colleague_went_on_from_is_not_sent(vault: Vault) -> None:
+    """Their BOM has these changes; ours, coming late, would undo theirs."""
+    mine(vault, b"one", UNKNOWN)
+    vault.send()
+    mine(vault, b"longer", sha(b"one"))
+
+    def hook(called: str) -> None:
+        if called == "merge_bom":
+            vault.silo.before = lambda _name: None
+            theirs(vault, b"went on", 2)
+
+    vault.silo.before = hook
+    vault.send()
+    assert vault.lines() == {"F01-0001": 3}
+    assert vault.waiting() == ()
+    assert "alice has committed revision 3 since" in vault.told[-1].entry.remark
+
+
+def test_a_server_without_checksums_is_known_by_what_was_sent_to_it(vault: Vault) -> None:
+    """The number of our own revision is remembered here; a colleague's is still found."""
+    silo = vault.silo
+    known = type(silo).revisions
+
+    def bare(self: FakeSilo, *arguments: object, **more: object) -> list[Revision]:
+        found = known(self, *arguments, **more)  # type: ignore[arg-type]
+        return [r.model_copy(update={"file_checksum": None}) for r in found]
+
+    class Bare(FakeSilo):
+        revisions = bare  # type: ignore[assignment]
+
+    silo.__class__ = Bare
+    mine(vault, b"one", UNKNOWN)
+    vault.send()
+    mine(vault, b"two", sha(b"one"))
+    vault.send()
+    theirs(vault, b"theirs", 2)
+    mine(vault, b"three", sha(b"two"))
+    vault.send()
+    assert contents(vault) == [b"one", b"two", b"theirs"]
+    assert [entry.newer["revision_number"] for entry in vault.waiting()] == [3]
+
+
+def test_saved_files_are_known_by_what_they_were_made_from(vault: Vault) -> None:
+    """By content, so a copied folder knows it as well."""
+    outbox = vault.outbox
+    assert outbox.origin_of("aa") == "aa"
+    outbox.derived("aa", "one")
+    outbox.derived("bb", "one")
+    outbox.derived("cc", "cc")
+    assert [outbox.origin_of(x) for x in ("aa", "bb", "cc")] == ["one", "one", "cc"]
+
+
+def test_an_outbox_of_before_is_taken_over(tmp_path: Path) -> None:
+    """Its entries ask nobody, as they did."""
+    path = tmp_path / "outbox.sqlite3"
+    store = Store(path)
+    entry = store.add(Commit(path="", taken_at=1.0, part_number="A", request="{}"))
+    with sqlite3.connect(path) as db:
+        for name in ("origin", "on_top_of", "newer", "place", "links"):
+            db.execute(f"ALTER TABLE entry DROP COLUMN {name}")
+        db.execute("DROP TABLE derived")
+        db.execute("DROP TABLE known")
+        db.execute("PRAGMA user_version = 2")
+    db.close()
+    (known,) = Store(path).entries()
+    assert (known.id, known.origin, known.newer, known.links) == (entry.id, "", {}, "")
+    Store(path).derived("aa", "bb")
+    assert Store(path).origin_of("aa") == "bb"
+
+
+@pytest.mark.parametrize("origin", ["", UNKNOWN])
+def test_the_first_file_of_an_item_passes(vault: Vault, origin: str) -> None:
+    """There is nothing to undo."""
+    mine(vault, b"one", origin)
+    vault.send()
+    assert (vault.waiting(), contents(vault)) == ((), [b"one"])
