@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import base64
+import gzip
+import json
 import re
 import zlib
 from collections.abc import Iterator
@@ -298,16 +300,53 @@ def test_a_file_too_large_is_a_page(tmp_path: Path) -> None:
 
 
 def test_a_giant_tree_is_shown_less_deep(visitors: dict[str, Visitor], api: Api) -> None:
-    """A tree too large for a page is shown less deep, and says so."""
+    """A tree too large for a page is shown less deep, says so, and has pages where all is asked for."""
     levels = [api.items(14) for _ in range(3)]
     root = api.item()
     api.merge(root, dict.fromkeys(levels[0], 1))
     for upper, lower in pairwise(levels):
         for number in upper:
             api.merge(number, dict.fromkeys(lower, 1))
-    page = visitors[VIEWER].get(f"/items/{root}").body.decode()
-    assert "This BOM is large: the first 2 levels are shown" in page
-    assert page.count('<div class="line">') == 14 + 14 * 14
+    path = f"/items/{root}"
+    page = visitors[VIEWER].get(path).body.decode()
+    assert "210 rows in the first 2 levels; 2954 in all 3" in page
+    assert page.count('<tr class="l') == 14 + 14 * 14
+    second = visitors[VIEWER].get(f"{path}?depth=3&page=2").body.decode()
+    assert "1001 to 2000 of 2954 rows" in second
+    assert second.count('<tr class="l') == 1000
+    assert '<tr class="trail">' in second
+    assert visitors[VIEWER].get(f"{path}?depth=3&page=99").body.decode().count('<tr class="l') == 954
+    one = levels[2][5]
+    found = visitors[VIEWER].get(f"{path}?q={one}").body.decode()
+    assert found.count('<tr class="l3">') == 14 * 14
+    assert found.count('<tr class="l') == 14 + 14 * 14 + 14 * 14
+
+
+def test_answers_are_compressed_and_secrets_masked(visitors: dict[str, Visitor], api: Api) -> None:
+    """Pages and JSON are, for those who take it; no two answers have the same secret."""
+    parent, *children = api.items(120)
+    api.merge(parent, dict.fromkeys(children, 1))
+    visitor = visitors[EDITOR]
+    asked = {"Cookie": visitor.cookie, **HTML, "Accept-Encoding": "gzip"}
+    packed = api.as_(None).call("GET", f"/items/{parent}/bom", headers=asked)
+    plain = visitor.get(f"/items/{parent}/bom")
+    assert packed.headers["content-encoding"] == "gzip"
+    assert "content-encoding" not in plain.headers
+    assert len(packed.body) * 6 < len(plain.body)
+    text = gzip.decompress(packed.body).decode()
+    secrets = {
+        re.search(r'name="csrf_token" value="([^"]+)"', page)[1] for page in (text, plain.body.decode())
+    }
+    assert len(secrets) == 2
+    for secret in secrets:
+        sent = visitor.post(f"/items/{parent}/bom/lines", csrf=secret, child=children[0], quantity="2")
+        assert sent.status in (303, 409), sent.body
+    for wrong in ("", "m.", "m.00", "m.zz", "m.0", secrets.pop()[:-2]):
+        sent = visitor.post(f"/items/{parent}/bom/lines", csrf=wrong, child=children[0], quantity="2")
+        assert sent.status == 403
+    answer = api.call("GET", bom(parent), headers={"Accept-Encoding": "gzip"})
+    assert answer.headers["content-encoding"] == "gzip"
+    assert len(json.loads(gzip.decompress(answer.body))) == 119
 
 
 def test_the_package_holds_its_files() -> None:

@@ -184,14 +184,17 @@ def download_revision(
     response_class=Response,
     responses={**READ_ERRORS, 200: {"content": {"image/png": {}}, "description": "The picture"}},
 )
-def thumbnail(server: ServerDep, caller: Viewer, part_number: str) -> Response:
-    """The picture that came with the newest file that has one."""
+def thumbnail(
+    server: ServerDep, caller: Viewer, part_number: str, key: Annotated[str, Query(max_length=64)] = ""
+) -> Response:
+    """The picture that came with the newest file that has one. One asked for by its ``key`` may be kept."""
     with server.db.read(caller) as tx:
         item = items.get_item(tx, part_number)
     if not item.thumbnail_key:
         raise NotFoundError(f"item {item.part_number} has no thumbnail")
     path = server.files.path_of(item.thumbnail_key)
-    return FileResponse(path, media_type="image/png", headers={"Cache-Control": "private, max-age=300"})
+    kept = "max-age=31536000, immutable" if key and item.thumbnail_key.startswith(key) else "max-age=300"
+    return FileResponse(path, media_type="image/png", headers={"Cache-Control": f"private, {kept}"})
 
 
 def _store(
