@@ -14,7 +14,7 @@ from silo.api.schemas import categories_of
 from silo.api.wire import MergeEntry, MergeRequest
 from silo.bom.errors import InputError, NotFoundError, RejectedError, RouteMissingError, UnreachableError
 
-UUIDS = [str(uuid4()) for _ in range(1000)]
+UUIDS = [str(uuid4()) for _ in range(2000)]
 
 
 def item(uuid: str) -> dict[str, Any]:
@@ -25,16 +25,16 @@ def route_missing(answer: Any) -> Any:
     return answer(405, "Method Not Allowed", {"Content-Type": "text/plain"})
 
 
-def test_a_thousand_identities_cost_two_requests(server: Any, client: SiloClient) -> None:
-    """500 each; the answers are put together under the identities as given."""
+def test_two_thousand_identities_cost_two_requests(server: Any, client: SiloClient) -> None:
+    """1000 each; the answers are put together under the identities as given."""
     server.on(
         "POST /api/items/by-uuid",
-        {"items": [item(u) for u in UUIDS[:500]]},
-        {"items": [item(u) for u in UUIDS[500:900]]},
+        {"items": [item(u) for u in UUIDS[:1000]]},
+        {"items": [item(u) for u in UUIDS[1000:1900]]},
     )
     found = client.get_items_by_uuid([*UUIDS, *UUIDS])
-    assert list(found) == UUIDS[:900]
-    assert [len(seen.json()["uuids"]) for seen in server.seen] == [500, 500]
+    assert list(found) == UUIDS[:1900]
+    assert [len(seen.json()["uuids"]) for seen in server.seen] == [1000, 1000]
 
 
 def test_nothing_to_look_up_is_no_request(server: Any, client: SiloClient) -> None:
@@ -67,6 +67,21 @@ def test_without_the_batch_a_bounded_pool_asks_and_remembers(
     assert most == 8
     client.get_items_by_uuid([str(uuid4())])
     assert len(server.paths("POST")) == 1
+
+
+def test_the_boms_of_many_items_cost_one_request_or_one_each(
+    server: Any, client: SiloClient, answer: Any
+) -> None:
+    """A server without the request is asked one by one; an item that is not known is left out."""
+    line = {"child_part_number": "C", "quantity": 2}
+    server.on("POST /api/items/boms", {"boms": {"A": [line]}}, route_missing(answer))
+    assert [one.quantity for one in client.get_boms(["A", "B", "A"])["A"]] == [2]
+    assert [seen.json()["part_numbers"] for seen in server.seen] == [["A", "B"]]
+    server.on("GET /api/items/A/bom", [line])
+    server.on("GET /api/items/B/bom", answer(404, {"error": "not_found"}))
+    assert list(client.get_boms(["A", "B"])) == ["A"]
+    assert list(client.get_boms(["A", "B"])) == ["A"]
+    assert len(server.paths("POST")) == 2, "the missing route is asked for once only"
 
 
 def test_one_malformed_identity_does_not_spoil_the_others(

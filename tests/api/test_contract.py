@@ -70,6 +70,16 @@ def lines(silo: SiloApi, parent: str) -> dict[str, tuple[float | None, str, bool
     }
 
 
+def test_many_boms_are_those_that_are_asked_for_singly(silo: SiloApi) -> None:
+    """By the number as it was asked for; what is not known is left out."""
+    top, part = make(silo, "Top", "A01"), make(silo, "Part")
+    merge(silo, top, **{key(part): 2})
+    found = silo.get_boms([top, top.lower(), part, "no such item"])
+    assert list(found) == [top, top.lower(), part]
+    assert found[top] == found[top.lower()] == silo.get_bom(top)
+    assert found[part] == []
+
+
 def test_an_item_is_found_by_its_identity_and_reads_as_a_mapping(silo: SiloApi) -> None:
     """The contract of resolve_part_numbers: a mapping with part_number and name, or None."""
     made = silo.create_item("kindred-rd", "M01", "Base plate", properties={"mass_kg": 1.5})

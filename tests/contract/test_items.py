@@ -152,6 +152,17 @@ def test_many_uuids_in_one_request(api: Api) -> None:
     assert api.good("POST", "/api/items/by-uuid", {"uuids": []}) == {"items": []}
 
 
+def test_many_boms_in_one_request(api: Api) -> None:
+    """Each as its own request gives it, by the number as it was asked for; unknown items are absent."""
+    top, other, part, empty = api.items(4)
+    api.merge(top, {part: 2})
+    api.merge(other, {part: 3, empty: 1})
+    asked = [top.lower(), other, empty, "no such item"]
+    boms = api.good("POST", "/api/items/boms", {"part_numbers": asked})["boms"]
+    assert boms == {number: api.get(f"/api/items/{number}/bom") for number in (top.lower(), other, empty)}
+    assert [len(boms[number]) for number in (top.lower(), other, empty)] == [1, 2, 0]
+
+
 def test_search_and_paging(api: Api) -> None:
     """Every word must be somewhere in number, name or description; the total is in a header."""
     word = uuid.uuid4().hex[:8]

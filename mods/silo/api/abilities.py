@@ -29,6 +29,8 @@ class Abilities:
 
     batch
         many identities in one question.
+    boms
+        the BOMs of many items in one question.
     strict
         it refuses keys that it does not know.
     keeps_item_ids
@@ -38,6 +40,7 @@ class Abilities:
     """
 
     batch: bool | None = None
+    boms: bool | None = None
     strict: bool = False
     keeps_item_ids: bool = False
     schemas: dict[str, str] = field(default_factory=dict)
@@ -54,7 +57,8 @@ def load(path: Path, server: str, *, clock: Callable[[], float] = time.time) -> 
     if not isinstance(known, dict) or not 0 <= clock() - _number(known.get("learned_at")) < KEPT_S:
         return Abilities()
     values = {f.name: known[f.name] for f in fields(Abilities) if f.name in known}
-    wanted = {"batch": (bool, type(None)), "strict": bool, "keeps_item_ids": bool, "schemas": dict}
+    maybe = (bool, type(None))
+    wanted = {"batch": maybe, "boms": maybe, "strict": bool, "keeps_item_ids": bool, "schemas": dict}
     if not all(isinstance(value, wanted[name]) for name, value in values.items()):  # type: ignore[arg-type]
         return Abilities()
     return Abilities(**values)

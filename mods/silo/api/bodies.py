@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from pydantic import Field, ValidationError
 
-from silo.api.wire import Answer, Quantity, Wire
+from silo.api.wire import Answer, BomLine, Quantity, Wire
 from silo.bom.errors import InputError
 
 Body = TypeVar("Body", bound=Wire)
@@ -18,6 +18,18 @@ class UuidsBody(Wire):
     """``POST /api/items/by-uuid``: many identities in one question."""
 
     uuids: list[str]
+
+
+class NumbersBody(Wire):
+    """``POST /api/items/boms``: the BOMs of many items in one question."""
+
+    part_numbers: list[str]
+
+
+class BomsAnswer(Answer):
+    """Its answer: the lines of each item that is known, by the part number as it was asked for."""
+
+    boms: dict[str, list[BomLine]]
 
 
 class ItemBody(Wire):

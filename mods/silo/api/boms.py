@@ -3,10 +3,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import Any
 
-from silo.api.bodies import LineBody, body
+from silo.api.bodies import BomsAnswer, LineBody, NumbersBody, body
 from silo.api.caller import LISTS, Caller, Params
 from silo.api.merging import merge_by_lines, merge_result, read_back, without_manual
 from silo.api.replies import Reply
@@ -28,6 +29,35 @@ class BomCalls(Caller):
         """The BOM lines directly below an item."""
         reply = self._get(f"the BOM of {part_number}", *_bom(part_number))
         return reply.models(BomLine, *LISTS)
+
+    def get_boms(
+        self, part_numbers: Iterable[str], /, *, cancelled: Cancel | None = None
+    ) -> dict[str, list[BomLine]]:
+        """The BOM lines directly below each of these items; items that are not known are left out.
+
+        One request per 1000 where the server offers that, else one each.
+        """
+
+        def batch(some: Sequence[str]) -> dict[str, list[BomLine]]:
+            reply = self._change(
+                "POST",
+                f"the BOMs of {len(some)} items",
+                *("items", "boms"),
+                body=NumbersBody(part_numbers=list(some)),
+                repeatable=True,
+                cancelled=cancelled,
+            )
+            return reply.model(BomsAnswer).boms
+
+        def single(part_number: str) -> list[BomLine] | None:
+            try:
+                return self.get_bom(part_number)
+            except RouteMissingError:
+                raise
+            except NotFoundError:
+                return None
+
+        return self._many("boms", part_numbers, batch, single, cancelled)
 
     def get_bom_version(self, part_number: str, /) -> str | None:
         """The version of the BOM as it is now, for ``if_match``; None where the server keeps none."""

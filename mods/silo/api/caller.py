@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, TypeVar
 
 from pydantic import BaseModel
 
@@ -13,11 +14,19 @@ from silo.api.abilities import Abilities
 from silo.api.address import ServerAddress
 from silo.api.multipart import as_json
 from silo.api.replies import Reply
-from silo.api.transport import Call, Cancel, Transport
-from silo.bom.errors import RejectedError
+from silo.api.transport import Call, Cancel, Transport, stop_if
+from silo.bom.errors import BusyError, ForbiddenError, NotFoundError, ReadOnlyError, RejectedError
+
+T = TypeVar("T")
 
 LISTS = ("items", "entries", "lines", "bom", "results", "data")
 """The keys under which servers put a list that is not bare."""
+
+MAX_IN_BATCH = 1000
+"""Things in one batch question."""
+
+MAX_WORKERS = 8
+"""Questions at once where the server has no batch look-up."""
 
 _UNKNOWN_KEY = re.compile(
     r"(unknown|unrecogni[sz]ed|unexpected|additional|extra|unsupported)\s+(json\s+)?"
@@ -34,6 +43,7 @@ class Caller:
     _address: ServerAddress
     _transport: Transport
     abilities: Abilities
+    _refused: frozenset[str] = frozenset()  # batch requests, for this token and mode
 
     def _get(self, subject: str, *segments: str, params: Params | None = None) -> Reply:
         """Ask; a question may be repeated freely."""
@@ -98,9 +108,59 @@ class Caller:
         self.abilities.strict = True
         return reply
 
+    def _many(
+        self,
+        ability: str,
+        keys: Iterable[str],
+        batch: Callable[[Sequence[str]], Mapping[str, T]],
+        single: Callable[[str], T | None],
+        cancelled: Cancel | None = None,
+    ) -> dict[str, T]:
+        """Ask about many things, in few requests where the server can, else in a bounded pool of single ones.
+
+        ability
+            the field of :class:`Abilities` that says whether the server has such a request.
+        """
+        wanted = list(dict.fromkeys(keys))
+        found: dict[str, T] = {}
+        for start in range(0, len(wanted), MAX_IN_BATCH):
+            stop_if(cancelled)
+            chunk = wanted[start : start + MAX_IN_BATCH]
+            answer = None
+            if ability not in self._refused and getattr(self.abilities, ability) is not False:
+                try:
+                    answer = batch(chunk)
+                    setattr(self.abilities, ability, True)
+                except NotFoundError:
+                    setattr(self.abilities, ability, False)
+                except (ForbiddenError, ReadOnlyError, BusyError):
+                    # No POST for viewers and on a read-only server: GET is allowed all the same.
+                    self._refused = self._refused | {ability}
+                except RejectedError:
+                    pass  # one malformed key spoils the batch; asked one by one, only that one is unknown
+            found.update(_one_by_one(chunk, single, cancelled) if answer is None else answer)
+        return found
+
     def _delete(self, subject: str, *segments: str) -> None:
         """Remove."""
         self._transport.send(Call("DELETE", self._address.api(*segments), subject))
+
+
+def _one_by_one(
+    keys: Sequence[str], single: Callable[[str], T | None], cancelled: Cancel | None
+) -> dict[str, T]:
+    def one(key: str) -> T | None:
+        stop_if(cancelled)
+        return single(key)
+
+    with ThreadPoolExecutor(min(MAX_WORKERS, len(keys)), "silo-lookup") as pool:
+        try:
+            found = list(pool.map(one, keys))
+        except BaseException:
+            # One failed, so the rest is not wanted any more.
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    return {key: value for key, value in zip(keys, found, strict=True) if value is not None}
 
 
 def _without(data: Any, keys: Sequence[str]) -> Any:

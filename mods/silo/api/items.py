@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 from uuid import UUID
 
@@ -13,31 +12,21 @@ from silo.api.caller import LISTS, Caller, Params
 from silo.api.failures import translated
 from silo.api.replies import Reply, WebPageError
 from silo.api.schemas import categories_of, schema_names
-from silo.api.transport import Cancel, stop_if
+from silo.api.transport import Cancel
 from silo.api.wire import Item
 from silo.bom.errors import (
-    BusyError,
-    ForbiddenError,
     InputError,
     NotFoundError,
-    ReadOnlyError,
     RejectedError,
     RouteMissingError,
     SiloError,
 )
-
-MAX_UUIDS = 500
-"""Identities in one batch question."""
-
-MAX_WORKERS = 8
-"""Questions at once where the server has no batch look-up."""
 
 
 class ItemCalls(Caller):
     """Finding and making items."""
 
     _is_silo: bool | None = None
-    _can_post_batch = True  # for this token and mode; the route itself is an ability
 
     def get_item_by_uuid(self, uuid: str, /) -> Item | None:
         """The item with this identity; None where the server has none (unknown, archived, or no UUID)."""
@@ -60,55 +49,23 @@ class ItemCalls(Caller):
     ) -> dict[str, Item]:
         """The items of these identities, by the identity as it was given; unknown ones are left out.
 
-        One request per 500 where the server offers the batch look-up, else a bounded pool of single ones.
+        One request per 1000 where the server offers the batch look-up, else a bounded pool of single ones.
         """
-        wanted = list(dict.fromkeys(uuid for uuid in uuids if uuid))
-        found: dict[str, Item] = {}
-        for start in range(0, len(wanted), MAX_UUIDS):
-            stop_if(cancelled)
-            chunk = wanted[start : start + MAX_UUIDS]
-            ask = self._can_post_batch and self.abilities.batch is not False
-            batch = self._batch(chunk, cancelled) if ask else None
-            found.update(self._one_by_one(chunk, cancelled) if batch is None else batch)
-        return found
 
-    def _batch(self, uuids: Sequence[str], cancelled: Cancel | None) -> dict[str, Item] | None:
-        try:
+        def batch(some: Sequence[str]) -> dict[str, Item]:
             reply = self._change(
                 "POST",
-                f"{len(uuids)} items",
+                f"{len(some)} items",
                 *("items", "by-uuid"),
-                body=UuidsBody(uuids=list(uuids)),
+                body=UuidsBody(uuids=list(some)),
                 repeatable=True,
                 cancelled=cancelled,
             )
-        except NotFoundError:
-            self.abilities.batch = False
-            return None
-        except (ForbiddenError, ReadOnlyError, BusyError):
-            # No POST for viewers and on a read-only server: GET is allowed all the same.
-            self._can_post_batch = False
-            return None
-        except RejectedError:
-            # One malformed identity spoils the batch; asked one by one, only that one is unknown.
-            return None
-        self.abilities.batch = True
-        known = {_written(item.id): item for item in reply.models(Item, *LISTS)}
-        return {uuid: known[_written(uuid)] for uuid in uuids if _written(uuid) in known}
+            known = {_written(item.id): item for item in reply.models(Item, *LISTS)}
+            return {uuid: known[_written(uuid)] for uuid in some if _written(uuid) in known}
 
-    def _one_by_one(self, uuids: Sequence[str], cancelled: Cancel | None) -> dict[str, Item]:
-        def one(uuid: str) -> Item | None:
-            stop_if(cancelled)
-            return self.get_item_by_uuid(uuid)
-
-        with ThreadPoolExecutor(min(MAX_WORKERS, len(uuids)), "silo-lookup") as pool:
-            try:
-                items = list(pool.map(one, uuids))
-            except BaseException:
-                # One failed, so the rest is not wanted any more.
-                pool.shutdown(wait=False, cancel_futures=True)
-                raise
-        return {uuid: item for uuid, item in zip(uuids, items, strict=True) if item is not None}
+        wanted = [uuid for uuid in uuids if uuid]
+        return self._many("batch", wanted, batch, self.get_item_by_uuid, cancelled)
 
     def _speaks_silo(self) -> bool:
         if self._is_silo is None:

@@ -18,7 +18,6 @@ from silo.api.wire import (
     Item,
     MergeRequest,
     MergeResult,
-    Origin,
     Revision,
     ServerState,
     User,
@@ -87,6 +86,10 @@ class BomApi(Protocol):
 
     def get_bom(self, part_number: str, /) -> list[BomLine]: ...
 
+    def get_boms(
+        self, part_numbers: Iterable[str], /, *, cancelled: Cancel | None = None
+    ) -> dict[str, list[BomLine]]: ...
+
     def get_bom_expanded(self, part_number: str, /, depth: int | None = None) -> list[BomLine]: ...
 
     def get_bom_flat(self, part_number: str, /) -> list[FlatLine]: ...
@@ -119,8 +122,6 @@ class FilesApi(Protocol):
         self, part_number: str, /, *, newest: int | None = None, after: int = 0
     ) -> list[Revision]: ...
 
-    def get_revision(self, part_number: str, number: int, /) -> Revision: ...
-
     def upload_file(
         self,
         part_number: str,
@@ -132,7 +133,6 @@ class FilesApi(Protocol):
         file_name: str | None = None,
         idempotency_key: str | None = None,
         sha256: str | None = None,
-        origin: Origin | None = None,
         cancelled: Cancel | None = None,
     ) -> Revision: ...
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Any
 
 import anyio.to_thread
@@ -11,6 +12,7 @@ from starlette.responses import Response
 
 from silo.api.wire import MergeResult
 from silo.bom.errors import CycleError, RejectedError
+from silo_server.db.engine import Tx
 from silo_server.routes import document
 from silo_server.routes.context import (
     READ_ERRORS,
@@ -24,18 +26,27 @@ from silo_server.routes.context import (
     json_body,
     raw_json,
 )
-from silo_server.routes.models import BomLineOut, ExpandedLineOut, LineChangeBody, LineOut, NewLineBody
+from silo_server.routes.models import (
+    BomLineOut,
+    BomsOut,
+    ExpandedLineOut,
+    LineChangeBody,
+    LineOut,
+    NewLineBody,
+    NumbersBody,
+)
 from silo_server.routes.render import render_expanded
 from silo_server.services.bom import edits, rollup, tree
-from silo_server.services.bom.last_sync import last_sync, marks, remember_refusal
-from silo_server.services.bom.lines import LineId, line_to_wire, lines_of
+from silo_server.services.bom.last_sync import NEVER, last_syncs, marks, remember_refusal
+from silo_server.services.bom.lines import LineId, line_to_wire, lines_of_many
 from silo_server.services.bom.merge import MergeOutcome, merge_bom, preview_merge
 from silo_server.services.bom.merge_json import MergeOrder, read_merge_order
 from silo_server.services.bom.review import told_quantities
-from silo_server.services.items import get_item
-from silo_server.values import Actor, number
+from silo_server.services.items import get_by_numbers, get_item
+from silo_server.values import Actor, Item, number
 
 router = APIRouter(prefix="/api/items/{part_number}/bom", tags=["bom"])
+several = APIRouter(prefix="/api", tags=["bom"])
 
 Depth = Annotated[int, Query(ge=1, le=tree.MAX_DEPTH)]
 MERGE_BODY = {
@@ -55,19 +66,35 @@ def get_bom(server: ServerDep, caller: Viewer, part_number: str) -> Response:
     """The lines of one level. ``ETag`` is the BOM's version, for ``If-Match``."""
     with server.db.read(caller) as tx:
         item = get_item(tx, part_number)
-        lines = lines_of(tx, item)
-        told = told_quantities(tx, item)
-        components = last_sync(tx, item).components
-    rows = [
-        {
-            **line_to_wire(line, item.part_number),
-            "assembly_told": line.child_id in told,
-            "assembly_quantity": number(told.get(line.child_id)),
-            "components": components.get(line.child_id, []),
-        }
-        for line in lines
-    ]
+        rows = _lines_of(tx, [item])[item.id]
     return json_answer(rows, headers={"ETag": etag_of(item.bom_version)})
+
+
+@several.post("/items/boms", response_model=BomsOut, responses=READ_ERRORS)
+def get_boms(server: ServerDep, caller: Viewer, body: NumbersBody) -> Response:
+    """The lines of many items, one level each; items that are not known are absent. Reads only."""
+    with server.db.read(caller) as tx:
+        found = get_by_numbers(tx, body.part_numbers)
+        rows = _lines_of(tx, list(found.values()))
+    return json_answer({"boms": {number: rows[item.id] for number, item in found.items()}})
+
+
+def _lines_of(tx: Tx, parents: Sequence[Item]) -> dict[int, list[dict[str, Any]]]:
+    """The lines of these items as the API has them, by the item's internal id."""
+    ids = [parent.id for parent in parents]
+    lines, told, last = lines_of_many(tx, ids), told_quantities(tx, ids), last_syncs(tx, ids)
+    return {
+        parent.id: [
+            {
+                **line_to_wire(line, parent.part_number),
+                "assembly_told": line.child_id in told.get(parent.id, {}),
+                "assembly_quantity": number(told.get(parent.id, {}).get(line.child_id)),
+                "components": last.get(parent.id, NEVER).components.get(line.child_id, []),
+            }
+            for line in lines.get(parent.id, [])
+        ]
+        for parent in parents
+    }
 
 
 @router.post("", status_code=201, response_model=LineOut, responses=WRITE_ERRORS)

@@ -15,7 +15,6 @@ from pydantic import (
     WithJsonSchema,
 )
 
-from silo.api.wire import LinkedFile
 from silo.bom.numbers import LARGEST_QUANTITY, read_quantity
 from silo_server.routes import document
 from silo_server.services.bom.edits import REL_TYPES, SOURCES
@@ -137,6 +136,12 @@ class UuidsBody(Body):
     uuids: list[Short] = Field(max_length=10_000)
 
 
+class NumbersBody(Body):
+    """``POST /api/items/boms``."""
+
+    part_numbers: list[Short] = Field(max_length=10_000)
+
+
 class NumberBody(Body):
     """``POST /api/generate-part-number``."""
 
@@ -199,9 +204,6 @@ class RevisionOut(BaseModel):
     thumbnail_key: str | None
     created_at: str
     created_by: str
-    base_revision: int | None
-    file_path: str | None
-    links: list[LinkedFile] | None = None
 
 
 class RevisionBody(Body):
@@ -245,6 +247,12 @@ class BomLineOut(LineOut):
     assembly_told: bool
     assembly_quantity: float | None
     components: list[dict[str, str]]
+
+
+class BomsOut(BaseModel):
+    """The lines of each item that was found, by the part number as it was asked for."""
+
+    boms: dict[str, list[BomLineOut]]
 
 
 class ExpandedLineOut(LineOut):

@@ -46,10 +46,6 @@ class ItemQuery:
 
     search
         words, as :func:`silo_server.services.search.search_for` finds them.
-    sort
-        a key of :data:`SORTS`, with ``-`` before it the largest first; "": the best first.
-    archived
-        the archived items only.
     """
 
     search: str = ""
@@ -58,18 +54,6 @@ class ItemQuery:
     include_archived: bool = False
     limit: int = 100
     offset: int = 0
-    sort: str = ""
-    archived: bool = False
-
-
-# By the key, then by part number. Names sort by code point, on both databases, as their index does.
-SORTS: Mapping[str, Sequence[ColumnElement[Any]]] = {
-    "number": (items.c.part_number_key,),
-    "name": (items.c.name, items.c.part_number_key),
-    "type": (items.c.item_type, items.c.part_number_key),
-    "revision": (items.c.current_revision, items.c.part_number_key),
-    "changed": (items.c.updated_at, items.c.part_number_key),
-}
 
 
 def to_item(row: Any) -> Item:
@@ -132,6 +116,18 @@ def get_by_uuids(tx: Tx, wanted: Sequence[str]) -> list[Item]:
     return [found[uuid] for uuid in dict.fromkeys(known) if uuid in found]
 
 
+def get_by_numbers(tx: Tx, wanted: Sequence[str]) -> dict[str, Item]:
+    """The items with these part numbers (in whatever case), by the number as it was asked for."""
+    keys = {number: number.casefold() for number in wanted}
+    rows = tx.conn.execute(
+        select(items).where(
+            one_of(tx, items.c.part_number_key, set(keys.values())), items.c.archived_at.is_(None)
+        )
+    ).all()
+    found = {row.part_number_key: to_item(row) for row in rows}
+    return {number: found[key] for number, key in keys.items() if key in found}
+
+
 def by_ids(tx: Tx, ids: Collection[int]) -> dict[int, Item]:
     """Items by their internal id, archived ones too."""
     rows = tx.conn.execute(select(items).where(one_of(tx, items.c.id, ids))).all()
@@ -140,19 +136,12 @@ def by_ids(tx: Tx, ids: Collection[int]) -> dict[int, Item]:
 
 def list_items(tx: Tx, query: ItemQuery) -> tuple[list[Item], int]:
     """A page of the items that match, best first, then by part number; and how many match in all."""
-    conditions: list[ColumnElement[bool]] = []
-    if query.archived:
-        conditions.append(items.c.archived_at.is_not(None))
-    elif not query.include_archived:
-        conditions.append(items.c.archived_at.is_(None))
-    order: list[ColumnElement[Any]] = list(SORTS.get(query.sort.removeprefix("-"), SORTS["number"]))
-    if query.sort.startswith("-"):
-        order = [column.desc() for column in order]
+    conditions: list[ColumnElement[bool]] = [] if query.include_archived else [items.c.archived_at.is_(None)]
+    order: list[ColumnElement[Any]] = [items.c.part_number_key]
     found = search_for(tx, query.search)
     if found is not None:
         conditions.append(found.condition)
-        if not query.sort:
-            order.insert(0, found.rank)
+        order.insert(0, found.rank)
     if query.item_type:
         conditions.append(items.c.item_type == query.item_type)
     if query.category:

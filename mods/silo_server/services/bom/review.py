@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -11,6 +11,7 @@ from sqlalchemy import select, update
 
 from silo.bom.diff import same_quantity
 from silo.bom.errors import ConflictError, NotFoundError, RejectedError
+from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import bom_conflicts
 from silo_server.services import events
@@ -89,14 +90,18 @@ def open_conflicts(tx: Tx, parent: Item, lines: Sequence[Line]) -> list[Conflict
     ]
 
 
-def told_quantities(tx: Tx, parent: Item) -> dict[int, float]:
-    """What the last merge said of people's lines, by the child's internal id; 0: not in the assembly."""
+def told_quantities(tx: Tx, parent_ids: Collection[int]) -> dict[int, dict[int, float]]:
+    """What the last merge said of people's lines: parent → child → quantity (internal ids); 0: not in the
+    assembly."""
     rows = tx.conn.execute(
-        select(bom_conflicts.c.child_id, bom_conflicts.c.cad_quantity).where(
-            bom_conflicts.c.parent_id == parent.id
+        select(bom_conflicts.c.parent_id, bom_conflicts.c.child_id, bom_conflicts.c.cad_quantity).where(
+            one_of(tx, bom_conflicts.c.parent_id, parent_ids)
         )
     )
-    return {row.child_id: row.cad_quantity for row in rows}
+    found: dict[int, dict[int, float]] = {}
+    for row in rows:
+        found.setdefault(row.parent_id, {})[row.child_id] = row.cad_quantity
+    return found
 
 
 def resolve(
