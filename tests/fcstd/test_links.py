@@ -14,6 +14,7 @@ from silo.bom.errors import DocumentError
 from silo.bom.findings import FindingCode
 from silo.bom.links import extract
 from silo.fcstd import FcstdObject, Library, Limits, open_document
+from silo.fcstd.library import Contents
 from silo.fcstd.locate import refusal
 
 
@@ -302,14 +303,14 @@ def test_a_copy_on_change_source(tmp_path: Path) -> None:
     assert link.LinkCopyOnChangeSource.Document.FileName.endswith("part.FCStd")
 
 
-class _Rewriting(Library):
+class _Rewriting(Contents):
     """A session in which somebody saves the file between the first look and the second."""
 
-    def _read(self, found):  # type: ignore[no-untyped-def]
+    def _read(self, path):  # type: ignore[no-untyped-def]
         try:
-            return super()._read(found)
+            return super()._read(path)
         except DocumentError:
-            part().save(Path(found.real))
+            part().save(Path(path))
             raise
 
 
@@ -317,7 +318,7 @@ def test_a_file_that_is_just_being_written_is_read_again(tmp_path: Path) -> None
     """One more look, if the file has changed since the first."""
     path = tmp_path / "part.FCStd"
     path.write_bytes(part().bytes()[:300])
-    assert [o.Name for o in _Rewriting().open(path).Objects] == ["Box"]
+    assert [o.Name for o in Library(contents=_Rewriting()).open(path).Objects] == ["Box"]
 
 
 def test_a_damaged_file_is_read_once(tmp_path: Path) -> None:
@@ -326,12 +327,12 @@ def test_a_damaged_file_is_read_once(tmp_path: Path) -> None:
     path.write_bytes(part().bytes()[:300])
     looks: list[str] = []
 
-    class Counting(Library):
-        def _read(self, found):  # type: ignore[no-untyped-def]
-            looks.append(found.real)
-            return super()._read(found)
+    class Counting(Contents):
+        def _read(self, path):  # type: ignore[no-untyped-def]
+            looks.append(path)
+            return super()._read(path)
 
-    library = Counting()
+    library = Library(contents=Counting())
     for _ in range(3):
         with pytest.raises(DocumentError):
             library.open(path)

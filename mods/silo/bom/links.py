@@ -56,6 +56,7 @@ def extract(
     canonical: Canonical | None = None,
     whole: Whole = as_it_is,
     hardware: bool = True,
+    below: bool = True,
 ) -> Extraction:
     """Walk an assembly.
 
@@ -67,8 +68,11 @@ def extract(
         gives a document with all its objects for one that FreeCAD loaded in part.
     hardware
         False leaves standard parts out.
+    below
+        False reads this one assembly only. ``is_assembly`` then says of the head whether it is one, and of
+        each entry whether it may be; nothing is said of what needs the whole tree (rings, shared identities).
     """
-    walker = _Walker(inspect, canonical, whole, hardware)
+    walker = _Walker(inspect, canonical, whole, hardware, below)
     top = assembly_obj
     entries: tuple[BomEntry, ...] = ()
     target = resolve_target(top, inspect)
@@ -77,7 +81,8 @@ def extract(
     else:
         top = target.obj
         entries = walker.tree(top, level)
-    head = replace(walker.entry_for(top), level=level - 1, is_assembly=True)
+    head = walker.entry_for(top)
+    head = replace(head, level=level - 1, is_assembly=below or head.is_assembly or walker.holds(top))
     if entries or walker.notes.any_blocking():
         walker.notes.container(top)
     else:
@@ -85,7 +90,9 @@ def extract(
     walker.notes.beside(beside(top, walker.silent), empty=not entries)
     for one, other in same_articles_of(walk_entries(entries)):
         walker.notes.same_article(one, other)
-    findings = (*walker.notes.findings(), *identity_findings([replace(head, children=entries)]))
+    findings = walker.notes.findings()
+    if below:
+        findings = (*findings, *identity_findings([replace(head, children=entries)]))
     return Extraction(assembly=head, entries=entries, findings=findings)
 
 
@@ -97,8 +104,14 @@ def same_articles_of(entries: Iterable[BomEntry]) -> list[tuple[BomEntry, BomEnt
 
 class _Walker:
     def __init__(
-        self, inspect: Inspect | None, canonical: Canonical | None, whole: Whole, hardware: bool
+        self,
+        inspect: Inspect | None,
+        canonical: Canonical | None,
+        whole: Whole,
+        hardware: bool,
+        below: bool,
     ) -> None:
+        self._goes_below = below
         self._canonical = canonical
         self._paths: dict[str, str] = {}
         self.notes = Notes(self._path)
@@ -184,7 +197,10 @@ class _Walker:
 
     def tree(self, top: Any, level: int) -> tuple[BomEntry, ...]:
         """The direct children of the top, with all that is below them."""
-        self._rings = Rings(self._read_all(top))
+        if self._goes_below:
+            self._rings = Rings(self._read_all(top))
+        else:
+            self.notes.newer(top.Document)
         return self._assembly(top, level, depth=1, entry=self.component(top))
 
     def _read_all(self, top: Any) -> dict[Key, list[Key]]:
@@ -239,7 +255,7 @@ class _Walker:
         return self._memo[(key, level, entry)]
 
     def _below(self, target: Any, level: int, depth: int, entry: Key) -> tuple[BomEntry, ...]:
-        if not self._is_container(self.component(target), target):
+        if not self._goes_below or not self._is_container(self.component(target), target):
             return ()
         if depth > MAX_LEVELS:
             self.notes.too_deep(target, MAX_LEVELS)
@@ -264,7 +280,13 @@ class _Walker:
 
     def _is_assembly(self, target: Any) -> bool:
         key = self.component(target)
-        return self._is_container(key, target) and self._reader.contents(target).holds_components
+        if not self._is_container(key, target):
+            return False
+        return not self._goes_below or self._reader.contents(target).holds_components
+
+    def holds(self, top: Any) -> bool:
+        """True where the top holds components, also such as do not count."""
+        return self._reader.contents(top).holds_components
 
 
 __all__ = ["Extraction", "Finding", "FindingCode", "Place", "extract", "extract_bom_links"]

@@ -71,24 +71,12 @@ def _known(document: Any) -> _Known:
 
 
 def _members_of(objects: _Known, kinds: frozenset[Kind]) -> set[str]:
-    """Names of the objects that lie in some container of these kinds, or are copies such a container made.
-
-    Also through folders: a part lists what lies in its folders, a link group does not.
-    """
-    held = {
-        object_name(obj): [
-            object_name(one) for name in ("Group", "ElementList") for one in own(obj, name) or ()
-        ]
-        for obj, kind in objects
-        if kind in kinds or kind is Kind.FOLDER
-    }
-    folders = {object_name(obj) for obj, kind in objects if kind is Kind.FOLDER}
+    """Names of the objects that lie in some container of these kinds, or are copies such a container made."""
     names: set[str] = set()
-    further = [object_name(obj) for obj, kind in objects if kind in kinds]
-    while further:
-        inside = [name for name in held[further.pop()] if name not in names]
-        names.update(inside)
-        further += [name for name in inside if name in folders]
+    for obj, kind in objects:
+        if kind in kinds:
+            for property_name in ("Group", "ElementList"):
+                names.update(object_name(member) for member in own(obj, property_name) or ())
     return names
 
 
@@ -223,12 +211,13 @@ def _loose(document: Any, kinds: frozenset[Kind]) -> list[Any]:
     """The objects of these kinds that lie in no container, no Body and no feature."""
     objects = _known(document)
     inner = _members_of(objects, _CONTAINERS)
-    used: set[str] = set()
-    if Kind.LOCAL in kinds:
-        local = [obj for obj, kind in objects if kind is Kind.LOCAL]
-        used.update(consumed(local, object_name))
-        used.update(object_name(one) for obj in local for one in own(obj, "Group") or ())
-    return [obj for obj, kind in objects if kind in kinds and object_name(obj) not in inner | used]
+    local = [obj for obj, kind in objects if kind is Kind.LOCAL] if Kind.LOCAL in kinds else []
+    inner.update(object_name(one) for obj in local for one in own(obj, "Group") or ())
+    loose = [obj for obj, kind in objects if kind in kinds and object_name(obj) not in inner]
+    if local and len(loose) > 1:  # to ask every feature costs more than all the rest
+        eaten = consumed(local, object_name)
+        loose = [obj for obj in loose if object_name(obj) not in eaten]
+    return loose
 
 
 def as_it_is(document: Any) -> Any:

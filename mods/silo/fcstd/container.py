@@ -108,7 +108,7 @@ class ContainerFile:
         self.limits = limits
         self._descriptor = _open(path)
         self._window, self._window_at = b"", 0
-        self.state = FileState(0, 0, 0, 0)
+        self.state, self.changed_ns = FileState(0, 0, 0, 0), 0
         try:
             self.state = self._regular_file()
             self.directory = self._directory()
@@ -180,6 +180,7 @@ class ContainerFile:
         if not stat.S_ISREG(status.st_mode):
             kind = "a folder" if stat.S_ISDIR(status.st_mode) else "no regular file"
             raise self._error(f"it is {kind}, not a FreeCAD document")
+        self.changed_ns = status.st_ctime_ns
         return FileState.of(status)
 
     def _directory(self) -> Directory:
@@ -222,6 +223,7 @@ class ContainerFile:
                 self.path,
                 "it is a Git LFS pointer, not the file itself; fetch it with `git lfs pull`",
                 FindingCode.LFS_POINTER,
+                self.state,
             )
         if self.state.size == 0:
             return self._error("it is empty")

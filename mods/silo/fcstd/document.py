@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from silo.bom.document import LinkProblem
 from silo.bom.findings import FindingCode
-from silo.fcstd.container import ContainerFile, Directory, Entry, FileState
+from silo.fcstd.container import ContainerFile, Entry
 from silo.fcstd.inflate import Inflater
 from silo.fcstd.locate import Found
 from silo.fcstd.objects import FcstdObject
@@ -20,10 +20,9 @@ from silo.fcstd.problem import FcstdError
 from silo.fcstd.properties import Properties
 from silo.fcstd.typetree import ancestors
 from silo.fcstd.values import ABSENT, Ref, Vector
-from silo.fcstd.xmltext import XmlText
 
 if TYPE_CHECKING:
-    from silo.fcstd.library import Library
+    from silo.fcstd.library import Content, Library
 
 # Objects of these types are read together with the rest of their file, for a walker looks at what they hold.
 _CONTAINERS = frozenset({"App::Part", "App::LinkGroup", "App::DocumentObjectGroup"})
@@ -42,12 +41,11 @@ class FcstdDocument:
 
     FileName: str
 
-    def __init__(
-        self, library: Library, found: Found, xml: XmlText, directory: Directory, state: FileState
-    ) -> None:
+    def __init__(self, library: Library, found: Found, content: Content) -> None:
         self.FileName = found.real
-        self._library, self._found, self._xml = library, found, xml
-        self._directory, self.state = directory, state
+        self._library, self._found, self._xml = library, found, content.xml
+        self._directory, self.state = content.directory, content.state
+        self.content = content
         self._table: Properties | None = None
         self._objects: dict[str, FcstdObject] = {}
         self._targets: dict[tuple[str, str], FcstdObject | LinkProblem] = {}

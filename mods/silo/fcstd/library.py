@@ -4,11 +4,14 @@
 from __future__ import annotations
 
 import os
+import time
+from collections import OrderedDict
+from dataclasses import dataclass
 from pathlib import Path
 
 from silo.bom.document import LinkProblem
 from silo.bom.findings import FindingCode
-from silo.fcstd.container import DOCUMENT_XML, ContainerFile, FileState
+from silo.fcstd.container import DOCUMENT_XML, ContainerFile, Directory, FileState
 from silo.fcstd.document import FcstdDocument
 from silo.fcstd.limits import Limits
 from silo.fcstd.locate import Found, Locator, NotFound
@@ -18,24 +21,103 @@ from silo.fcstd.values import Ref
 from silo.fcstd.xmltext import Shared, XmlText
 
 
+@dataclass(frozen=True, slots=True)
+class Content:
+    """What was read of one file: its text, as far as it is unpacked, and the directory of its container.
+
+    changed_ns
+        when the file system last changed anything of the file (``st_ctime_ns``).
+    read_ns
+        a moment before it was opened, by this machine's clock.
+    """
+
+    xml: XmlText
+    directory: Directory
+    state: FileState
+    changed_ns: int
+    read_ns: int
+
+    @property
+    def digest(self) -> str:
+        """What tells this content from any other."""
+        return self.xml.digest(self.directory.raw)
+
+    @property
+    def size(self) -> int:
+        """Bytes that stay in memory, about; unpacked text is counted elsewhere."""
+        return self.xml.packed_size + 2 * len(self.directory.raw) + 300 * self.directory.entry_count
+
+
+class Contents:
+    """The contents of files for several sessions, one after the other: a file that many assemblies use is
+    read once. Those that were not asked for longest are forgotten first.
+    """
+
+    def __init__(self, limits: Limits | None = None) -> None:
+        self.limits = limits or Limits()
+        self.shared = Shared(self.limits.resident)
+        self.reads = 0
+        self._known: OrderedDict[str, Content] = OrderedDict()
+        self._size = 0
+
+    def read(self, path: str) -> Content:
+        """The content of a file. Raises FcstdError."""
+        if (known := self._known.get(path)) is not None:
+            self._known.move_to_end(path)
+            return known
+        self.reads += 1
+        found = self._read(path)
+        self._known[path] = found
+        self._size += found.size
+        while self._size > self.limits.resident and len(self._known) > 1:
+            _, oldest = self._known.popitem(last=False)
+            self._size -= oldest.size
+        return found
+
+    def _read(self, path: str) -> Content:
+        read_ns = time.time_ns()
+        with ContainerFile(path, self.limits) as container:
+            entry = container.entry(DOCUMENT_XML)
+            if entry is None:
+                reason = "it is no FreeCAD document (there is no Document.xml in it)"
+                raise FcstdError(path, reason, state=container.state)
+            packed = container.packed(entry, self.limits.packed)
+            if container.changed():
+                raise FcstdError(path, "it is being written just now; try again", state=container.state)
+            xml = XmlText(path, entry, packed, self.limits, self.shared)
+            return Content(xml, container.directory, container.state, container.changed_ns, read_ns)
+
+
 class Library:
     """Shares opened documents: one file is one document object.
 
     root
         no file outside this folder is read; links that leave it have the problem OUTSIDE_ROOT. None: no such
         limit, for projects use ``../`` freely.
+    contents
+        what was read before, by other sessions.
     notes
         what was taken in another way than recorded (a file name in other case), in plain words.
+    documents, lookups
+        all that this session has read, and each path of a link that it followed with where that led: what was
+        found out in it depends on these and on nothing else.
 
     No file stays open; closing (or leaving the ``with`` block) only gives memory back.
     """
 
-    def __init__(self, root: Path | str | None = None, limits: Limits | None = None) -> None:
+    def __init__(
+        self,
+        root: Path | str | None = None,
+        limits: Limits | None = None,
+        contents: Contents | None = None,
+        locator: Locator | None = None,
+    ) -> None:
         self.limits = limits or Limits()
         self.notes: list[str] = []
-        self._locator = Locator(None if root is None else os.fspath(root))
-        self._shared = Shared(self.limits.resident)
-        self._documents: dict[str, FcstdDocument | FcstdError] = {}
+        self.documents: dict[str, FcstdDocument | FcstdError] = {}
+        self.lookups: dict[tuple[tuple[str, ...], str], Found | NotFound] = {}
+        self._locator = locator or Locator(None if root is None else os.fspath(root))
+        self._contents = contents or Contents(self.limits)
 
     def __enter__(self) -> Library:
         return self
@@ -45,8 +127,8 @@ class Library:
 
     def close(self) -> None:
         """Forget all documents."""
-        self._documents.clear()
-        self._shared = Shared(self.limits.resident)
+        self.documents.clear()
+        self._contents = Contents(self.limits)
 
     def open(self, path: Path | str) -> FcstdDocument:
         """The document in a file, read to its end and checked. Raises DocumentError."""
@@ -62,14 +144,10 @@ class Library:
         document.complete()
         return document
 
-    def glance(self, path: Path | str) -> FcstdDocument:
-        """The document in a file, of which only as much is read as is asked for. Raises DocumentError."""
-        opened = os.path.abspath(path)
-        return self._document(Found(opened, self._locator.real(opened)))
-
     def follow(self, owner: FcstdDocument, ref: Ref) -> FcstdObject | LinkProblem:
         """The object that a link in ``owner`` means, or why there is none. Never raises for a broken link."""
         found = self._locator.find(ref.file, owner.folders)
+        self.lookups[owner.folders, ref.file] = found
         if isinstance(found, NotFound):
             return LinkProblem(found.code, ref.file, ref.name, found.detail)
         try:
@@ -85,37 +163,26 @@ class Library:
         return target
 
     def _document(self, found: Found) -> FcstdDocument:
-        known = self._documents.get(found.real)
+        known = self.documents.get(found.real)
         if known is None:
-            known = self._documents[found.real] = self._load(found)
+            known = self.documents[found.real] = self._load(found)
         if isinstance(known, FcstdError):
-            raise FcstdError(known.path, known.reason, known.finding)
+            raise FcstdError(known.path, known.reason, known.finding, known.state)
         return known
 
     def _load(self, found: Found) -> FcstdDocument | FcstdError:
-        if len(self._documents) >= self.limits.documents:
+        if len(self.documents) >= self.limits.documents:
             return FcstdError(found.real, f"more than {self.limits.documents} files are not read in one go")
         try:
             try:
-                return self._read(found)
+                return FcstdDocument(self, found, self._contents.read(found.real))
             except FcstdError as error:
                 # FreeCAD may just be writing it; if nobody is, a second look is the same as the first.
                 if error.state is None or error.state == _state(found.real):
                     raise
-                return self._read(found)
+                return FcstdDocument(self, found, self._contents.read(found.real))
         except FcstdError as error:
             return error
-
-    def _read(self, found: Found) -> FcstdDocument:
-        with ContainerFile(found.real, self.limits) as container:
-            entry = container.entry(DOCUMENT_XML)
-            if entry is None:
-                raise FcstdError(found.real, "it is no FreeCAD document (there is no Document.xml in it)")
-            packed = container.packed(entry, self.limits.packed)
-            if container.changed():
-                raise FcstdError(found.real, "it is being written just now; try again", state=container.state)
-            xml = XmlText(found.real, entry, packed, self.limits, self._shared)
-            return FcstdDocument(self, found, xml, container.directory, container.state)
 
     def _note_respelt(self, owner: FcstdDocument, ref: Ref, found: Found) -> None:
         name = os.path.basename(found.real)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from hashlib import sha256
 from typing import TYPE_CHECKING
 
 from silo.fcstd import careful
@@ -85,6 +86,16 @@ class XmlText:
     def text(self) -> bytes:
         """What is unpacked so far; spans count from its begin."""
         return self._text if self._text is not None else self._unpack_again()
+
+    @property
+    def packed_size(self) -> int:
+        """Bytes of the text as the file holds it."""
+        return len(self._packed)
+
+    def digest(self, directory: bytes) -> str:
+        """What tells this content from any other: of the packed text, and of the container's directory, which
+        holds a checksum of each other entry."""
+        return sha256(b"%d %b%b" % (len(directory), directory, self._packed)).hexdigest()
 
     def release(self) -> None:
         """Give the memory back; the text is unpacked again when somebody asks."""
