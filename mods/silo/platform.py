@@ -8,6 +8,7 @@ instead of the platform's name, so that tests can put either in its place.
 from __future__ import annotations
 
 import errno
+import importlib
 import os
 import signal
 import socket
@@ -16,7 +17,7 @@ import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any, Protocol
+from typing import Any, BinaryIO, Protocol
 
 NAME = sys.platform
 WINDOWS = os.name == "nt"
@@ -104,6 +105,37 @@ def is_locked(path: str) -> bool | None:
     except OSError:
         return False
     return False
+
+
+def hold_lock(path: str | os.PathLike[str], *, shared: bool = False) -> BinaryIO | None:
+    """Lock a file, which is made where there is none, for as long as the result stays open.
+
+    shared
+        with others that share it. Windows has no such lock, and needs none where it guards an open file:
+        nobody can delete that.
+
+    None where another process holds the lock. It ends with the process, however that ends. Raises OSError.
+    """
+    file = open(path, "a+b")  # noqa: SIM115
+    try:
+        try:
+            import fcntl
+        except ImportError:
+            if not shared:
+                modes: Any = importlib.import_module("msvcrt")
+                file.seek(1 << 30)  # locks of Windows keep others from reading; nobody reads there
+                modes.locking(file.fileno(), modes.LK_NBLCK, 1)
+            return file
+        fcntl.flock(file, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+        return file
+    except OSError as error:
+        file.close()
+        if isinstance(error, BlockingIOError | PermissionError) or error.errno in (
+            errno.EDEADLK,
+            errno.EACCES,
+        ):
+            return None
+        raise
 
 
 def _is_locked_on_windows(descriptor: int) -> bool | None:

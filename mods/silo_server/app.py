@@ -18,7 +18,7 @@ from silo_server.clock import Clock, utc_now
 from silo_server.db.engine import WRITERS_WAITING, Database
 from silo_server.events.hub import Hub
 from silo_server.files import FileStore
-from silo_server.middleware import BodyLimit, SecurityHeaders
+from silo_server.middleware import BodyLimit, Compressed, SecurityHeaders
 from silo_server.operation.housekeeping import keep_tidy
 from silo_server.operation.metrics import Metrics
 from silo_server.operation.requests import Observed
@@ -83,6 +83,7 @@ def create_app(settings: Settings, clock: Clock = utc_now) -> FastAPI:
     pages.install(app)
     app.add_middleware(BodyLimit, settings=settings)
     app.add_middleware(SecurityHeaders)
+    app.add_middleware(Compressed)
     app.state.metrics = metrics
     app.openapi = lambda: _openapi(app)  # type: ignore[method-assign]
     return app

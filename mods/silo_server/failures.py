@@ -15,7 +15,15 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.responses import JSONResponse, Response
 
-from silo.bom.errors import BusyError, CycleError, ReadOnlyError, RejectedError, RouteMissingError, SiloError
+from silo.bom.errors import (
+    BusyError,
+    CycleError,
+    NewerRevisionError,
+    ReadOnlyError,
+    RejectedError,
+    RouteMissingError,
+    SiloError,
+)
 from silo_server.errors import TooManyAttemptsError
 from silo_server.operation.requests import info_of
 
@@ -43,14 +51,17 @@ def error_answer(
     *,
     problems: Sequence[str] = (),
     path: Sequence[str] = (),
+    revision: Mapping[str, Any] | None = None,
     headers: Mapping[str, str] | None = None,
 ) -> Response:
-    """An error in the one shape; ``problems`` and ``path`` only where there are any."""
+    """An error in the one shape; ``problems``, ``path`` and ``revision`` only where there are any."""
     body: dict[str, Any] = {"error": code, "message": message}
     if problems:
         body["problems"] = list(problems)
     if path:
         body["path"] = list(path)
+    if revision is not None:
+        body["revision"] = dict(revision)
     return JSONResponse(body, status, dict(headers) if headers else None)
 
 
@@ -69,6 +80,7 @@ async def _silo_error(request: Request, error: Exception) -> Response:
         str(error),
         problems=error.problems if isinstance(error, RejectedError) else (),
         path=error.path if isinstance(error, CycleError) else (),
+        revision=error.revision if isinstance(error, NewerRevisionError) else None,
         headers=headers,
     )
 

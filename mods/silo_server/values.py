@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from enum import StrEnum
@@ -114,7 +114,11 @@ class Item:
 
 @dataclass(frozen=True, slots=True)
 class Revision:
-    """A revision of an item: a property snapshot and, where one was uploaded, a file."""
+    """A revision of an item: a property snapshot and, where one was uploaded, a file.
+
+    base_revision, file_path, links
+        what the client said of the file (:class:`silo.api.wire.Revision`).
+    """
 
     revision_number: int
     comment: str
@@ -126,6 +130,9 @@ class Revision:
     thumbnail_key: str | None
     created_at: str
     created_by: str
+    base_revision: int | None = None
+    file_path: str | None = None
+    links: Sequence[Mapping[str, str]] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,7 +28,7 @@ from silo.api.policy import Retries
 from silo.api.sse import ServerEvent
 from silo.api.stream import SILENCE, HttpEventStream, open_stream
 from silo.api.transport import Call, Cancel, Timeouts, Transport, stop_if
-from silo.api.wire import Revision, ServerState, User
+from silo.api.wire import Origin, Revision, ServerState, User
 from silo.bom.errors import RouteMissingError, ServerFaultError, SiloError
 
 _PAGE = 1000  # revisions in one answer
@@ -172,6 +172,11 @@ class SiloClient(ItemCalls, BomCalls):
                 return found[:newest]
             params["before"] = found[-1].revision_number
 
+    def get_revision(self, part_number: str, number: int, /) -> Revision:
+        """One revision, with the files that its file links to."""
+        subject = f"revision {number} of {part_number}"
+        return self._get(subject, *_revision(part_number, number)).model(Revision)
+
     def get_properties(self, part_number: str, /) -> dict[str, Any]:
         """All properties of an item, from its newest revision where the item's own answer carries none.
 
@@ -208,11 +213,14 @@ class SiloClient(ItemCalls, BomCalls):
         file_name: str | None = None,
         idempotency_key: str | None = None,
         sha256: str | None = None,
+        origin: Origin | None = None,
         cancelled: Cancel | None = None,
     ) -> Revision:
         """Send a file as a new revision, streamed; never repeated by itself (see :mod:`silo.outbox`).
 
         ``sha256`` is what must arrive: a server that knows the field makes no revision of anything else.
+        ``origin`` says what the file was made from: :class:`silo.bom.errors.NewerRevisionError` where a newer
+        one is there. A server that does not know this takes the file.
         Raises :class:`silo.bom.errors.DocumentError` for a file that cannot be read.
         """
         return files.upload(
@@ -225,6 +233,7 @@ class SiloClient(ItemCalls, BomCalls):
             file_name=file_name,
             idempotency_key=idempotency_key,
             sha256=sha256,
+            origin=origin,
             cancelled=cancelled,
         )
 

@@ -14,7 +14,7 @@ from urllib.parse import urljoin
 from silo.api.multipart import FileBody, FileForm, Progress, as_json, upload_fields
 from silo.api.replies import error_of
 from silo.api.transport import MAX_ERROR, Call, Cancel, Transport
-from silo.api.wire import Revision
+from silo.api.wire import Origin, Revision
 from silo.bom.errors import (
     ConflictError,
     DocumentError,
@@ -38,6 +38,7 @@ def upload(
     file_name: str | None,
     idempotency_key: str | None,
     sha256: str | None,
+    origin: Origin | None,
     cancelled: Cancel | None,
 ) -> Revision:
     """Send a file as a new revision (``POST …/file``); the server's checksum must be that of the file.
@@ -46,7 +47,7 @@ def upload(
     """
     name = file_name or path.name
     subject = f"{name} for {part_number}"
-    fields = upload_fields(comment, properties, sha256)
+    fields = upload_fields(comment, properties, sha256) | _origin_fields(origin)
     with FileForm(path, fields, file_name=name, on_progress=on_progress, cancelled=cancelled) as form:
         headers = {"Content-Type": form.content_type, "Accept": "application/json"}
         if idempotency_key:
@@ -75,6 +76,20 @@ def upload(
             f"(revision {revision.revision_number}); look at that revision, then send the file again"
         )
     return revision
+
+
+def _origin_fields(origin: Origin | None) -> dict[str, str]:
+    """Where the file came from; a server that knows none of these takes no notice."""
+    said: dict[str, str] = {}
+    if origin is None:
+        return said
+    if origin.base_revision is not None:
+        said["base_revision"] = str(origin.base_revision)
+    if origin.file_path:
+        said["path"] = origin.file_path
+    if origin.links is not None:
+        said["links"] = as_json([link.model_dump() for link in origin.links]).decode()
+    return said
 
 
 def _in_two_steps(

@@ -18,6 +18,7 @@ from silo.api.wire import (
     Item,
     MergeRequest,
     MergeResult,
+    Origin,
     Revision,
     ServerState,
     User,
@@ -122,6 +123,8 @@ class FilesApi(Protocol):
         self, part_number: str, /, *, newest: int | None = None, after: int = 0
     ) -> list[Revision]: ...
 
+    def get_revision(self, part_number: str, number: int, /) -> Revision: ...
+
     def upload_file(
         self,
         part_number: str,
@@ -133,6 +136,7 @@ class FilesApi(Protocol):
         file_name: str | None = None,
         idempotency_key: str | None = None,
         sha256: str | None = None,
+        origin: Origin | None = None,
         cancelled: Cancel | None = None,
     ) -> Revision: ...
 

@@ -25,6 +25,7 @@ from silo.bom.errors import (
     ConflictError,
     CycleError,
     ForbiddenError,
+    NewerRevisionError,
     NotFoundError,
     ReadOnlyError,
     RejectedError,
@@ -125,6 +126,7 @@ class Complaint:
     text: str = ""
     problems: tuple[str, ...] = ()
     path: tuple[str, ...] = ()
+    revision: dict[str, Any] | None = None
 
 
 def complaint(reply: Reply) -> Complaint:
@@ -147,6 +149,7 @@ def complaint(reply: Reply) -> Complaint:
         text=_clean(text, reply.secret),
         problems=problems,
         path=_texts(body.get("path"), reply),
+        revision=newer if isinstance(newer := body.get("revision"), dict) else None,
     )
 
 
@@ -170,6 +173,8 @@ def error_of(reply: Reply, *, writing: bool = False) -> SiloError:
     if status in (404, 410):
         return NotFoundError(f"{asked}: not found{told}")
     if status == 409:
+        if said.code == NewerRevisionError.code and said.revision is not None:
+            return NewerRevisionError(f"{asked}{told}", said.revision)
         cycle = len(said.path) > 1
         return (
             CycleError(said.path)

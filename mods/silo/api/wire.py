@@ -300,16 +300,43 @@ class MergeEvent(Answer):
 
 
 class ErrorBody(Answer):
-    """The one shape of every HTTP error. ``problems`` lists all bad entries at once, with their index."""
+    """The one shape of every HTTP error. ``problems`` lists all bad entries at once, with their index.
+
+    ``revision``: with the code ``newer_revision``, the one that the request does not know.
+    """
 
     error: str
     message: str = ""
     problems: list[str] = Field(default_factory=list)
     path: list[str] = Field(default_factory=list)
+    revision: dict[str, Any] | None = None
+
+
+class LinkedFile(Wire):
+    """A file that a FreeCAD file links to.
+
+    path
+        as the link records it: relative to the folder of the linking file, with ``/``.
+    item, sha256
+        the UUID of its item and the hash of its content when the linking file was committed; "" where that
+        was not known.
+    """
+
+    path: str = Field(min_length=1, max_length=1000)
+    item: str = Field(default="", max_length=64)
+    sha256: str = Field(default="", pattern="^([0-9a-f]{64})?$")
 
 
 class Revision(Record):
-    """A revision of an item; ``file_checksum`` is the SHA-256 of its file, in hex."""
+    """A revision of an item; ``file_checksum`` is the SHA-256 of its file, in hex.
+
+    base_revision
+        the revision that the file was made from; None where nobody said.
+    file_path
+        where the file was, relative to the folder that holds it and all that it links to.
+    links
+        the files that it links to; only where one revision is asked for.
+    """
 
     revision_number: int = Field(validation_alias=AliasChoices("revision_number", "revision", "number"))
     file_key: str | None = None
@@ -324,6 +351,17 @@ class Revision(Record):
     properties: dict[str, Any] = Field(default_factory=dict)
     created_by: str | None = None
     created_at: Time = None
+    base_revision: int | None = None
+    file_path: str | None = None
+    links: list[LinkedFile] = Field(default_factory=list)
+
+
+class Origin(Wire):
+    """What a client says of a file that it sends: the fields of :class:`Revision` of these names."""
+
+    base_revision: int | None = None
+    file_path: str = ""
+    links: list[LinkedFile] | None = None
 
 
 class FlatLine(Record):

@@ -20,6 +20,7 @@
     │   └── ServerFaultError    any other 5xx, or an answer that cannot be understood
     ├── ConflictError           nobody's: two truths met (409)
     │   ├── CycleError          the BOM would contain itself
+    │   ├── NewerRevisionError  somebody committed the item since this file was opened
     │   └── VersionConflictError  412: somebody else changed it first
     └── CancelledError          a person stopped it; not a failure
 
@@ -28,8 +29,8 @@ A message says what was wanted, what was got, where, and what to do.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import ClassVar
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
 
 
 class SiloError(Exception):
@@ -160,6 +161,16 @@ class CycleError(ConflictError):
     def __init__(self, path: Sequence[str]) -> None:
         super().__init__("this BOM would contain itself: " + " → ".join(path))
         self.path = tuple(path)
+
+
+class NewerRevisionError(ConflictError):
+    """Somebody committed the item since this file was opened. ``revision`` is the newest one with a file."""
+
+    code = "newer_revision"
+
+    def __init__(self, message: str, revision: Mapping[str, Any]) -> None:
+        super().__init__(message)
+        self.revision = revision
 
 
 class VersionConflictError(ConflictError):

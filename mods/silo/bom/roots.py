@@ -71,12 +71,24 @@ def _known(document: Any) -> _Known:
 
 
 def _members_of(objects: _Known, kinds: frozenset[Kind]) -> set[str]:
-    """Names of the objects that lie in some container of these kinds, or are copies such a container made."""
+    """Names of the objects that lie in some container of these kinds, or are copies such a container made.
+
+    Also through folders: a part lists what lies in its folders, a link group does not.
+    """
+    held = {
+        object_name(obj): [
+            object_name(one) for name in ("Group", "ElementList") for one in own(obj, name) or ()
+        ]
+        for obj, kind in objects
+        if kind in kinds or kind is Kind.FOLDER
+    }
+    folders = {object_name(obj) for obj, kind in objects if kind is Kind.FOLDER}
     names: set[str] = set()
-    for obj, kind in objects:
-        if kind in kinds:
-            for property_name in ("Group", "ElementList"):
-                names.update(object_name(member) for member in own(obj, property_name) or ())
+    further = [object_name(obj) for obj, kind in objects if kind in kinds]
+    while further:
+        inside = [name for name in held[further.pop()] if name not in names]
+        names.update(inside)
+        further += [name for name in inside if name in folders]
     return names
 
 

@@ -144,6 +144,11 @@ class Library:
         document.complete()
         return document
 
+    def glance(self, path: Path | str) -> FcstdDocument:
+        """The document in a file, of which only as much is read as is asked for. Raises DocumentError."""
+        opened = os.path.abspath(path)
+        return self._document(Found(opened, self._locator.real(opened)))
+
     def follow(self, owner: FcstdDocument, ref: Ref) -> FcstdObject | LinkProblem:
         """The object that a link in ``owner`` means, or why there is none. Never raises for a broken link."""
         found = self._locator.find(ref.file, owner.folders)

@@ -21,10 +21,9 @@ from silo.fcstd.container import ContainerFile
 from silo.fcstd.edit import check_writable, document_xml, edited_xml, replace_file
 from silo.fcstd.library import Library
 from silo.fcstd.limits import Limits
+from silo.fcstd.linked import TAGS
 from silo.fcstd.rewrite import replaced_entry
 
-# The elements of Document.xml that record another file (``src/App/PropertyLinks.cpp``).
-_TAGS = frozenset({"XLink", "XLinkSub"})
 _FILE = re.compile(rb"""(\sfile\s*=\s*)("[^"]*"|'[^']*')""")
 
 
@@ -79,7 +78,7 @@ def _records(text: bytes, path: str, file: str, limits: Limits) -> Iterator[_Rec
     if as_utf8(text) is not text:
         raise Malformed("is not in UTF-8")
     folder, wanted = os.path.dirname(path), {file, os.path.realpath(file)}
-    for at, attributes in start_tags(text, limits.depth, _TAGS):
+    for at, attributes in start_tags(text, limits.depth, TAGS):
         recorded = attributes.get("file", "")
         if recorded and not wanted.isdisjoint(_meant(recorded, folder)):
             yield _Record(at, attributes.get("name", ""))

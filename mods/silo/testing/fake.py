@@ -28,6 +28,7 @@ from silo.api.wire import (
     MergeEvent,
     MergeRequest,
     MergeResult,
+    Origin,
     Revision,
     ServerState,
     User,
@@ -49,7 +50,7 @@ from silo.testing.boms import (
     missing_of,
     with_components,
 )
-from silo.testing.store import CATEGORIES, FakeStore, FakeStream, Stored
+from silo.testing.store import CATEGORIES, FakeStore, FakeStream, Stored, check_base
 
 
 class FakeSilo(FakeStore):
@@ -283,6 +284,8 @@ class FakeSilo(FakeStore):
                 raise VersionConflictError(
                     f"the BOM of {part_number} is at version {stored.item.bom_version}"
                 )
+            if request.document is not None and not request.dry_run:
+                check_base(stored, request.document.revision, request.document.sha256)
             return self._merge(stored, request, content)
 
     def _merge(self, stored: Stored, request: MergeRequest, content: list[tuple[str, float]]) -> MergeResult:
@@ -320,6 +323,12 @@ class FakeSilo(FakeStore):
         known = reversed(self._stored(part_number).revisions)
         return [revision for revision in known if revision.revision_number > after][:newest]
 
+    def get_revision(self, part_number: str, number: int, /) -> Revision:
+        for revision in self._stored(part_number).revisions:
+            if revision.revision_number == number:
+                return revision
+        raise NotFoundError(f"{part_number} has no revision {number}")
+
     def upload_file(
         self,
         part_number: str,
@@ -331,6 +340,7 @@ class FakeSilo(FakeStore):
         file_name: str | None = None,
         idempotency_key: str | None = None,
         sha256: str | None = None,
+        origin: Origin | None = None,
         cancelled: Cancel | None = None,
     ) -> Revision:
         stop_if(cancelled)
@@ -344,7 +354,20 @@ class FakeSilo(FakeStore):
             raise RejectedError(f"sha256: {part_number}: another content arrived than was sent")
         with self._changing("upload_file"):
             stored = self._stored(part_number)
-            return self._revise(stored, comment, properties, content, file_name or Path(path).name)
+            if idempotency_key is not None and idempotency_key in stored.uploads:
+                number, known = stored.uploads[idempotency_key]
+                if known != hashlib.sha256(content).hexdigest():
+                    raise ConflictError(
+                        f"this Idempotency-Key was used before for another file of {part_number}"
+                    )
+                return self.get_revision(part_number, number)
+            check_base(stored, origin.base_revision if origin else None, hashlib.sha256(content).hexdigest())
+            revision = self._revise(
+                stored, comment, properties, content, file_name or Path(path).name, origin
+            )
+            if idempotency_key is not None:
+                stored.uploads[idempotency_key] = (revision.revision_number, revision.file_checksum or "")
+            return revision
 
     def download_file(
         self,

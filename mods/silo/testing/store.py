@@ -13,8 +13,8 @@ from typing import Any
 
 from silo.api.multipart import as_json
 from silo.api.sse import MERGE, ServerEvent
-from silo.api.wire import BomLine, Item, MergeEvent, MergeResult, Revision
-from silo.bom.errors import NotFoundError, ReadOnlyError, RejectedError
+from silo.api.wire import BomLine, Item, MergeEvent, MergeResult, Origin, Revision
+from silo.bom.errors import NewerRevisionError, NotFoundError, ReadOnlyError, RejectedError
 
 CATEGORIES = {
     "A01": "Mechanical assembly",
@@ -34,11 +34,23 @@ class Stored:
     files: dict[int, bytes] = field(default_factory=dict)
     lines: list[dict[str, Any]] = field(default_factory=list)
     answers: dict[str, tuple[list[tuple[str, float]], MergeResult]] = field(default_factory=dict)
+    uploads: dict[str, tuple[int, str]] = field(default_factory=dict)  # key → (revision, hash)
 
     def search_text(self) -> str:
         """What a search looks into: number, name, and the hashes of its files."""
         hashes = [self.item.properties.get("file_sha256"), *(r.file_checksum for r in self.revisions)]
         return "\n".join(map(str, (self.item.part_number, self.item.name, *filter(None, hashes)))).casefold()
+
+
+def check_base(stored: Stored, base: int | None, checksum: str | None) -> None:
+    """The server's rule: a file was committed after ``base``, and it is not this one."""
+    newest = next((r for r in reversed(stored.revisions) if r.file_checksum), None)
+    if base is None or newest is None or newest.revision_number <= base or newest.file_checksum == checksum:
+        return
+    raise NewerRevisionError(
+        f"{newest.created_by} committed revision {newest.revision_number} of {stored.item.part_number}",
+        newest.model_dump(mode="json"),
+    )
 
 
 def _nothing(name: str) -> None:
@@ -118,6 +130,7 @@ class FakeStore:
         properties: Mapping[str, Any] | None,
         content: bytes | None = None,
         file_name: str | None = None,
+        origin: Origin | None = None,
     ) -> Revision:
         known = {**stored.item.properties, **(properties or {})} if content is not None else properties or {}
         as_json(known)
@@ -130,6 +143,9 @@ class FakeStore:
             file_size=len(content) if content is not None else None,
             created_by=self.user,
             created_at=self._clock(),
+            base_revision=origin.base_revision if origin else None,
+            file_path=(origin.file_path or None) if origin else None,
+            links=(origin.links or []) if origin else [],
         )
         stored.revisions.append(revision)
         if content is not None:
@@ -138,7 +154,13 @@ class FakeStore:
             update={"current_revision": revision.revision_number, "properties": dict(known)}
         )
         number = stored.item.part_number
-        data = {"part_number": number, "revision_number": revision.revision_number, "comment": comment}
+        data = {
+            "part_number": number,
+            "id": stored.item.id,
+            "revision_number": revision.revision_number,
+            "comment": comment,
+            "user": self.user,
+        }
         self._announce("revision.created", data)
         return revision
 

@@ -114,8 +114,31 @@ async def _check_csrf(request: Request, actor: Actor) -> None:
     if sent is None and request.headers.get("content-type", "").startswith(FORM_TYPES):
         sent = (await request.form()).get("csrf_token")
     wanted = actor.csrf_token or ""
-    if not isinstance(sent, str) or not secrets.compare_digest(sent.encode(), wanted.encode()):
+    if not isinstance(sent, str) or not secrets.compare_digest(unmasked(sent), wanted.encode()):
         raise ForbiddenError("the form's secret is missing or old; load the page again and repeat")
+
+
+def masked(secret: str) -> str:
+    """A secret as a page shows it: another text each time, so that the size of a compressed page that also
+    shows what somebody else made up says nothing about it (the BREACH attack)."""
+    raw = secret.encode()
+    mask = secrets.token_bytes(len(raw))
+    return _MASKED + (mask + bytes(a ^ b for a, b in zip(mask, raw, strict=True))).hex()
+
+
+def unmasked(sent: str) -> bytes:
+    """What :func:`masked` was given; a text that it did not make as it is."""
+    if not sent.startswith(_MASKED):
+        return sent.encode()
+    try:
+        both = bytes.fromhex(sent.removeprefix(_MASKED))
+    except ValueError:
+        return b""
+    half = len(both) // 2
+    return bytes(a ^ b for a, b in zip(both[:half], both[half:], strict=False))
+
+
+_MASKED = "m."
 
 
 def json_answer(value: Any, status: int = 200, headers: Mapping[str, str] | None = None) -> Response:

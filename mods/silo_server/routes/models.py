@@ -15,6 +15,7 @@ from pydantic import (
     WithJsonSchema,
 )
 
+from silo.api.wire import LinkedFile
 from silo.bom.numbers import LARGEST_QUANTITY, read_quantity
 from silo_server.routes import document
 from silo_server.services.bom.edits import REL_TYPES, SOURCES
@@ -204,6 +205,9 @@ class RevisionOut(BaseModel):
     thumbnail_key: str | None
     created_at: str
     created_by: str
+    base_revision: int | None
+    file_path: str | None
+    links: list[LinkedFile] | None = None
 
 
 class RevisionBody(Body):

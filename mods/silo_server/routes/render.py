@@ -12,7 +12,7 @@ from silo_server.clock import wire
 from silo_server.services.bom.last_sync import LastSync
 from silo_server.services.bom.lines import child_to_wire, line_state_to_wire, revisions_to_wire
 from silo_server.services.bom.tree import Occurrence
-from silo_server.values import Item, LineState, Revision, number
+from silo_server.values import Item, LineState, number
 
 
 def item_to_wire(item: Item, last_sync: LastSync | None = None) -> dict[str, Any]:
@@ -38,23 +38,6 @@ def item_to_wire(item: Item, last_sync: LastSync | None = None) -> dict[str, Any
         "updated_at": wire(item.updated_at),
         "updated_by": item.updated_by,
         "archived_at": wire(item.archived_at),
-    }
-
-
-def revision_to_wire(part_number: str, revision: Revision) -> dict[str, Any]:
-    """A revision, under the contract's names."""
-    return {
-        "part_number": part_number,
-        "revision_number": revision.revision_number,
-        "comment": revision.comment,
-        "status": revision.status,
-        "properties": dict(revision.properties),
-        "file_name": revision.file_name,
-        "file_checksum": revision.file_checksum,
-        "file_size": revision.file_size,
-        "thumbnail_key": revision.thumbnail_key,
-        "created_at": wire(revision.created_at),
-        "created_by": revision.created_by,
     }
 
 

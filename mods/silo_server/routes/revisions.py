@@ -9,9 +9,11 @@ from typing import Annotated, Any
 
 import anyio.to_thread
 from fastapi import APIRouter, Path, Query, Request
+from pydantic import Field, TypeAdapter, ValidationError
 from starlette.datastructures import UploadFile
 from starlette.responses import FileResponse, Response
 
+from silo.api.wire import LinkedFile
 from silo.bom.errors import NotFoundError, RejectedError
 from silo_server.routes import document
 from silo_server.routes.context import (
@@ -24,9 +26,9 @@ from silo_server.routes.context import (
     json_answer,
 )
 from silo_server.routes.models import RevisionBody, RevisionOut
-from silo_server.routes.render import revision_to_wire
 from silo_server.services import items, revisions
 from silo_server.services.bom.merge_json import is_text
+from silo_server.services.revisions import Origin, revision_to_wire
 from silo_server.values import Actor, Revision
 
 router = APIRouter(prefix="/api/items/{part_number}", tags=["revisions"])
@@ -36,6 +38,8 @@ DOWNLOAD_HEADERS = {
     "Content-Security-Policy": "default-src 'none'; sandbox",
     "Cache-Control": "private, no-cache",
 }
+_MAX_FIELD = 8 << 20
+_LINKS = TypeAdapter(Annotated[list[LinkedFile], Field(max_length=10_000)])
 RevisionNumber = Annotated[int, Path(ge=1, le=1_000_000)]
 BINARY: dict[int | str, dict[str, Any]] = {
     200: {"content": {"application/octet-stream": {}}, "description": "The file"},
@@ -44,7 +48,10 @@ BINARY: dict[int | str, dict[str, Any]] = {
     416: {"description": "The file has no such range"},
 }
 UPLOAD = {
-    **document.refused("properties that are no JSON object, and a sha256 that is not that of the file"),
+    **document.refused(
+        "properties that are no JSON object, links that are no such list, "
+        "and a sha256 that is not that of the file"
+    ),
     "requestBody": {
         "required": True,
         "content": {
@@ -59,6 +66,17 @@ UPLOAD = {
                         "sha256": {
                             **document.SHA256,
                             "description": "of the file; another content is refused",
+                        },
+                        "base_revision": {
+                            "type": "integer",
+                            "minimum": 0,
+                            "maximum": 1_000_000,
+                            "description": "what the file was made from; 409 where a newer file is there",
+                        },
+                        "path": document.text(1000, description="where the file is in its project, with /"),
+                        "links": {
+                            "type": "string",
+                            "description": "a JSON list of the linked files: path, item (UUID), sha256",
                         },
                     },
                 }
@@ -90,11 +108,11 @@ def list_revisions(
 
 @router.get("/revisions/{number}", response_model=RevisionOut, responses=READ_ERRORS)
 def get_revision(server: ServerDep, caller: Viewer, part_number: str, number: RevisionNumber) -> Response:
-    """One revision."""
+    """One revision, with the files that its file links to."""
     with server.db.read(caller) as tx:
         item = items.get_item(tx, part_number)
         revision = revisions.get_revision(tx, item, number)
-    return json_answer(revision_to_wire(item.part_number, revision))
+    return json_answer(revision_to_wire(item.part_number, revision, links=True))
 
 
 @router.post("/revisions", status_code=201, response_model=RevisionOut, responses=WRITE_ERRORS)
@@ -103,7 +121,7 @@ def add_revision(server: ServerDep, caller: Editor, part_number: str, body: Revi
     with server.db.write(caller) as tx:
         item = items.get_item(tx, part_number, lock=True)
         revision = revisions.add_revision(tx, item, comment=body.comment, properties=body.properties)
-        return json_answer(revision_to_wire(item.part_number, revision), 201)
+        return json_answer(revision_to_wire(item.part_number, revision, links=True), 201)
 
 
 @router.post(
@@ -112,10 +130,11 @@ def add_revision(server: ServerDep, caller: Editor, part_number: str, body: Revi
 async def upload_file(server: ServerDep, caller: Editor, part_number: str, request: Request) -> Response:
     """Upload a file (form part ``file``, texts ``comment`` and ``properties``) as a new revision.
 
-    ``Idempotency-Key`` makes a repeat give the revision that the first request made.
+    ``Idempotency-Key`` makes a repeat give the revision that the first request made. With ``base_revision``
+    a file is refused (409 ``newer_revision``, with that revision) where somebody committed one since.
     The form is read here and not by a parameter, so that nobody without a role fills the disk.
     """
-    async with request.form(max_files=1, max_fields=20) as form:
+    async with request.form(max_files=1, max_fields=20, max_part_size=_MAX_FIELD) as form:
         file, comment, raw = form.get("file"), form.get("comment"), form.get("properties")
         sha256 = form.get("sha256")
         if not isinstance(file, UploadFile):
@@ -125,6 +144,9 @@ async def upload_file(server: ServerDep, caller: Editor, part_number: str, reque
         if sha256 is not None and not (isinstance(sha256, str) and re.fullmatch("[0-9A-Fa-f]{64}", sha256)):
             raise RejectedError("sha256: wanted 64 hexadecimal digits")
         properties = _properties(raw)
+        origin = Origin(
+            _base_revision(form.get("base_revision")), _path(form.get("path")), _links(form.get("links"))
+        )
         return await anyio.to_thread.run_sync(
             _store,
             server,
@@ -135,6 +157,7 @@ async def upload_file(server: ServerDep, caller: Editor, part_number: str, reque
             properties,
             _idempotency_key(request),
             (sha256 or "").lower(),
+            origin,
         )
 
 
@@ -161,14 +184,17 @@ def download_revision(
     response_class=Response,
     responses={**READ_ERRORS, 200: {"content": {"image/png": {}}, "description": "The picture"}},
 )
-def thumbnail(server: ServerDep, caller: Viewer, part_number: str) -> Response:
-    """The picture that came with the newest file that has one."""
+def thumbnail(
+    server: ServerDep, caller: Viewer, part_number: str, key: Annotated[str, Query(max_length=64)] = ""
+) -> Response:
+    """The picture that came with the newest file that has one. One asked for by its ``key`` may be kept."""
     with server.db.read(caller) as tx:
         item = items.get_item(tx, part_number)
     if not item.thumbnail_key:
         raise NotFoundError(f"item {item.part_number} has no thumbnail")
     path = server.files.path_of(item.thumbnail_key)
-    return FileResponse(path, media_type="image/png", headers={"Cache-Control": "private, max-age=300"})
+    kept = "max-age=31536000, immutable" if key and item.thumbnail_key.startswith(key) else "max-age=300"
+    return FileResponse(path, media_type="image/png", headers={"Cache-Control": f"private, {kept}"})
 
 
 def _store(
@@ -180,6 +206,7 @@ def _store(
     properties: dict[str, Any] | None,
     key: str | None,
     sha256: str,
+    origin: Origin,
 ) -> Response:
     with server.db.read(caller) as tx:
         items.get_item(tx, part_number)  # before anything is written to the disk
@@ -192,9 +219,15 @@ def _store(
         item = items.get_item(tx, part_number, lock=True)
         merged = None if properties is None else {**item.properties, **properties}
         revision = revisions.add_revision(
-            tx, item, comment=comment, properties=merged, file=stored, idempotency_key=key
+            tx,
+            item,
+            comment=comment,
+            properties=merged,
+            file=stored,
+            idempotency_key=key,
+            origin=origin,
         )
-        return json_answer(revision_to_wire(item.part_number, revision), 201)
+        return json_answer(revision_to_wire(item.part_number, revision, links=True), 201)
 
 
 def _idempotency_key(request: Request) -> str | None:
@@ -202,6 +235,37 @@ def _idempotency_key(request: Request) -> str | None:
     if key is not None and not 0 < len(key) <= 128:
         raise RejectedError("Idempotency-Key: wanted 1 to 128 characters")
     return key
+
+
+def _base_revision(raw: object) -> int | None:
+    if raw is None or raw == "":
+        return None
+    if not (isinstance(raw, str) and re.fullmatch("[0-9]{1,7}", raw) and int(raw) <= 1_000_000):
+        raise RejectedError("base_revision: wanted the number of a revision, or 0 where there was none")
+    return int(raw)
+
+
+def _path(raw: object) -> str | None:
+    if raw is None or raw == "":
+        return None
+    if not is_text(raw, 1000):
+        raise RejectedError("path: wanted a text of at most 1000 characters")
+    return str(raw)
+
+
+def _links(raw: object) -> list[dict[str, str]] | None:
+    if raw is None or raw == "":
+        return None
+    try:
+        found = _LINKS.validate_json(raw if isinstance(raw, str) else "")
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(map(str, first["loc"]))
+        wanted = "wanted a JSON list of path, item and sha256"
+        raise RejectedError(f"links: {wanted}; {where}: {first['msg']}") from None
+    if not all(is_text(link.path, 1000) and is_text(link.item, 64) for link in found):
+        raise RejectedError("links: wanted texts without the character NUL")
+    return [link.model_dump() for link in found]
 
 
 def _properties(raw: str | None) -> dict[str, Any] | None:

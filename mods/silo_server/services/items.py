@@ -46,6 +46,10 @@ class ItemQuery:
 
     search
         words, as :func:`silo_server.services.search.search_for` finds them.
+    sort
+        a key of :data:`SORTS`, with ``-`` before it the largest first; "": the best first.
+    archived
+        the archived items only.
     """
 
     search: str = ""
@@ -54,6 +58,18 @@ class ItemQuery:
     include_archived: bool = False
     limit: int = 100
     offset: int = 0
+    sort: str = ""
+    archived: bool = False
+
+
+# By the key, then by part number. Names sort by code point, on both databases, as their index does.
+SORTS: Mapping[str, Sequence[ColumnElement[Any]]] = {
+    "number": (items.c.part_number_key,),
+    "name": (items.c.name, items.c.part_number_key),
+    "type": (items.c.item_type, items.c.part_number_key),
+    "revision": (items.c.current_revision, items.c.part_number_key),
+    "changed": (items.c.updated_at, items.c.part_number_key),
+}
 
 
 def to_item(row: Any) -> Item:
@@ -136,12 +152,19 @@ def by_ids(tx: Tx, ids: Collection[int]) -> dict[int, Item]:
 
 def list_items(tx: Tx, query: ItemQuery) -> tuple[list[Item], int]:
     """A page of the items that match, best first, then by part number; and how many match in all."""
-    conditions: list[ColumnElement[bool]] = [] if query.include_archived else [items.c.archived_at.is_(None)]
-    order: list[ColumnElement[Any]] = [items.c.part_number_key]
+    conditions: list[ColumnElement[bool]] = []
+    if query.archived:
+        conditions.append(items.c.archived_at.is_not(None))
+    elif not query.include_archived:
+        conditions.append(items.c.archived_at.is_(None))
+    order: list[ColumnElement[Any]] = list(SORTS.get(query.sort.removeprefix("-"), SORTS["number"]))
+    if query.sort.startswith("-"):
+        order = [column.desc() for column in order]
     found = search_for(tx, query.search)
     if found is not None:
         conditions.append(found.condition)
-        order.insert(0, found.rank)
+        if not query.sort:
+            order.insert(0, found.rank)
     if query.item_type:
         conditions.append(items.c.item_type == query.item_type)
     if query.category:

@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy import Row, func, insert, select, update
 
-from silo.bom.errors import ConflictError, NotFoundError
+from silo.bom.errors import ConflictError, NewerRevisionError, NotFoundError
+from silo_server.clock import wire
 from silo_server.db.engine import Tx
 from silo_server.db.tables import items, revisions
 from silo_server.json_values import check_json, dumps, loads
@@ -28,6 +30,15 @@ class StoredFile:
     thumbnail_key: str | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """What the client says of a file: the revision that it was made from, its place, what it links to."""
+
+    base_revision: int | None = None
+    path: str | None = None
+    links: Sequence[Mapping[str, str]] | None = None
+
+
 def add_revision(
     tx: Tx,
     item: Item,
@@ -36,10 +47,12 @@ def add_revision(
     properties: Mapping[str, Any] | None = None,
     file: StoredFile | None = None,
     idempotency_key: str | None = None,
+    origin: Origin = Origin(),
 ) -> Revision:
     """Append a revision. Without ``properties`` it carries those of the one before on.
 
-    A repeat with the same ``idempotency_key`` gives the revision that the first one made.
+    A repeat with the same ``idempotency_key`` gives the revision that the first one made. A file that was
+    made from an older revision than the newest is refused (:class:`NewerRevisionError`).
 
     The caller holds the item's lock; the unique key on (item, number) guards the rest.
     """
@@ -49,6 +62,8 @@ def add_revision(
         earlier = _by_key(tx, item, idempotency_key, file)
         if earlier is not None:
             return earlier
+    if file is not None and origin.base_revision is not None:
+        check_base(tx, item, origin.base_revision, file.checksum)
     last = tx.conn.scalar(select(func.max(revisions.c.revision_number)).where(revisions.c.item_id == item.id))
     number = (last or 0) + 1
     snapshot = dict(item.properties) if properties is None else dict(properties)
@@ -66,6 +81,9 @@ def add_revision(
             idempotency_key=idempotency_key,
             created_at=tx.stamp,
             created_by=tx.actor.username,
+            base_revision=origin.base_revision,
+            file_path=origin.path,
+            links=None if origin.links is None else dumps([dict(link) for link in origin.links]),
         )
     )
     changed: dict[str, Any] = {"current_revision": number, "properties": dumps(snapshot)}
@@ -80,6 +98,21 @@ def add_revision(
     revision = get_revision(tx, item, number)
     events.revision_created(tx, item, revision)
     return revision
+
+
+def check_base(tx: Tx, item: Item, base: int, checksum: str | None = None) -> None:
+    """Raise :class:`NewerRevisionError` where a file was committed after ``base``.
+
+    A newer revision with this very ``checksum`` is no other file.
+    """
+    newest = _newest_file(tx, item)
+    if newest is None or newest.revision_number <= base or newest.file_checksum == checksum:
+        return
+    raise NewerRevisionError(
+        f"{newest.created_by} committed revision {newest.revision_number} of {item.part_number}, and this "
+        f"was made from revision {base}. Look at the newer one; it is the base_revision to send this on top",
+        revision_to_wire(item.part_number, newest),
+    )
 
 
 def list_revisions(
@@ -111,15 +144,20 @@ def get_revision(tx: Tx, item: Item, number: int) -> Revision:
 
 def newest_file(tx: Tx, item: Item) -> Revision:
     """The newest revision that has a file; NotFoundError where none has."""
+    newest = _newest_file(tx, item)
+    if newest is None:
+        raise NotFoundError(f"item {item.part_number} has no file yet")
+    return newest
+
+
+def _newest_file(tx: Tx, item: Item) -> Revision | None:
     row = tx.conn.execute(
         select(revisions)
         .where(revisions.c.item_id == item.id, revisions.c.file_checksum.is_not(None))
         .order_by(revisions.c.revision_number.desc())
         .limit(1)
     ).one_or_none()
-    if row is None:
-        raise NotFoundError(f"item {item.part_number} has no file yet")
-    return _to_revision(row)
+    return None if row is None else _to_revision(row)
 
 
 def items_with_file(tx: Tx, checksum: str) -> list[tuple[str, int]]:
@@ -159,4 +197,27 @@ def _to_revision(row: Row[Any]) -> Revision:
         thumbnail_key=row.thumbnail_key,
         created_at=row.created_at,
         created_by=row.created_by,
+        base_revision=row.base_revision,
+        file_path=row.file_path,
+        links=json.loads(row.links) if row.links else (),
     )
+
+
+def revision_to_wire(part_number: str, revision: Revision, *, links: bool = False) -> dict[str, Any]:
+    """A revision, under the contract's names; its links only where they are wanted, there may be many."""
+    told = {"links": [dict(link) for link in revision.links]} if links else {}
+    return told | {
+        "part_number": part_number,
+        "revision_number": revision.revision_number,
+        "comment": revision.comment,
+        "status": revision.status,
+        "properties": dict(revision.properties),
+        "file_name": revision.file_name,
+        "file_checksum": revision.file_checksum,
+        "file_size": revision.file_size,
+        "thumbnail_key": revision.thumbnail_key,
+        "created_at": wire(revision.created_at),
+        "created_by": revision.created_by,
+        "base_revision": revision.base_revision,
+        "file_path": revision.file_path,
+    }

@@ -3,42 +3,71 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Query, Request
+from fastapi import APIRouter, Depends, Query, Request
 from starlette.responses import Response
 
 from silo.bom.errors import ConflictError
 from silo_server.db.engine import Tx
 from silo_server.errors import TooLargeError
 from silo_server.routes.context import ServerDep
+from silo_server.schema.catalog import ITEM_TYPES
 from silo_server.services import revisions
 from silo_server.services.bom import rollup, tree
 from silo_server.services.bom.last_sync import in_sentences, last_sync
 from silo_server.services.bom.last_sync import marks as marks_of
 from silo_server.services.items import get_item
-from silo_server.values import Item, Line
+from silo_server.values import Item
 from silo_server.web.guard import Reader
-from silo_server.web.render import page
+from silo_server.web.render import page, segment
+from silo_server.web.structure import Structure, Wanted, flat_page, level_counts, tree_page, usual_depth
+from silo_server.web.tables import Address
 
 router = APIRouter(include_in_schema=False)
 
-# A tree with more lines than this helps nobody; it is shown less deep, and the exports have all of it.
-MOST_LINES = 2000
-MOST_ROWS = 5000
 MOST_USES = 200
+MOST_PIECES = 1_000_000
 
 
-@dataclass
-class Node:
-    """A line of the tree with what lies below it."""
+@dataclass(frozen=True)
+class Look:
+    """The part of the address that says how the BOM is shown."""
 
-    line: Line
-    total: tree.Exact
-    mark: str = ""
-    below: list[Node] = field(default_factory=list)
+    view: Annotated[str, Query(max_length=10)] = "tree"
+    q: Annotated[str, Query(max_length=200)] = ""
+    type: Annotated[str, Query(max_length=20)] = ""
+    sort: Annotated[str, Query(max_length=20)] = ""
+    page: Annotated[int, Query(ge=1, le=10**9)] = 1
+    depth: Annotated[int, Query(ge=0, le=tree.MAX_DEPTH)] = 0
+    flip: Annotated[str, Query(max_length=20_000)] = ""
+    pieces: Annotated[int, Query(ge=1, le=MOST_PIECES)] = 1
+
+    @property
+    def is_flat(self) -> bool:
+        return self.view == "flat"
+
+    @property
+    def wanted(self) -> Wanted:
+        """The same for the tables."""
+        flipped = frozenset(filter(None, self.flip.split(",")))
+        return Wanted(self.q, self.type, self.sort, self.page, self.depth, flipped, self.pieces)
+
+    def address(self, path: str) -> Address:
+        """The page with this view."""
+        usual = {"view": "tree", "page": 1, "depth": 0, "pieces": 1}
+        names = ("view", "q", "type", "sort", "page", "depth", "flip", "pieces")
+        values = {name: getattr(self, name) for name in names}
+        return Address(path, {n: str(v) for n, v in values.items() if v not in ("", usual.get(n))})
+
+    def flipped(self, key: str) -> str:
+        """``flip`` where this branch is the other way round."""
+        keys = list(dict.fromkeys(filter(None, self.flip.split(","))))
+        return ",".join(one for one in keys if one != key) if key in keys else ",".join([*keys, key])
+
+
+Asked = Annotated[Look, Depends()]
 
 
 @router.get("/items/{part_number}")
@@ -47,7 +76,7 @@ def item_page(
     server: ServerDep,
     caller: Reader,
     part_number: str,
-    view: Annotated[str, Query(max_length=10)] = "tree",
+    look: Asked,
     used_from: Annotated[int, Query(ge=0, le=10_000_000)] = 0,
     revisions_before: Annotated[int, Query(ge=1, le=2**31 - 1)] = 2**31 - 1,
 ) -> Response:
@@ -57,7 +86,7 @@ def item_page(
     """
     with server.db.read(caller) as tx:
         item = get_item(tx, part_number, include_archived=True)
-        shown = _structure(tx, item, flat=view == "flat")
+        shown = structure_of(tx, item, look)
         history, revision_count = revisions.list_revisions(tx, item, before=revisions_before)
         used, uses = tree.where_used(tx, item, indirect=True, limit=MOST_USES, offset=used_from)
     return page(
@@ -65,7 +94,9 @@ def item_page(
         "item.html",
         caller,
         item=item,
-        view="flat" if view == "flat" else "tree",
+        look=look,
+        at=look.address(f"/items/{segment(item.part_number)}"),
+        types=ITEM_TYPES,
         revisions=history,
         revision_count=revision_count,
         used=used,
@@ -76,54 +107,24 @@ def item_page(
     )
 
 
-def _structure(tx: Tx, item: Item, *, flat: bool) -> dict[str, Any]:
+def structure_of(tx: Tx, item: Item, look: Look) -> dict[str, Any]:
+    """What the templates of a BOM over all levels show: table, totals, what the last sync left out."""
     graph = tree.load_graph(tx, item)
     last, marks = last_sync(tx, item), marks_of(tx, graph)
     values: dict[str, Any] = {"last": last, "gaps": in_sentences(last.gaps), "marks": marks}
-    values |= {"problem": "", "nodes": [], "levels": 0, "rows": [], "cost": None, "mass": None}
+    values |= {"problem": "", "table": None, "above": (), "levels": 0, "depth": 0, "cost": None, "mass": None}
     if item.id not in graph.lines:
         return values
+    counts = level_counts(graph)
+    depth = look.depth or usual_depth(counts)
+    values |= {"levels": len(counts), "occurrences": sum(counts), "depth": depth}
     try:
         parts = rollup.parts_of(tx, graph)
-        cost, mass = rollup.roll_up_cost(graph, parts), rollup.roll_up_mass(graph, parts)
-    except ConflictError as error:
+        values |= {"cost": rollup.roll_up_cost(graph, parts), "mass": rollup.roll_up_mass(graph, parts)}
+        shown = Structure(graph, parts, rollup.worths(graph, parts), marks)
+        if look.is_flat:
+            return values | {"table": flat_page(shown, look.wanted)}
+        table, above = tree_page(shown, replace(look.wanted, depth=depth), sum(counts))
+        return values | {"table": table, "above": above}
+    except (ConflictError, TooLargeError) as error:
         return {**values, "problem": str(error)}
-    values |= {"cost": cost, "mass": mass}
-    if flat:
-        return values | {"rows": _flat_rows(graph, cost, mass)}
-    rows, levels = _deepest(graph)
-    return values | {"nodes": nested(rows, marks), "levels": levels}
-
-
-def _deepest(graph: tree.Graph) -> tuple[Sequence[tree.Occurrence], int]:
-    """As much of the tree as a page can show, and down to which level (0 = all of it)."""
-    for depth in (tree.MAX_DEPTH, 4, 3, 2):
-        try:
-            rows = tree.expand(graph, depth, MOST_LINES)
-        except TooLargeError:
-            continue
-        return rows, 0 if depth == tree.MAX_DEPTH else depth
-    return tree.expand(graph, 1, 10**9)[:MOST_LINES], 1
-
-
-def _flat_rows(
-    graph: tree.Graph, cost: rollup.CostRollup, mass: rollup.MassRollup
-) -> list[tuple[tree.FlatRow, rollup.CostRow | None, rollup.MassRow | None]]:
-    costs = {row.part_number: row for row in cost.rows}
-    masses = {row.part_number: row for row in mass.rows}
-    return [
-        (row, costs.get(row.line.child_part_number), masses.get(row.line.child_part_number))
-        for row in tree.flatten(graph)[:MOST_ROWS]
-    ]
-
-
-def nested(rows: Sequence[tree.Occurrence], marks: Mapping[int, str] | None = None) -> list[Node]:
-    """The rows of an expanded BOM (parents before children) as a tree; ``marks`` by item id."""
-    top: list[Node] = []
-    stack: list[list[Node]] = [top]
-    for row in rows:
-        del stack[row.depth :]
-        node = Node(row.line, row.total, (marks or {}).get(row.line.child_id, ""))
-        stack[-1].append(node)
-        stack.append(node.below)
-    return top

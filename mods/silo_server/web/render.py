@@ -18,7 +18,7 @@ from starlette.responses import HTMLResponse, Response
 from silo.bom.numbers import as_decimal
 from silo_server.clock import wire
 from silo_server.db.engine import mode_of
-from silo_server.routes.context import server_of
+from silo_server.routes.context import masked, server_of
 from silo_server.values import Actor, Role
 
 NOTICE_COOKIE = "silo_notice"
@@ -177,7 +177,7 @@ def page(
         is_admin=actor is not None and actor.role.covers(Role.ADMIN),
         closed=closed,
         off=SWITCHED_OFF if closed else "",
-        csrf=(actor.csrf_token or "") if actor is not None else "",
+        csrf=masked(actor.csrf_token) if actor is not None and actor.csrf_token else "",
         here=request.url.path,
         notice=notice,
         **values,

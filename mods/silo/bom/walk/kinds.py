@@ -140,7 +140,9 @@ def _standard_kind(obj: object) -> Kind | None:
 
 def sources(repeater: object) -> list[Any]:
     """The objects that an array, a compound or a copy shows."""
-    for name in ("Base", "Links", "Objects", "Source"):
+    # A mirror image has a Base too: the point that its plane goes through.
+    names = ("Source",) if derived(repeater, "Part::Mirroring") else ("Base", "Links", "Objects", "Source")
+    for name in names:
         if (found := own(repeater, name)) is not None:
             several = found if isinstance(found, list) or name in ("Links", "Objects") else (found,)
             return [source for one in several if (source := first_of(one)) is not None]

@@ -38,6 +38,7 @@ from silo_server.services.bom.last_sync import LastSync, last_sync, remember
 from silo_server.services.bom.lines import lines_of
 from silo_server.services.bom.merge_json import MergeOrder, answer_of, event_of
 from silo_server.services.items import get_item
+from silo_server.services.revisions import check_base
 from silo_server.values import Item, Line, LineState, number
 
 
@@ -74,13 +75,17 @@ def merge_bom(tx: Tx, part_number: str, order: MergeOrder, expected: int | None)
     """Merge the assembly's direct children into the BOM.
 
     Raises NotFoundError (parent), RejectedError (all bad entries at once), CycleError, VersionConflictError,
-    ConflictError (the ``sync_id`` was used for something else).
+    ConflictError (the ``sync_id`` was used for something else), NewerRevisionError (the document is not the
+    item's newest file).
     """
     parent = get_item(tx, part_number, lock=True)
     earlier = _replay(tx, parent, order)
     if earlier is not None:
         return earlier
     check_version(parent, expected)
+    if order.document_revision is not None:
+        # The BOM of an older file that comes late would undo that of the newer one.
+        check_base(tx, parent, order.document_revision, order.document_sha256)
     prepared = _prepare(tx, parent, order)
     changes = _line_changes(tx, prepared)
     change_id, version = apply_changes(tx, parent, changes, _note(prepared, order))

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 from sqlalchemy import select
 
-from silo.bom.numbers import exact_product, exact_sum, read_number
+from silo.bom.numbers import as_decimal, exact_product, exact_sum, read_number
 from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import items
@@ -76,18 +76,70 @@ class Part(NamedTuple):
     part_number: str
     name: str
     properties: Mapping[str, Any]
+    thumbnail_key: str | None = None
+
+
+class Worth(NamedTuple):
+    """What one piece of an item weighs [kg] and costs, per currency; of an assembly, all that is in it.
+
+    ``whole``: nothing that belongs to it is without a value.
+    """
+
+    mass: Decimal | None
+    mass_whole: bool
+    costs: Mapping[str, Decimal]
+    cost_whole: bool
 
 
 def parts_of(tx: Tx, graph: Graph) -> dict[int, Part]:
     """Everything in the graph, by internal id, read once for both roll-ups."""
     children = {line.child_id for below in graph.lines.values() for line in below}
     rows = tx.conn.execute(
-        select(items.c.id, items.c.part_number, items.c.name, items.c.properties).where(
-            one_of(tx, items.c.id, children)
-        )
+        select(
+            items.c.id, items.c.part_number, items.c.name, items.c.properties, items.c.thumbnail_key
+        ).where(one_of(tx, items.c.id, children))
     )
-    parts = {row[0]: Part(row[1], row[2], loads(row[3])) for row in rows}
-    return {**parts, graph.root.id: Part(graph.root.part_number, graph.root.name, graph.root.properties)}
+    parts = {row[0]: Part(row[1], row[2], loads(row[3]), row[4]) for row in rows}
+    root = graph.root
+    own = Part(root.part_number, root.name, root.properties, root.thumbnail_key)
+    return {**parts, root.id: own}
+
+
+def worths(graph: Graph, parts: Mapping[int, Part]) -> dict[int, Worth]:
+    """What each item of the graph is worth, by internal id, by the rules of the roll-ups below."""
+    order = order_of(graph)
+    found = {item_id: _own_worth(part.properties) for item_id, part in parts.items()}
+    for item_id in reversed(order):  # children before parents
+        below = [(line, found[line.child_id]) for line in graph.components(item_id)]
+        if below:
+            found[item_id] = _sum_of(below, found[item_id], is_root=item_id == graph.root.id)
+    return found
+
+
+def _own_worth(properties: Mapping[str, Any]) -> Worth:
+    mass, cost = (positive_number(properties, name) for name in ("mass_kg", "standard_cost"))
+    costs = {currency_of(properties): as_decimal(cost)} if cost is not None else {}
+    return Worth(None if mass is None else as_decimal(mass), mass is not None, costs, bool(costs))
+
+
+def _sum_of(below: Sequence[tuple[Line, Worth]], own: Worth, *, is_root: bool) -> Worth:
+    mass: Decimal | None = None
+    costs: dict[str, Decimal] = {}
+    for line, worth in below:
+        quantity = as_decimal(line.state.quantity)
+        if worth.mass is not None:
+            mass = exact_sum((mass or Decimal(0), exact_product((quantity, worth.mass))))
+        for currency, cost in worth.costs.items():
+            costs[currency] = exact_sum((costs.get(currency, Decimal(0)), exact_product((quantity, cost))))
+    mass_whole = all(worth.mass_whole for _, worth in below)
+    if not mass_whole and own.mass is not None and not is_root:
+        mass, mass_whole = own.mass, True
+    return Worth(mass, mass_whole, costs, all(worth.cost_whole for _, worth in below))
+
+
+def currency_of(properties: Mapping[str, Any]) -> str:
+    """The currency of an item's cost."""
+    return str(properties.get("currency") or DEFAULT_CURRENCY)
 
 
 def roll_up_cost(graph: Graph, parts: Mapping[int, Part]) -> CostRollup:
@@ -97,7 +149,7 @@ def roll_up_cost(graph: Graph, parts: Mapping[int, Part]) -> CostRollup:
     for row in flat:
         item = parts[row.line.child_id]
         cost = positive_number(item.properties, "standard_cost")
-        currency = str(item.properties.get("currency") or DEFAULT_CURRENCY) if cost is not None else None
+        currency = currency_of(item.properties) if cost is not None else None
         total = exact_product((cost, row.total)) if cost is not None else None
         if total is None or currency is None:
             missing.append(item.part_number)

@@ -1,0 +1,491 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What was found out about FreeCAD files, kept in one SQLite file until a file says something else.
+
+The index is a memory of answers. An answer is a value computed from files; with it stands its trail: every
+file that was read for it, by content, and every path of a link that was followed, with where it led. An
+answer is given again only where all of its trail is true today. So whatever happens to the vault or to the
+index, the worst is that something is computed once more.
+
+The rules of this module:
+
+* a file is unchanged where size, inode, time of modification and time of change are those of the look that
+  read it, and both times lie well before that look: a file system's clock has ticks, and two changes in one
+  tick look like one. Else its content is compared;
+* content is the packed ``Document.xml`` with the container's directory, which has a checksum of every entry;
+* a row has a checksum; a row that fails it is not there;
+* code that reads otherwise asks under another name (``ENGINE``), so an update never meets old answers;
+* a database that is damaged or of another format is made anew; one that cannot be written is left alone, and
+  the answers live in memory. Nothing here makes a run fail.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import sqlite3
+import time
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from functools import cache
+from hashlib import blake2b, sha256
+from pathlib import Path
+from typing import Any, BinaryIO, NamedTuple
+
+import silo.bom
+import silo.fcstd
+from silo.bom.errors import InputError
+from silo.durable import remove_patiently
+from silo.fcstd.container import FileState
+from silo.fcstd.library import Content, Contents, Library
+from silo.fcstd.locate import Found, Locator, NotFound
+from silo.fcstd.problem import FcstdError
+from silo.folders import cache_folder
+from silo.platform import hold_lock
+
+log = logging.getLogger("silo.vault")
+
+FORMAT = 1
+_APPLICATION = 0x51107A11  # marks our databases (SQLite's application_id)
+_MAGIC = b"SQLite format 3\0"
+_SETTLED_NS = 2_500_000_000  # FAT has ticks of 2 s, the coarsest in use
+_KEPT_S = 30 * 24 * 3600.0
+_BUSY_S = 10.0
+_SAVED_EACH = 500
+
+_TABLES = """
+CREATE TABLE files (path TEXT PRIMARY KEY, seen TEXT NOT NULL, mark BLOB NOT NULL) WITHOUT ROWID;
+CREATE TABLE answers (
+    path TEXT NOT NULL, question TEXT NOT NULL, answer TEXT NOT NULL, trail TEXT NOT NULL,
+    made_at REAL NOT NULL, mark BLOB NOT NULL, PRIMARY KEY (path, question)
+);
+CREATE TABLE places (vault TEXT, uuid TEXT, path TEXT, PRIMARY KEY (vault, uuid, path)) WITHOUT ROWID;
+"""
+
+
+def default_path() -> Path:
+    """The user's index."""
+    return cache_folder() / "documents.sqlite3"
+
+
+@cache
+def engine() -> str:
+    """A name for the code that reads documents: another one where any of it differs."""
+    digest = sha256(f"{FORMAT}".encode())
+    for package in (silo.bom, silo.fcstd):
+        for folder in package.__path__:
+            for file in sorted(Path(folder).rglob("*.py")):
+                digest.update(file.name.encode() + b"\0" + file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+class Seen(NamedTuple):
+    """A file at the time of a look. ``content`` begins with "!" for a file that could not be read."""
+
+    content: str
+    inode: int
+    size: int
+    modified_ns: int
+    changed_ns: int
+    read_ns: int
+
+    @classmethod
+    def of(cls, content: Content) -> Seen:
+        """What was read."""
+        state = content.state
+        return cls(
+            content.digest,
+            state.inode,
+            state.size,
+            state.modified_ns,
+            content.changed_ns,
+            content.read_ns,
+        )
+
+    def still(self, status: os.stat_result) -> bool:
+        """True where the file certainly is what it was then."""
+        then = (self.inode, self.size, self.modified_ns, self.changed_ns)
+        now = (status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns)
+        return then == now and max(self.modified_ns, self.changed_ns) + _SETTLED_NS < self.read_ns
+
+
+class Known(NamedTuple):
+    """An answer with its trail; it travels between processes and machines.
+
+    answer
+        JSON.
+    trail
+        JSON: [{path: content}, [[folders in which links' paths begin, {recorded path: where it leads}], …]].
+    seen
+        path → the file when it was read; empty where the answer comes from the index.
+    lasting
+        False where the answer must not be kept: a file was being written, or its state is not known.
+    """
+
+    answer: str
+    trail: str
+    seen: Mapping[str, Seen] = {}
+    lasting: bool = True
+
+    @classmethod
+    def found_in(cls, library: Library, answer: Any) -> Known:
+        """An answer that was found in a session which did nothing else."""
+        seen: dict[str, Seen] = {}
+        lasting = True
+        for path, document in library.documents.items():
+            if not isinstance(document, FcstdError):
+                seen[path] = Seen.of(document.content)
+            elif isinstance(document.state, FileState):
+                seen[path] = Seen(_unread(document, document.state), 0, 0, 0, 0, 0)
+            else:
+                lasting = False
+        led: dict[tuple[str, ...], dict[str, str]] = {}
+        for (folders, recorded), found in library.lookups.items():
+            led.setdefault(folders, {})[recorded] = _led_to(found)
+        files = {path: one.content for path, one in seen.items()}
+        return cls(_json(answer), _json([files, list(led.items())]), seen, lasting)
+
+    @property
+    def links(self) -> frozenset[str]:
+        """The files that links lead to, counted or not."""
+        files, lookups = json.loads(self.trail)
+        found = (_target(to) for _, led in lookups for to in led.values())
+        return frozenset(filter(None, found)) - {next(iter(files), "")}
+
+
+def _unread(error: FcstdError, state: FileState) -> str:
+    # Not the content, which could not be read, but the state; so any change of it counts.
+    return f"!{state.inode}:{state.size}:{state.modified_ns}:{error.reason}"
+
+
+def _led_to(found: Found | NotFound) -> str:
+    if isinstance(found, NotFound):
+        return f"!{found.code}:{found.detail}"
+    if found.opened == found.real and not found.respelt:
+        return found.real
+    return f"{found.opened}\0{found.real}\0{found.respelt}"
+
+
+def _target(led: str) -> str | None:
+    return None if led.startswith("!") else (led.split("\0") * 2)[1]
+
+
+def _json(value: Any) -> str:
+    # Escaped: a file's name need not be valid Unicode, and SQLite takes nothing else.
+    return json.dumps(value, separators=(",", ":"))
+
+
+def _mark(*texts: str) -> bytes:
+    return blake2b("\0".join(texts).encode("utf-8", "surrogateescape"), digest_size=8).digest()
+
+
+class Index:
+    """The memory, for one run: a file that was looked at once is not looked at again. For one thread.
+
+    path
+        the database, which several processes may use; None keeps nothing beyond this object's life.
+    given
+        the user named this path: a file that is no index of ours is not touched (InputError).
+    """
+
+    def __init__(self, path: Path | None = None, *, given: bool = False) -> None:
+        self.path = path
+        self.trouble = ""
+        self.contents = Contents()
+        self._now: dict[str, str | None] = {}
+        self._led: dict[tuple[tuple[str, ...], str], str] = {}
+        self._locator = Locator()
+        self._unsaved: dict[tuple[str, str], Known] = {}
+        self._files: dict[str, Seen] = {}
+        self._rows: dict[str, tuple[str, bytes]] = {}
+        self._expected = ""
+        self._guard: BinaryIO | None = None
+        self._writes = True
+        self._database = _empty()
+        if path is not None:
+            self._open(path, given)
+
+    def __enter__(self) -> Index:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Save, and let others rebuild the database."""
+        self.save()
+        self._database.close()
+        if self._guard is not None:
+            self._guard.close()
+
+    # --- answers ----------------------------------------------------------------------------------------
+
+    def recall(self, path: str, question: str) -> Known | None:
+        """The answer to a question about a file; None where it must be found out (again)."""
+        known = self._unsaved.get((path, question)) or self._row(path, question)
+        if known is None:
+            return None
+        files, lookups = json.loads(known.trail)
+        if not all(self.content(file) == content for file, content in files.items()):
+            return None
+        for folders, led in lookups:
+            start = tuple(folders)
+            if any(self._leads(start, recorded) != to for recorded, to in led.items()):
+                return None
+        return known
+
+    def _row(self, path: str, question: str) -> Known | None:
+        rows = self._select(
+            "SELECT answer, trail, mark FROM answers WHERE path = ? AND question = ?", _text(path), question
+        )
+        found = rows[0] if rows else None
+        if found is None or found[2] != _mark(path, question, found[0], found[1]):
+            return None
+        return Known(found[0], found[1])
+
+    def remember(self, path: str, question: str, known: Known) -> None:
+        """Keep an answer; on disk with the next :meth:`save`."""
+        if not known.lasting:
+            return
+        for file, seen in known.seen.items():
+            if self._now.get(file) != seen.content:
+                self._now[file] = seen.content
+                self._files[file] = seen
+        self._unsaved[path, question] = Known(known.answer, known.trail)
+        if len(self._unsaved) >= _SAVED_EACH:
+            self.save()
+
+    def content(self, path: str) -> str | None:
+        """What a file holds now, as the trails name it; None where nobody can say."""
+        if path in self._now:
+            return self._now[path]
+        self._now[path] = content = self._content(path)
+        return content
+
+    def _content(self, path: str) -> str | None:
+        try:
+            status = os.stat(path)
+        except (OSError, ValueError):
+            return None
+        known = self._known_file(path)
+        if known is not None and known.still(status):
+            return known.content
+        try:
+            seen = Seen.of(self.contents.read(path))
+        except FcstdError as error:
+            return _unread(error, error.state) if isinstance(error.state, FileState) else None
+        self._files[path] = seen
+        return seen.content
+
+    def _leads(self, folders: tuple[str, ...], recorded: str) -> str:
+        key = (folders, recorded)
+        if (known := self._led.get(key)) is None:
+            known = self._led[key] = _led_to(self._locator.find(recorded, folders))
+        return known
+
+    # --- where items were -------------------------------------------------------------------------------
+
+    def places(self, vault: str) -> dict[str, set[str]]:
+        """Identity → files that carried it when the vault was last read."""
+        found: dict[str, set[str]] = {}
+        for uuid, path in self._select("SELECT uuid, path FROM places WHERE vault = ?", _text(vault)):
+            found.setdefault(uuid, set()).add(path)
+        return found
+
+    def keep_places(self, vault: str, places: Iterable[tuple[str, str]]) -> None:
+        """Replace what is known of a vault."""
+        rows = [(_text(vault), uuid, _text(path)) for uuid, path in set(places)]
+        self._write(
+            ("DELETE FROM places WHERE vault = ?", [(_text(vault),)]),
+            ("INSERT OR REPLACE INTO places VALUES (?, ?, ?)", rows),
+        )
+
+    def forget(self, folder: str, but: Collection[str]) -> None:
+        """Forget the files of a folder but these, and what older code has found out."""
+        rows = self._select("SELECT path FROM files WHERE path >= ? AND path < ?", *_below(folder))
+        gone = [path for (path,) in rows if path not in but]
+        self._write(
+            ("DELETE FROM files WHERE path = ?", [(path,) for path in gone]),
+            ("DELETE FROM answers WHERE path = ?", [(path,) for path in gone]),
+            (
+                "DELETE FROM answers WHERE made_at < ? AND substr(question, 1, 16) <> ?",
+                [(time.time() - _KEPT_S, engine())],
+            ),
+        )
+
+    # --- the database -----------------------------------------------------------------------------------
+
+    def save(self) -> None:
+        """Write what is not yet on disk, all or nothing."""
+        if not self._writes or not (self._unsaved or self._files):
+            return
+        now = time.time()
+        files = [
+            (_text(path), text, _mark(path, text))
+            for path, text in ((path, _json(seen)) for path, seen in self._files.items())
+        ]
+        answers = [
+            (_text(path), question, one.answer, one.trail, now, _mark(path, question, one.answer, one.trail))
+            for (path, question), one in self._unsaved.items()
+        ]
+        if self._write(
+            ("INSERT OR REPLACE INTO files VALUES (?, ?, ?)", files),
+            ("INSERT OR REPLACE INTO answers VALUES (?, ?, ?, ?, ?, ?)", answers),
+        ):
+            self._files.clear()
+            self._unsaved.clear()
+
+    def _known_file(self, path: str) -> Seen | None:
+        if path in self._files:
+            return self._files[path]
+        row = self._rows.get(path)
+        if row is None and not self._all_below(path):
+            found = self._select("SELECT path, seen, mark FROM files WHERE path = ?", _text(path))
+            row = found[0][1:] if found else None
+        return Seen(*json.loads(row[0])) if row is not None and row[1] == _mark(path, row[0]) else None
+
+    def expect(self, folder: str) -> None:
+        """Load what is known of all files below a folder, since most will be asked for."""
+        self._expected = os.path.join(folder, "")
+        found = self._select(
+            "SELECT path, seen, mark FROM files WHERE path >= ? AND path < ?", *_below(folder)
+        )
+        self._rows = {path: (seen, mark) for path, seen, mark in found}
+
+    def _all_below(self, path: str) -> bool:
+        return bool(self._expected) and path.startswith(self._expected) and path == _text(path)
+
+    def _select(self, statement: str, *values: str) -> list[Any]:
+        try:
+            return self._database.execute(statement, values).fetchall()
+        except sqlite3.Error as error:
+            self._give_up(error)
+            return []
+
+    def _write(self, *changes: tuple[str, Sequence[tuple[Any, ...]]]) -> bool:
+        if not self._writes:
+            return False
+        try:
+            self._database.execute("BEGIN IMMEDIATE")
+            try:
+                for statement, rows in changes:
+                    self._database.executemany(statement, rows)
+                self._database.execute("COMMIT")
+            except BaseException:
+                if self._database.in_transaction:
+                    self._database.execute("ROLLBACK")
+                raise
+        except sqlite3.Error as error:
+            self._give_up(error)
+            return False
+        return True
+
+    def _open(self, path: Path, given: bool) -> None:
+        try:
+            if given and not _may_replace(path):
+                raise InputError(f"{path} is no index of silo-mod and is not touched. Name another file.")
+            path.parent.mkdir(parents=True, exist_ok=True)
+            for attempt in range(2):
+                self._guard = hold_lock(f"{path}.lock", shared=True)
+                if self._guard is None:
+                    self.trouble = f"the index {path} is being made anew by another process"
+                    return
+                try:
+                    database = _connected(path)
+                    self._database.close()
+                    self._database = database
+                    return
+                except _Unusable as error:
+                    log.info("%s: %s; it is made anew", path, error)
+                    self._guard.close()
+                    if attempt or not _removed(path):
+                        self.trouble = f"the index {path} cannot be used ({error})"
+                        return
+        except (OSError, sqlite3.Error) as error:
+            self._give_up(error)
+
+    def _give_up(self, error: sqlite3.Error | OSError) -> None:
+        """The database fails: what it holds is read as long as it can be, and nothing is written any more."""
+        if not self.trouble:
+            self.trouble = f"the index {self.path} cannot be used ({error}); nothing is lost but time"
+            log.warning("%s", self.trouble)
+        self._writes = False
+        if isinstance(error, sqlite3.DatabaseError) and not isinstance(error, sqlite3.OperationalError):
+            self._database.close()
+            self._database = _empty()
+            if self._guard is not None and self.path is not None:
+                self._guard.close()
+                self._guard = None
+                _removed(self.path)
+
+
+def _empty() -> sqlite3.Connection:
+    """A database of this process alone, on disk where it grows large."""
+    database = sqlite3.connect("", isolation_level=None)
+    database.executescript(_TABLES)
+    return database
+
+
+class _Unusable(Exception):
+    """The file is no database that this code can use."""
+
+
+def _connected(path: Path) -> sqlite3.Connection:
+    """An open database of our format. Raises _Unusable, sqlite3.OperationalError (locked, full, no right)."""
+    database = sqlite3.connect(path, timeout=_BUSY_S, isolation_level=None)
+    try:
+        database.execute("PRAGMA synchronous = NORMAL")
+        database.execute("BEGIN IMMEDIATE")
+        (application,) = database.execute("PRAGMA application_id").fetchone()
+        (version,) = database.execute("PRAGMA user_version").fetchone()
+        (tables,) = database.execute("SELECT count(*) FROM sqlite_master").fetchone()
+        if (application, version) == (0, 0) and not tables:
+            for statement in _TABLES.split(";"):
+                database.execute(statement)
+            database.execute(f"PRAGMA application_id = {_APPLICATION}")
+            database.execute(f"PRAGMA user_version = {FORMAT}")
+        elif (application, version) != (_APPLICATION, FORMAT):
+            raise _Unusable(f"it has format {version}, wanted is {FORMAT}")
+        database.execute("COMMIT")
+        return database
+    except sqlite3.OperationalError:
+        database.close()
+        raise
+    except sqlite3.DatabaseError as error:
+        database.close()
+        raise _Unusable(str(error)) from error
+    except _Unusable:
+        database.close()
+        raise
+
+
+def _removed(path: Path) -> bool:
+    """Delete a database that nobody has open; True where it is gone."""
+    guard = hold_lock(f"{path}.lock")
+    if guard is None:
+        return False
+    with guard:
+        for name in (path, f"{path}-journal", f"{path}-wal", f"{path}-shm"):
+            remove_patiently(name)
+    return True
+
+
+def _may_replace(path: Path) -> bool:
+    """True for a path where nothing is, and for a database of ours, however damaged behind its head."""
+    try:
+        with path.open("rb") as file:
+            head = file.read(72)
+    except FileNotFoundError:
+        return True
+    ours = head.startswith(_MAGIC) and head[68:72] == _APPLICATION.to_bytes(4, "big")
+    return ours or not head
+
+
+def _below(folder: str) -> tuple[str, str]:
+    """Between these lie the paths below a folder, in the order of the database."""
+    begin = _text(os.path.join(folder, ""))
+    return begin, begin[:-1] + chr(ord(os.sep) + 1)
+
+
+def _text(path: str) -> str:
+    # SQLite takes valid Unicode only. Two names may become one here; the marks tell their rows apart.
+    return path.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
