@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from silo.inertia.geometry.exact.quadrature import Curve, Face, Floats, Surface
-from silo.inertia.geometry.exact.surfaces import Asked, Basis, Elementary, Nurbs
+from silo.inertia.geometry.exact.surfaces import Asked, Basis, Elementary, Nurbs, Turned
 
 _ELEMENTARY = {
     "Plane": (Basis.LINEAR, Basis.LINEAR),
@@ -113,8 +113,8 @@ def _surface(face: Any) -> Surface:
     return Asked(_asker(face), np.linspace(u_low, u_high, 5))
 
 
-def _forms(surface: Any, kind: str, face: Any, value: Value) -> Iterator[Nurbs | Elementary]:
-    u_range = tuple(face.ParameterRange[:2])
+def _forms(surface: Any, kind: str, face: Any, value: Value) -> Iterator[Surface]:
+    u_range, v_range = tuple(face.ParameterRange[:2]), tuple(face.ParameterRange[2:])
     if kind in _ELEMENTARY:
         yield Elementary.sampled(*_ELEMENTARY[kind], value, u_range)
     elif kind in ("BSplineSurface", "BezierSurface"):
@@ -122,7 +122,7 @@ def _forms(surface: Any, kind: str, face: Any, value: Value) -> Iterator[Nurbs |
             surface = surface.toBSpline()
         if surface.NbUPoles == surface.NbVPoles == 2:
             yield Elementary.sampled(Basis.LINEAR, Basis.LINEAR, value, u_range)
-        yield _nurbs(surface)
+        yield _nurbs(surface, u_range, v_range)
     elif kind in ("SurfaceOfExtrusion", "SurfaceOfRevolution"):
         curve = surface.BasisCurve
         extruded = kind == "SurfaceOfExtrusion"
@@ -131,9 +131,11 @@ def _forms(surface: Any, kind: str, face: Any, value: Value) -> Iterator[Nurbs |
         along = Basis.LINEAR if type(curve).__name__ in ("Line", "LineSegment") else Basis.CIRCULAR
         bases = (along, Basis.LINEAR) if extruded else (Basis.CIRCULAR, along)
         yield Elementary.sampled(*bases, value, u_range)
+        if not extruded:
+            yield Turned(_asker(face), u_range)
 
 
-def _same(form: Nurbs | Elementary, value: Value, u: float, v: float, size: float) -> bool:
+def _same(form: Surface, value: Value, u: float, v: float, size: float) -> bool:
     ours = form.at(np.array([[u]]), np.array([v]))[0][0, 0]
     return bool(np.abs(ours - value(u, v)).max() <= SAME * size)
 
@@ -162,35 +164,29 @@ def _extruded(curve: Any, face: Any, value: Value) -> Nurbs:
     """A spline drawn along a straight line: a spline surface of degree 1 in that direction."""
     if type(curve).__name__ == "BezierCurve":
         curve = curve.toBSpline()
-    curve = curve.copy()
-    if curve.isPeriodic():
+    curve, periodic = curve.copy(), curve.isPeriodic()
+    if periodic:
         curve.setNotPeriodic()
-    u_low, _, v_low, v_high = face.ParameterRange
+    u_low, u_high, v_low, v_high = face.ParameterRange
     along = np.subtract(value(u_low, v_high), value(u_low, v_low)) / (v_high - v_low)
-    # The curve itself is at v = 0.
     poles = np.array([tuple(pole) for pole in curve.getPoles()], dtype=np.float64)
-    both = np.stack([poles + along * v_low, poles + along * v_high], axis=1)
     weights = np.array(curve.getWeights(), dtype=np.float64) if curve.isRational() else None
-    return Nurbs(
-        both,
-        np.stack([weights, weights], axis=1) if weights is not None else None,
-        np.array(curve.KnotSequence, dtype=np.float64),
-        np.array([v_low, v_low, v_high, v_high]),
-        curve.Degree,
-        1,
-    )
+    knots = np.array(curve.KnotSequence, dtype=np.float64)
+    drawn = Nurbs.drawn((poles, weights, knots, curve.Degree), along, (v_low, v_high))
+    return drawn.unrolled((u_low, u_high) if periodic else None)
 
 
-def _nurbs(surface: Any) -> Nurbs:
+def _nurbs(surface: Any, u_range: tuple[float, float], v_range: tuple[float, float]) -> Nurbs:
     surface = surface.copy()
-    if surface.isUPeriodic():
+    u_periodic, v_periodic = surface.isUPeriodic(), surface.isVPeriodic()
+    if u_periodic:
         surface.setUNotPeriodic()
-    if surface.isVPeriodic():
+    if v_periodic:
         surface.setVNotPeriodic()
     weights = None
     if surface.isURational() or surface.isVRational():
         weights = np.array(surface.getWeights(), dtype=np.float64)
-    return Nurbs(
+    found = Nurbs(
         np.array([[tuple(pole) for pole in row] for row in surface.getPoles()], dtype=np.float64),
         weights,
         np.array(surface.UKnotSequence, dtype=np.float64),
@@ -198,3 +194,4 @@ def _nurbs(surface: Any) -> Nurbs:
         surface.UDegree,
         surface.VDegree,
     )
+    return found.unrolled(u_range if u_periodic else None, v_range if v_periodic else None)

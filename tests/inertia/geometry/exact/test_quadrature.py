@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.inertia.geometry.exact.quadrature import Curve, Face, Moments, Surface, integrate
-from silo.inertia.geometry.exact.surfaces import Asked, Basis, Elementary, Nurbs, basis_functions
+from silo.inertia.geometry.exact.surfaces import Asked, Basis, Elementary, Nurbs, Turned, basis_functions
 
 Point = Callable[[float, float], tuple[float, float, float]]
 TURN = 2 * math.pi
@@ -231,6 +231,22 @@ def test_the_slopes_of_a_spline_surface_are_its_derivatives() -> None:
         np.testing.assert_allclose((at(u, v + h)[0] - at(u, v - h)[0]) / (2 * h), dv, rtol=1e-5, atol=1e-6)
 
 
+def test_a_periodic_spline_is_repeated_as_far_as_the_face_goes() -> None:
+    """A wave that repeats in u and v, unrolled over seams on both sides: each value is that of its one turn."""
+    random = np.random.default_rng(8)
+    poles = random.normal(size=(6, 5, 3))
+    knots = {2: np.array([0.0, 0, 0, 0.2, 0.5, 0.7, 1, 1, 1]), 3: np.array([2.0, 2, 2, 2, 3, 4, 4, 4, 4])}
+    for weights in (None, random.uniform(0.5, 2, size=(6, 5))):
+        one = Nurbs(poles, weights, knots[2], knots[3], 2, 3)
+        many = one.unrolled((-1.3, 2.1), (3.5, 7.9))
+        assert (many.u_breaks[0], many.u_breaks[-1]) == (-2, 3)
+        assert many.v_breaks.tolist() == [3, 4, 5, 6, 7]
+        for u, v in ((-1.3, 3.5), (-0.25, 4.1), (0.6, 6.7), (1.9, 7.9)):
+            found = many.at(np.array([[u]]), np.array([v]))
+            wanted = one.at(np.array([[u % 1]]), np.array([2 + v % 2]))
+            np.testing.assert_allclose(found, wanted, rtol=1e-10, atol=1e-10)
+
+
 # --- surfaces that only answer ------------------------------------------------------------------------------
 
 
@@ -252,6 +268,22 @@ def test_a_surface_that_is_asked_point_by_point_gives_the_same() -> None:
     one, other = measured([face], 100), measured([asked], 100)
     assert other.volume == pytest.approx(one.volume, rel=1e-10)
     np.testing.assert_allclose(other.inertia, one.inertia, rtol=1e-9, atol=1e-7)
+
+
+def test_a_turned_curve_is_asked_at_three_angles() -> None:
+    """A torus as a turned circle: the same result, for a tenth of the questions."""
+    face = torus_face(5, 1)
+    questions = []
+
+    def ask(u: float, v: float) -> Any:
+        questions.append((u, v))
+        return Answering(face.surface)(u, v)
+
+    one = measured([face], 100)
+    turned = measured([Face(Turned(ask, (0, TURN)), face.edges)], 100)
+    assert turned.volume == pytest.approx(one.volume, rel=1e-12)
+    np.testing.assert_allclose(turned.inertia, one.inertia, rtol=1e-11, atol=1e-9)
+    assert len(questions) < 1000
 
 
 def test_what_does_not_converge_is_told() -> None:
@@ -277,6 +309,53 @@ def test_a_spline_drawn_along_a_line_is_exact(read_in: Any, codes_of: Any) -> No
     (part,) = read_in(WAVY).prototypes.values()
     assert part.volume_m3 * 1e9 == pytest.approx(WAVY_MM3, rel=1e-9)
     assert codes_of(part) == []
+
+
+def splines(kind: str) -> tuple[Any, float]:
+    """A solid with a spline in its side, and its volume [mm3] in closed form."""
+    from OCP.BRepBuilderAPI import (
+        BRepBuilderAPI_MakeEdge,
+        BRepBuilderAPI_MakeFace,
+        BRepBuilderAPI_MakeWire,
+        BRepBuilderAPI_NurbsConvert,
+    )
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism, BRepPrimAPI_MakeRevol, BRepPrimAPI_MakeTorus
+    from OCP.Geom import Geom_BezierCurve
+    from OCP.GeomConvert import GeomConvert
+    from OCP.gp import gp, gp_Pnt, gp_Vec
+    from OCP.TopoDS import TopoDS
+
+    if kind == "periodic":
+        return BRepBuilderAPI_NurbsConvert(BRepPrimAPI_MakeTorus(10, 3).Shape(), True).Shape(), math.pi**2 * 180
+    try:
+        from OCP.TColgp import TColgp_Array1OfPnt
+    except ImportError:
+        from OCP.collections import Array1_gp_Pnt as TColgp_Array1OfPnt
+    # The parabola x = 2 + z (6 - z) / 9 from z = 0 to 6, closed by the axis.
+    points = TColgp_Array1OfPnt(1, 3)
+    for n, (x, z) in enumerate([(2, 0), (4, 3), (2, 6)], start=1):
+        points.SetValue(n, gp_Pnt(x, 0, z))
+    curve = GeomConvert.CurveToBSplineCurve_s(Geom_BezierCurve(points))
+    corners = [gp_Pnt(2, 0, 6), gp_Pnt(0, 0, 6), gp_Pnt(0, 0, 0), gp_Pnt(2, 0, 0)]
+    wire = BRepBuilderAPI_MakeWire(BRepBuilderAPI_MakeEdge(curve).Edge())
+    for one, other in zip(corners, corners[1:], strict=False):
+        wire.Add(BRepBuilderAPI_MakeEdge(one, other).Edge())
+    face = BRepBuilderAPI_MakeFace(wire.Wire()).Face()
+    if kind == "drawn":
+        return BRepPrimAPI_MakePrism(face, gp_Vec(0, 5, 0)).Shape(), 5 * (12 + 4)
+    # pi times the integral of (2 + z (6 - z) / 9)^2 = pi (24 + 16 + 3.2)
+    return BRepPrimAPI_MakeRevol(face, gp.OZ_s()).Shape(), math.pi * (24 + 16 + 3.2)
+
+
+@pytest.mark.parametrize("kind", ["periodic", "drawn", "turned"])
+def test_splines_of_the_kernel_are_read_as_such(kind: str) -> None:
+    """Nothing is asked point by point where numpy can have the surface as a whole, and the volume is exact."""
+    from silo.inertia.geometry.kernel import occt
+    from silo.inertia.geometry.kernel.faces import _surface, moments
+
+    shape, volume = splines(kind)
+    assert not [face for face in occt.faces_of(shape) if isinstance(_surface(face), Asked)]
+    assert moments(shape, volume, 1e-10).volume == pytest.approx(volume, rel=1e-10)
 
 
 def test_both_engines_agree_where_both_converge(box: Any) -> None:

@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,9 @@ from numpy.typing import NDArray
 from silo.inertia.geometry.exact.quadrature import Floats
 
 NO_BREAKS: Floats = np.zeros(0)
+
+Ask: TypeAlias = Callable[[float, float], tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]]
+"""(u, v) → a point of a surface, and its derivatives in u and in v."""
 
 
 class Basis(Enum):
@@ -70,9 +74,7 @@ class Elementary:
     @property
     def u_breaks(self) -> Floats:
         """The range in quarter turns, in which twelve points are exact to the last digit."""
-        low, high = self.u_range
-        count = 1 if self.in_u is Basis.LINEAR else max(int(np.ceil((high - low) / (np.pi / 2) - 1e-9)), 1)
-        return np.linspace(low, high, count + 1)
+        return np.array(self.u_range) if self.in_u is Basis.LINEAR else _quarters(*self.u_range)
 
     @property
     def v_breaks(self) -> Floats:
@@ -94,9 +96,13 @@ class Elementary:
         return a @ across, da @ across, a @ sloped
 
 
+def _quarters(low: float, high: float) -> Floats:
+    return np.linspace(low, high, max(int(np.ceil((high - low) / (np.pi / 2) - 1e-9)), 1) + 1)
+
+
 @dataclass(frozen=True, eq=False)
 class Nurbs:
-    """A B-spline surface, not periodic.
+    """A B-spline surface, not periodic (see :meth:`unrolled`).
 
     poles : (nu, nv, 3); weights : (nu, nv) or None
     u_knots, v_knots : with repetitions, as many as poles + degree + 1
@@ -108,6 +114,42 @@ class Nurbs:
     v_knots: Floats
     u_degree: int
     v_degree: int
+
+    @classmethod
+    def drawn(
+        cls,
+        curve: tuple[Floats, Floats | None, Floats, int],
+        along: Floats,
+        v_range: tuple[float, float],
+    ) -> Nurbs:
+        """A spline drawn along a line.
+
+        curve
+            poles (n, 3), weights (n,) or None, knots with repetitions and degree, at v = 0.
+        along
+            (3,) for each unit of v.
+        """
+        poles, weights, knots, degree = curve
+        both = np.stack([poles + along * v for v in v_range], axis=1)
+        twice = np.stack([weights, weights], axis=1) if weights is not None else None
+        return cls(both, twice, knots, np.repeat(v_range, 2).astype(np.float64), degree, 1)
+
+    def unrolled(
+        self, u_range: tuple[float, float] | None = None, v_range: tuple[float, float] | None = None
+    ) -> Nurbs:
+        """One turn of a periodic surface, repeated until it covers the ranges (None: not periodic there)."""
+        result = self
+        if u_range is not None:
+            turns, knots = _turns(self.u_knots, self.u_degree, u_range)
+            result = replace(result, poles=np.tile(self.poles, (turns, 1, 1)), u_knots=knots)
+            if self.weights is not None:
+                result = replace(result, weights=np.tile(self.weights, (turns, 1)))
+        if v_range is not None:
+            turns, knots = _turns(self.v_knots, self.v_degree, v_range)
+            poles = np.tile(result.poles, (1, turns, 1))
+            weights = np.tile(result.weights, (1, turns)) if result.weights is not None else None
+            result = replace(result, poles=poles, weights=weights, v_knots=knots)
+        return result
 
     @property
     def exact(self) -> bool:
@@ -152,6 +194,15 @@ class Nurbs:
         return value, (du[..., :3] - value * du[..., 3:]) / w, (dv[..., :3] - value * dv[..., 3:]) / w
 
 
+def _turns(knots: Floats, degree: int, ends: tuple[float, float]) -> tuple[int, Floats]:
+    """How many turns cover ``ends``, and their knots; those of one turn begin and end with degree + 1 equal."""
+    low, period = knots[0], knots[-1] - knots[0]
+    first = int(np.floor((ends[0] - low) / period + 1e-6))
+    last = max(int(np.ceil((ends[1] - low) / period - 1e-6)), first + 1)
+    later = [knots[degree + 1 :] + period * turn for turn in range(first, last)]
+    return last - first, np.concatenate([knots[: degree + 1] + period * first, *later])
+
+
 def basis_functions(
     t: Floats, where: Floats, knots: Floats, degree: int
 ) -> tuple[NDArray[np.intp], Floats, Floats]:
@@ -181,6 +232,41 @@ def basis_functions(
 
 
 @dataclass(frozen=True, eq=False)
+class Turned:
+    """Any curve turned round an axis: what it is at three angles says all, so few points are asked.
+
+    ask(u, v)
+        as for :class:`Asked`; u is the angle.
+    """
+
+    ask: Ask
+    u_range: tuple[float, float]
+    order: int = 12
+    exact: bool = True
+
+    @property
+    def u_breaks(self) -> Floats:
+        """The range in quarter turns."""
+        return _quarters(*self.u_range)
+
+    @property
+    def v_breaks(self) -> Floats:
+        """Not known."""
+        return NO_BREAKS
+
+    def at(self, u: Floats, v: Floats) -> tuple[Floats, Floats, Floats]:
+        """See :class:`silo.inertia.geometry.exact.quadrature.Surface`."""
+        basis = Basis.CIRCULAR
+        unique, place = np.unique(v, return_inverse=True)
+        asked = [[self.ask(float(a), float(y))[::2] for a in basis.samples] for y in unique]
+        # (n, 2, 3 functions of u, 3): the point and its slope in v.
+        samples = np.array(asked, dtype=np.float64).reshape(-1, 3, 2, 3).swapaxes(1, 2)
+        curves = (np.linalg.inv(basis.at(basis.samples)) @ samples)[place.reshape(-1)]
+        a, da = basis.at(u), basis.slope(u)
+        return a @ curves[:, 0], da @ curves[:, 0], a @ curves[:, 1]
+
+
+@dataclass(frozen=True, eq=False)
 class Asked:
     """Any other surface: asked point by point, which is slow and always right.
 
@@ -188,7 +274,7 @@ class Asked:
         point, derivative in u, derivative in v, three numbers each.
     """
 
-    ask: Callable[[float, float], tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]]
+    ask: Ask
     u_breaks: Floats
     order: int = 10
     exact: bool = False

@@ -22,6 +22,7 @@ from OCP.GeomAbs import (
     GeomAbs_Plane,
     GeomAbs_Sphere,
     GeomAbs_SurfaceOfExtrusion,
+    GeomAbs_SurfaceOfRevolution,
     GeomAbs_Torus,
 )
 from OCP.gp import gp_Pnt, gp_Vec
@@ -29,7 +30,7 @@ from OCP.TopAbs import TopAbs_EDGE, TopAbs_FORWARD, TopAbs_REVERSED, TopAbs_WIRE
 from OCP.TopoDS import TopoDS, TopoDS_Iterator
 
 from silo.inertia.geometry.exact.quadrature import Curve, Face, Floats, Moments, Surface, integrate
-from silo.inertia.geometry.exact.surfaces import Asked, Basis, Elementary, Nurbs
+from silo.inertia.geometry.exact.surfaces import Asked, Basis, Elementary, Nurbs, Turned
 from silo.inertia.geometry.kernel import occt
 from silo.inertia.geometry.kernel.tessellate import box, xyz
 
@@ -103,51 +104,72 @@ def _fitted(asked: Callable[[Floats], Floats], basis: Basis) -> Callable[[Floats
 
 
 def _surface(face: Any) -> Surface:
+    """The quickest form of the face's surface that is the same surface."""
     adaptor = BRepAdaptor_Surface(face, True)
     kind = adaptor.GetType()
     u_range = (adaptor.FirstUParameter(), adaptor.LastUParameter())
+    v_range = (adaptor.FirstVParameter(), adaptor.LastVParameter())
 
     def value(u: float, v: float) -> tuple[float, float, float]:
         return xyz(adaptor.Value(u, v))
-
-    if kind in _ELEMENTARY:
-        return Elementary.sampled(*_ELEMENTARY[kind], value, u_range)
-    if kind == GeomAbs_BSplineSurface:
-        spline = adaptor.BSpline()
-        if not spline.IsUPeriodic() and not spline.IsVPeriodic():
-            return _nurbs(spline)
-    breaks = np.linspace(*u_range, 5)
-    if kind == GeomAbs_SurfaceOfExtrusion:
-        breaks = np.union1d(breaks, _knots_within(adaptor.BasisCurve(), u_range))
 
     def ask(u: float, v: float) -> Any:
         point, du, dv = gp_Pnt(), gp_Vec(), gp_Vec()
         adaptor.D1(u, v, point, du, dv)
         return xyz(point), xyz(du), xyz(dv)
 
-    return Asked(ask, breaks)
+    if kind in _ELEMENTARY:
+        return Elementary.sampled(*_ELEMENTARY[kind], value, u_range)
+    if kind == GeomAbs_BSplineSurface:
+        return _nurbs(adaptor.BSpline().Copy(), u_range, v_range)
+    if kind == GeomAbs_SurfaceOfRevolution:
+        return Turned(ask, u_range)
+    if kind == GeomAbs_SurfaceOfExtrusion:
+        basis = adaptor.BasisCurve()
+        if basis.GetType() in _ROUND:
+            return Elementary.sampled(Basis.CIRCULAR, Basis.LINEAR, value, u_range)
+        if basis.GetType() == GeomAbs_BSplineCurve:
+            along = np.array(xyz(adaptor.Direction()))
+            return _drawn(basis.BSpline().Copy(), along, u_range, v_range)
+    return Asked(ask, np.linspace(*u_range, 5))
 
 
-def _knots_within(curve: Any, u_range: tuple[float, float]) -> Floats:
-    if curve.GetType() != GeomAbs_BSplineCurve:
-        return np.zeros(0)
-    spline = curve.BSpline()
-    knots = np.array([spline.Knot(n) for n in range(1, spline.NbKnots() + 1)])
-    inside: Floats = knots[(knots > u_range[0]) & (knots < u_range[1])]
-    return inside
+_Range = tuple[float, float]
 
 
-def _nurbs(spline: Any) -> Nurbs:
+def _drawn(curve: Any, along: Floats, u_range: _Range, v_range: _Range) -> Nurbs:
+    periodic = curve.IsPeriodic()
+    if periodic:
+        curve.SetNotPeriodic()
+    rows = range(1, curve.NbPoles() + 1)
+    poles = np.array([xyz(curve.Pole(i)) for i in rows])
+    weights = np.array([curve.Weight(i) for i in rows]) if curve.IsRational() else None
+    knots = _repeated(curve.NbKnots(), curve.Knot, curve.Multiplicity)
+    surface = Nurbs.drawn((poles, weights, knots, curve.Degree()), along, v_range)
+    return surface.unrolled(u_range if periodic else None)
+
+
+def _nurbs(spline: Any, u_range: _Range, v_range: _Range) -> Nurbs:
+    u_periodic, v_periodic = spline.IsUPeriodic(), spline.IsVPeriodic()
+    if u_periodic:
+        spline.SetUNotPeriodic()
+    if v_periodic:
+        spline.SetVNotPeriodic()
     rows, columns = range(1, spline.NbUPoles() + 1), range(1, spline.NbVPoles() + 1)
     weights = None
     if spline.IsURational() or spline.IsVRational():
         weights = np.array([[spline.Weight(i, j) for j in columns] for i in rows])
-    u, v = range(1, spline.NbUKnots() + 1), range(1, spline.NbVKnots() + 1)
-    return Nurbs(
+    surface = Nurbs(
         np.array([[xyz(spline.Pole(i, j)) for j in columns] for i in rows]),
         weights,
-        np.repeat([spline.UKnot(n) for n in u], [spline.UMultiplicity(n) for n in u]),
-        np.repeat([spline.VKnot(n) for n in v], [spline.VMultiplicity(n) for n in v]),
+        _repeated(spline.NbUKnots(), spline.UKnot, spline.UMultiplicity),
+        _repeated(spline.NbVKnots(), spline.VKnot, spline.VMultiplicity),
         spline.UDegree(),
         spline.VDegree(),
     )
+    return surface.unrolled(u_range if u_periodic else None, v_range if v_periodic else None)
+
+
+def _repeated(count: int, knot: Callable[[int], float], multiplicity: Callable[[int], int]) -> Floats:
+    numbers = range(1, count + 1)
+    return np.repeat([knot(n) for n in numbers], [multiplicity(n) for n in numbers])
