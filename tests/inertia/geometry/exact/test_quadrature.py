@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -232,7 +233,7 @@ def test_the_slopes_of_a_spline_surface_are_its_derivatives() -> None:
 
 
 def test_a_periodic_spline_is_repeated_as_far_as_the_face_goes() -> None:
-    """A wave that repeats in u and v, unrolled over seams on both sides: each value is that of its one turn."""
+    """A wave that repeats in u and v, over seams on both sides: each value is that of its one turn."""
     random = np.random.default_rng(8)
     poles = random.normal(size=(6, 5, 3))
     knots = {2: np.array([0.0, 0, 0, 0.2, 0.5, 0.7, 1, 1, 1]), 3: np.array([2.0, 2, 2, 2, 3, 4, 4, 4, 4])}
@@ -323,10 +324,10 @@ def splines(kind: str) -> tuple[Any, float]:
     from OCP.Geom import Geom_BezierCurve
     from OCP.GeomConvert import GeomConvert
     from OCP.gp import gp, gp_Pnt, gp_Vec
-    from OCP.TopoDS import TopoDS
 
     if kind == "periodic":
-        return BRepBuilderAPI_NurbsConvert(BRepPrimAPI_MakeTorus(10, 3).Shape(), True).Shape(), math.pi**2 * 180
+        torus = BRepPrimAPI_MakeTorus(10, 3).Shape()
+        return BRepBuilderAPI_NurbsConvert(torus, True).Shape(), math.pi**2 * 180
     try:
         from OCP.TColgp import TColgp_Array1OfPnt
     except ImportError:
@@ -338,7 +339,7 @@ def splines(kind: str) -> tuple[Any, float]:
     curve = GeomConvert.CurveToBSplineCurve_s(Geom_BezierCurve(points))
     corners = [gp_Pnt(2, 0, 6), gp_Pnt(0, 0, 6), gp_Pnt(0, 0, 0), gp_Pnt(2, 0, 0)]
     wire = BRepBuilderAPI_MakeWire(BRepBuilderAPI_MakeEdge(curve).Edge())
-    for one, other in zip(corners, corners[1:], strict=False):
+    for one, other in itertools.pairwise(corners):
         wire.Add(BRepBuilderAPI_MakeEdge(one, other).Edge())
     face = BRepBuilderAPI_MakeFace(wire.Wire()).Face()
     if kind == "drawn":
@@ -349,7 +350,7 @@ def splines(kind: str) -> tuple[Any, float]:
 
 @pytest.mark.parametrize("kind", ["periodic", "drawn", "turned"])
 def test_splines_of_the_kernel_are_read_as_such(kind: str) -> None:
-    """Nothing is asked point by point where numpy can have the surface as a whole, and the volume is exact."""
+    """Nothing is asked point by point where numpy can have the surface as a whole; the volume is exact."""
     from silo.inertia.geometry.kernel import occt
     from silo.inertia.geometry.kernel.faces import _surface, moments
 

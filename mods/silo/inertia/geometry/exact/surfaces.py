@@ -195,7 +195,7 @@ class Nurbs:
 
 
 def _turns(knots: Floats, degree: int, ends: tuple[float, float]) -> tuple[int, Floats]:
-    """How many turns cover ``ends``, and their knots; those of one turn begin and end with degree + 1 equal."""
+    """How many turns cover ``ends``, and their knots; those of one are clamped."""
     low, period = knots[0], knots[-1] - knots[0]
     first = int(np.floor((ends[0] - low) / period + 1e-6))
     last = max(int(np.ceil((ends[1] - low) / period - 1e-6)), first + 1)
