@@ -230,6 +230,16 @@ class Desk:
         assert doc is not None
         doc.identity = identity
         self.documents.save(doc)
+        # As FreeCAD does it: who links to a saved document has the time of that in its file.
+        for parent in self.open:
+            parent.changed = parent.changed or doc in parent.parts
+
+    def unedited(self) -> list[Document]:
+        return [doc for doc in self.open if not doc.changed]
+
+    def save_marked(self, doc: Document) -> None:
+        if doc.changed:
+            self.documents.save(doc)
 
     def save_as(self, _doc: Any) -> None:
         return

@@ -58,6 +58,20 @@ def test_from_the_offer_to_the_bom(office: Office, flow: RegisterFlow, top: Docu
     assert "M01" in window.numbers
 
 
+def test_no_unsaved_edits_are_left(office: Office, flow: RegisterFlow, top: Document) -> None:
+    """What FreeCAD marks because its parts were saved is saved too, after them; a person's edits are not."""
+    edited = office.document("Edited")
+    edited.parts.update(top.parts)
+    flow.start(top)
+    office.settle()
+    office.desk.registers[0].wishes.register(orders(office))
+    office.settle()
+    assert not top.changed
+    assert office.desk.documents.saved[-1] == "Top"
+    assert edited.changed
+    assert "Edited" not in office.desk.documents.saved
+
+
 def test_a_server_that_refuses_leaves_the_files_alone(
     office: Office, flow: RegisterFlow, top: Document
 ) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 
 from silo.bom.errors import DocumentError
 from silo.open_in_freecad import open_in_others
+from silo.workbench.commit.plan import leaves_first
 from silo.workbench.freecad import host, live, saving
 from silo.workbench.register.registering import Candidate, Seen, State
 
@@ -53,4 +54,20 @@ def write_identity(candidate: Candidate, identity: str) -> None:
     if live.lost_assemblies(doc):
         raise DocumentError(entry.doc_path, "made by a newer FreeCAD; saving it here would destroy it")
     saving.write_identity(doc, entry.object_name, identity, whole_document=not candidate.shares_file)
-    saving.save(doc)
+    saving.save(doc, mark_parents=True)
+
+
+def unedited() -> list[Any]:
+    """The documents without unsaved edits, each after those that it links to."""
+    clean = {doc.Name: doc for doc in host.documents() if doc.FileName and not saving.is_modified(doc)}
+    ordered: dict[str, Any] = {}
+    for doc in clean.values():
+        ordered.update((below.Name, below) for below in leaves_first(doc) if below.Name in clean)
+    return list(ordered.values())
+
+
+def save_marked(doc: Any) -> None:
+    """Save a document that was unedited, and that FreeCAD marked because something below it was saved."""
+    if live.lost_assemblies(doc):
+        return
+    saving.save_marked(doc)

@@ -47,6 +47,8 @@ class LiveDesk:
     find = staticmethod(host.find_document)
     look_at = staticmethod(components.look_at)
     write_identity = staticmethod(components.write_identity)
+    unedited = staticmethod(components.unedited)
+    save_marked = staticmethod(components.save_marked)
 
     def save_as(self, _doc: Any) -> None:
         """FreeCAD's own dialog, for the active document."""

@@ -8,21 +8,17 @@ main thread only.
 from __future__ import annotations
 
 import os
-from functools import cache
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from typing import Any
 
 from silo.workbench.freecad import host
-from silo.workbench.freecad.saved_marks import SavedMarks
 
 
 def is_modified(doc: Any) -> bool:
     """True where the document has edits that are not on disk."""
     if not host.has_gui():
         return bool(doc.isTouched()) if hasattr(doc, "isTouched") else False
-    return _is_marked(doc) and not (host.version() < (0, 21) and _marks().is_clean(doc))
-
-
-def _is_marked(doc: Any) -> bool:
     view = host.view_of(doc)
     return bool(view is not None and view.Modified)
 
@@ -49,8 +45,12 @@ def open_fully(path: str) -> Any:
             raise DocumentError(path, f"FreeCAD cannot open it: {problem}") from problem
 
 
-def save(doc: Any) -> None:
-    """Save a document to its file; :class:`DocumentError` unless the file really was written."""
+def save(doc: Any, *, mark_parents: bool = False) -> None:
+    """Save a document to its file; :class:`DocumentError` unless the file really was written.
+
+    mark_parents
+        let FreeCAD mark the documents that link to this one; whoever asks for it saves them as well.
+    """
     from silo.bom.errors import DocumentError
 
     path = doc.FileName
@@ -62,7 +62,8 @@ def save(doc: Any) -> None:
         raise DocumentError(path, "the file is read-only")
     before = _stamp(path)
     try:
-        _save(doc)
+        with nullcontext() if mark_parents else others_unmarked(doc):
+            _save(doc)
     except (OSError, RuntimeError) as problem:
         raise DocumentError(path, f"FreeCAD could not save it: {problem}") from problem
     if _stamp(path) == before:
@@ -76,25 +77,50 @@ def _save(doc: Any) -> None:
     elif host.version() >= (0, 21):
         doc.save()
         view.Modified = False
-    elif view.ActiveView is None or _asks_before_saving(doc):
+    elif not view.Modified:
         doc.save()
-        _marks().saved(doc)
     else:
-        with host.same_active_document():
-            host.activate(doc)
-            host.run_command("Std_Save")
+        # In 0.20 only FreeCAD's own save takes the mark of unsaved edits away.
+        from silo.workbench.gui.save_in_view import save_in_view
+
+        save_in_view(doc)
 
 
-@cache
-def _marks() -> SavedMarks:
-    marks = SavedMarks()
-    host.add_document_observer(marks)
-    return marks
+@contextmanager
+def others_unmarked(doc: Any) -> Iterator[None]:
+    """Documents without edits stay so while this one is changed and saved.
+
+    FreeCAD marks each document that links to a saved one, for the time of saving that it keeps of it (0.20
+    does so whatever we do), and each that shows an axis cross, for the size of that. Nobody edited them.
+    """
+    clean = [other for other in host.documents() if other != doc and not is_modified(other)]
+    if not host.has_gui():
+        yield
+    elif host.version() >= (0, 21):
+        yield
+        for other in clean:
+            if is_modified(other):
+                host.view_of(other).Modified = False
+    else:
+        with ExitStack() as stack:
+            for other in clean:
+                for obj in other.Objects:
+                    if obj.TypeId in ("App::Origin", "App::Line", "App::Plane"):
+                        stack.enter_context(_unmarking(obj.ViewObject, "Size"))
+            yield
 
 
-def _asks_before_saving(doc: Any) -> bool:
-    """True where FreeCAD's own save command would ask about further modified files."""
-    return any(other != doc and _is_marked(other) for other in doc.getDependentDocuments())
+@contextmanager
+def _unmarking(owner: Any, name: str) -> Iterator[None]:
+    """A change of this property does not mark the document as edited."""
+    if name not in owner.PropertiesList:
+        yield
+        return
+    owner.setPropertyStatus(name, "NoModify")
+    try:
+        yield
+    finally:
+        owner.setPropertyStatus(name, "-NoModify")
 
 
 def _stamp(path: str) -> tuple[int, int, int]:
@@ -103,6 +129,16 @@ def _stamp(path: str) -> tuple[int, int, int]:
     except OSError:
         return (0, 0, 0)
     return (status.st_mtime_ns, status.st_size, status.st_ino)
+
+
+def save_marked(doc: Any) -> None:
+    """Save a document that FreeCAD marked because something below it was saved, where that can be done."""
+    from silo.bom.errors import DocumentError
+
+    if is_modified(doc) and not host.is_partial(doc):
+        # Where it cannot be saved, FreeCAD's mark says what is so.
+        with suppress(DocumentError):
+            save(doc, mark_parents=True)
 
 
 def is_writable(path: str) -> bool:
@@ -129,19 +165,28 @@ def write_identity(doc: Any, name: str, identity: str, *, whole_document: bool) 
     obj = doc.getObject(name) if name else None
     if name and obj is None:
         raise DocumentError(doc.FileName, f"it has no object {name} any more")
-    if obj is not None:
-        _set_text(obj, "SiloItemId", identity)
-        if "SiloUUID" in obj.PropertiesList:
-            obj.SiloUUID = identity
-    # Meta gives a copy: only assigning a whole dictionary changes it.
-    doc.Meta = {**doc.Meta, meta_key("" if whole_document else name): identity}
-    if whole_document and hasattr(doc, "addProperty"):
-        _set_text(doc, "SiloUUID", identity)
+    with others_unmarked(doc):
+        if obj is not None:
+            _set_text(obj, "SiloItemId", identity)
+            if "SiloUUID" in obj.PropertiesList:
+                _set_text(obj, "SiloUUID", identity)
+        # Meta gives a copy: only assigning a whole dictionary changes it.
+        doc.Meta = {**doc.Meta, meta_key("" if whole_document else name): identity}
+        if whole_document and hasattr(doc, "addProperty"):
+            _set_text(doc, "SiloUUID", identity)
+
+
+# FreeCAD's number for "a change of it asks for no recompute" (Prop_Output of App::PropertyType).
+_OUTPUT = 8
 
 
 def _set_text(owner: Any, name: str, value: str) -> None:
+    """Set a property without touching its object.
+
+    A touched object touches all links to it, and the next recompute marks their documents as edited.
+    """
     if name not in owner.PropertiesList:
-        owner.addProperty("App::PropertyString", name, "Silo", "Identity of the item in Silo")
+        owner.addProperty("App::PropertyString", name, "Silo", "Identity of the item in Silo", _OUTPUT, True)
+    if hasattr(owner, "State") and "Output" not in owner.getPropertyStatus(name):
+        owner.setPropertyStatus(name, "Output")
     setattr(owner, name, value)
-    if hasattr(owner, "setEditorMode"):
-        owner.setEditorMode(name, ["ReadOnly"])

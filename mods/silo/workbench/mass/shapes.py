@@ -102,7 +102,7 @@ class LiveFacts:
         linked = linked_material(obj)
         if linked is not None:
             return linked
-        card = own(obj, "ShapeMaterial")
+        card = _stored(obj, "ShapeMaterial")
         if card is None or not card.UUID or card.UUID == NO_MATERIAL:
             return NOTHING
         return told_material(card.Name, _density(card))
@@ -110,6 +110,18 @@ class LiveFacts:
     def problem(self, link: Any) -> LinkProblem | None:
         """Why a link has no target."""
         return self._inspect(link)
+
+
+def _stored(obj: Any, name: str) -> Any:
+    """The value of a property, cut off from its object; None where the object has no such property.
+
+    ``obj.ShapeMaterial.getPhysicalValue(…)`` marks the document as edited and touches all links to the object
+    (measured in FreeCAD 1.0 and 1.1): FreeCAD takes every call of a value that it handed out as an attribute
+    for a change of it. A value got by name is nobody's.
+    """
+    if name not in obj.PropertiesList:
+        return None
+    return getattr(obj, "real", obj).getPropertyByName(name)
 
 
 def matrix_of(placement: Any) -> Floats:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Any
 
 from silo.bom.errors import SiloError
@@ -114,6 +115,7 @@ class RegisterFlow:
     def _register(self, path: str, orders: Sequence[Order]) -> None:
         schema = self._preferences.text("Schema")
         registered: list[Candidate] = []
+        clean = self._desk.unedited()
 
         def run(client: Any, control: Any) -> None:
             def tell(order: Order, result: Registration) -> None:
@@ -138,7 +140,7 @@ class RegisterFlow:
             # The numbers that were foretold are taken now.
             for category in sorted({order.category for order in orders}):
                 self._number(path, category)
-            self._send(path, registered)
+            self._save_parents(clean if registered else [], lambda: self._send(path, registered))
 
         def failed(error: SiloError) -> None:
             if error.code != "cancelled":
@@ -146,6 +148,15 @@ class RegisterFlow:
             finished()
 
         self._session.ask(translate("Silo", "Registering"), run, done=finished, failed=failed)
+
+    def _save_parents(self, clean: list[Any], then: Callable[[], None]) -> None:
+        """Save the documents that FreeCAD marked because their parts were saved, one in a turn."""
+        if not clean:
+            then()
+            return
+        with suppress(ReferenceError):  # closed meanwhile
+            self._desk.save_marked(clean[0])
+        self._desk.later(lambda: self._save_parents(clean[1:], then))
 
     def _done(self, path: str, order: Order, result: Registration) -> None:
         self._with_dialog(path, lambda dialog: dialog.registered(order, result))

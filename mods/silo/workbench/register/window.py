@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 from silo.bom.errors import SiloError
 from silo.registration import Registration
@@ -61,3 +61,9 @@ class RegisterDesk(Desk, Protocol):
     def look_at(self, paths: Iterable[str], /) -> dict[str, Seen]: ...
 
     def write_identity(self, candidate: Candidate, identity: str, /) -> None: ...
+
+    def unedited(self) -> list[Any]:
+        """The documents without unsaved edits, each after those that it links to."""
+
+    def save_marked(self, doc: Any, /) -> None:
+        """Save a document that was unedited, where FreeCAD has marked it for something below it."""

@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Inside FreeCAD: every command on a project without edits; what is marked, touched or undoable after it."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+from typing import Any
+
+sys.path.insert(0, os.environ["SILO_TEST_CASES"])
+
+from inside import (
+    App,
+    Gui,
+    QtCore,
+    QtWidgets,
+    addon,
+    assembly,
+    boxes,
+    close_all,
+    part,
+    register,
+    run,
+    settled,
+    tell,
+    wait,
+)
+
+
+def story() -> None:
+    from silo.workbench.commands import commands
+
+    one = addon()
+    one.preferences.set("AskRegister", False)
+    one.preferences.set("AskComment", False)
+    wait(lambda: one.session.shown.connection == "online")
+    top = project()
+    register(*(doc for doc in App.listDocuments().values() if doc.Name in ("Plate", "Top")))
+    # Opened as people do it: what the assembly links to has no window of its own.
+    close_all()
+    doc = App.openDocument(top)
+    wait(settled)
+    one.desk  # noqa: B018  # made when first needed; what is edited from now on is seen
+    edited_and_saved(doc)
+    done: dict[str, Any] = {}
+    tell(start=states())
+    for name in sorted(commands(one)):
+        before = states()
+        App.setActiveDocument(doc.Name)
+        RUNS.get(name, nothing)(one)
+        wait(settled)
+        done[name] = {"known": name in RUNS, "changed": difference(before, states())}
+    tell(done=done)
+    reopened(top)
+
+
+def project() -> str:
+    """Two parts, of materials where FreeCAD has such, in an assembly; its path."""
+    parts = [part("Plate"), part("Bolt")]
+    for box in parts:
+        if "ShapeMaterial" in box.PropertiesList:
+            box.ShapeMaterial = card()
+            box.Document.recompute()
+            box.Document.save()
+    path = str(assembly("Top", ("P", parts[0], 0), ("B", parts[1], 3)).Document.FileName)
+    for doc in App.listDocuments().values():
+        doc.recompute()
+        doc.save()
+    return path
+
+
+def card() -> Any:
+    import Materials
+
+    found = Materials.MaterialManager().Materials.values()
+    return next(material for material in found if material.hasPhysicalProperty("Density"))
+
+
+def edited_and_saved(top: Any) -> None:
+    """Each document has one step to undo, and is saved with it."""
+    from silo.workbench.freecad import saving
+
+    for name in ("Plate", "Bolt", "Top"):
+        doc = App.getDocument(name)
+        doc.openTransaction("Longer")
+        obj = doc.getObject("Box") or doc.getObject("P")
+        obj.Placement.Base = App.Vector(1, 2, 3)
+        doc.commitTransaction()
+        doc.recompute()
+    tell(edited=states())
+    for name in ("Plate", "Bolt", "Top"):
+        saving.save(App.getDocument(name))
+    tell(saved=states(), active=App.ActiveDocument.Name, windows=windows())
+
+
+def states() -> dict[str, Any]:
+    return {
+        doc.Name: {
+            "modified": bool(Gui.getDocument(doc.Name).Modified),
+            "undo": list(doc.UndoNames),
+            "touched": [obj.Name for obj in doc.Objects if "Touched" in obj.State],
+        }
+        for doc in App.listDocuments().values()
+    }
+
+
+def difference(before: dict[str, Any], after: dict[str, Any]) -> dict[str, Any]:
+    return {name: after[name] for name in after if before.get(name) != after[name]}
+
+
+def windows() -> list[str]:
+    """Titles of the 3D views."""
+    area = Gui.getMainWindow().findChild(QtWidgets.QMdiArea)
+    return [one.windowTitle() for one in area.subWindowList()]
+
+
+def nothing(_one: Any) -> None:
+    """A command that this story does not know."""
+
+
+def commit(one: Any) -> None:
+    seen = len(boxes("Committed")) + len(boxes("BOM Updated"))
+    Gui.runCommand("Origin_Commit")
+    wait(lambda: len(boxes("Committed")) + len(boxes("BOM Updated")) > seen and settled())
+
+
+def preview(one: Any) -> None:
+    Gui.runCommand("Silo_BOM")
+    window = wait(lambda: next(iter(one.previews._open.values()), None))
+    wait(lambda: window._preview is not None)
+    if window.sync_button.isEnabled():
+        window.sync_button.click()
+        wait(lambda: settled() and window._preview is not None)
+    window.close()
+    wait(lambda: not one.previews._open)
+
+
+def registering(one: Any) -> None:
+    Gui.runCommand("Silo_RegisterParts")
+    window = wait(lambda: next(iter(one.registrations._open.values()), None))
+    wait(lambda: window.rows)
+    window.register_button.click()
+    wait(lambda: all(row.finished for row in window.rows) and settled())
+    tell(registered=[row.component() for row in window.rows])
+    window.close()
+    wait(lambda: not one.registrations._open)
+
+
+def mass(one: Any) -> None:
+    Gui.runCommand("Silo_Mass")
+    window = wait(lambda: shown("SiloMass"))
+    tell(mass=[window.table.topLevelItem(0).text(column) for column in range(6)])
+    window.close()
+    wait(lambda: shown("SiloMass") is None)
+
+
+def shown(name: str) -> Any:
+    windows = QtWidgets.QApplication.topLevelWidgets()
+    return next((w for w in windows if w.objectName() == name and w.isVisible()), None)
+
+
+def settings(one: Any) -> None:
+    def end() -> None:
+        found = QtWidgets.QApplication.activeModalWidget()
+        if found is None:
+            QtCore.QTimer.singleShot(50, end)
+        else:
+            found.reject()
+
+    QtCore.QTimer.singleShot(50, end)
+    Gui.runCommand("Silo_Settings")
+
+
+def activity(one: Any) -> None:
+    Gui.runCommand("Silo_Activity")
+
+
+def reopened(top: str) -> None:
+    """FreeCAD marks an assembly at once whose parts were saved after it."""
+    close_all()
+    App.openDocument(top)
+    wait(settled)
+    tell(reopened=states())
+
+
+RUNS: dict[str, Callable[[Any], None]] = {
+    "Origin_Commit": commit,
+    "Silo_BOM": preview,
+    "Silo_RegisterParts": registering,
+    "Silo_Mass": mass,
+    "Silo_Activity": activity,
+    "Silo_Settings": settings,
+}
+
+run(story)

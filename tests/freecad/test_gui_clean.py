@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""No command leaves a document marked as edited, touched, or with another undo stack than before."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from freecad_cases.machines import WANTED
+from gui_cases.window import window
+
+from silo.workbench import commands
+
+pytestmark = [pytest.mark.freecad, pytest.mark.slow]
+
+COMMANDS = sorted(value for name, value in vars(commands).items() if name.isupper() and name != "OWN_COMMIT")
+
+
+@pytest.fixture(name="said", scope="module", params=WANTED)
+def _said(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[dict[str, Any]]:
+    with window(request.param, tmp_path_factory.mktemp("clean").resolve()) as freecad:
+        freecad.prepare()
+        yield freecad.run("clean.py")
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_command_leaves_the_documents_as_they_were(said: dict[str, Any], command: str) -> None:
+    """Registering writes and saves; all others only read or send."""
+    assert said["done"][command] == {"known": True, "changed": {}}
+
+
+def test_the_commands_did_their_work(said: dict[str, Any]) -> None:
+    """The bolt got its number, and the mass needed the materials where FreeCAD has them."""
+    assert said["registered"] == ["Bolt.FCStd"]
+    assert said["mass"]
+    assert all("Longer" in state["undo"] for state in said["start"].values())
+
+
+def test_our_save_takes_the_mark_away(said: dict[str, Any]) -> None:
+    """Also of a document without a window, which FreeCAD 0.20 saves for nobody."""
+    assert [state["modified"] for state in said["edited"].values()] == [True] * 3
+    assert [state["modified"] for state in said["saved"].values()] == [False] * 3
+    assert said["active"] == "Top"
+    assert len(said["windows"]) == 1
+
+
+def test_the_project_opens_without_marks(said: dict[str, Any]) -> None:
+    """Registering a part saves the assembly too, which keeps the times at which its parts were saved."""
+    clean = {"modified": False, "undo": [], "touched": []}
+    assert said["reopened"] == dict.fromkeys(("Bolt", "Plate", "Top"), clean)
