@@ -15,9 +15,7 @@ Ends with an error where an answer was wrong, a status dishonest, something lost
 from __future__ import annotations
 
 import argparse
-import http.client
 import os
-import random
 import re
 import shutil
 import signal
@@ -28,20 +26,32 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from urllib.parse import quote, unquote
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
 
-from server_testing import Api, Databases, ServerProcess, bom, form_body, merge_body, postgres, wait_until
-from server_testing.kill import kill_rounds
+from server_testing import (
+    Answer,
+    Api,
+    Databases,
+    ServerProcess,
+    bom,
+    form_body,
+    merge_body,
+    postgres,
+    wait_until,
+)
+from server_testing.kill import LINES, Moments, kill_rounds, killed
+from server_testing.process import ForkedServer, command_line, forked
 
 TOKEN = "silo_faults"
 READS = 300
 P99 = 0.2
-LINES = 300
+UPLOAD = 2_000_000
 
 
 def main() -> None:
@@ -66,8 +76,10 @@ def main() -> None:
                     print(f"{kind:9} {case:10} {run(databases.new(kind), folder)}", flush=True)
             if "kill" in wanted:
                 for what, kill in KILLS.items():
+                    began = time.perf_counter()
                     told = kill(databases.new(kind), folder / what, args.kills)
-                    print(f"{kind:9} kill {what:8} {told}", flush=True)
+                    seconds = time.perf_counter() - began
+                    print(f"{kind:9} kill {what:8} {told} ({seconds:.0f} s)", flush=True)
             with suppress(Exception):
                 databases.close()
 
@@ -339,7 +351,7 @@ def as_owner() -> list[str]:
     return [] if os.geteuid() != 0 or owner == "root" else ["runuser", "-u", owner, "--"]
 
 
-def upload(api: Api, item: str, content: bytes, key: str) -> object:
+def upload(api: Api, item: str, content: bytes, key: str) -> Answer:
     """Send a file."""
     body, headers = form_body({"file": ("part.FCStd", content), "comment": key})
     headers["Idempotency-Key"] = key
@@ -349,86 +361,73 @@ def upload(api: Api, item: str, content: bytes, key: str) -> object:
 def kill_merges(url: str, folder: Path, kills: int) -> str:
     """See ``server_testing.kill``."""
     report = kill_rounds(url, folder, kills, seed=1)
-    return f"{report.kills} kills: {report.old} old, {report.new} new, 0 between; retries right"
-
-
-def killed(server: ServerProcess, work: Callable[[Api], None], after: float) -> bool:
-    """Kill the server so many seconds after ``work`` begins; True where its answer had come."""
-    came = threading.Event()
-
-    def run() -> None:
-        with Api(server.base_url, TOKEN) as api, suppress(OSError, http.client.HTTPException):
-            work(api)
-            came.set()
-
-    thread = threading.Thread(target=run)
-    thread.start()
-    time.sleep(after)  # the moment of the kill is the random input here
-    server.kill()
-    thread.join()
-    return came.is_set()
+    return (
+        f"{report.kills} kills: {report.old} old, {report.new} new, {report.answered} answered; none "
+        "between, every retry right"
+    )
 
 
 def kill_uploads(url: str, folder: Path, kills: int) -> str:
     """After each kill the revision is there with all of its file, or not at all; the retry makes it one."""
-    chance = random.Random(2)
     answered = there = 0
-    server = ServerProcess(url, folder, TOKEN)
+    server = ForkedServer(url, folder, TOKEN)
     with Api(server.base_url, TOKEN) as api:
         item = api.item("KILLED")
         started = time.perf_counter()
-        upload(api, item, os.urandom(2_000_000), "first")
-        usual = time.perf_counter() - started
+        upload(api, item, os.urandom(UPLOAD), "first")
+        moments = Moments(2, time.perf_counter() - started)
     for number in range(kills):
-        content, key = os.urandom(2_000_000), f"k{number}"
-        came = killed(
-            server, lambda api, c=content, k=key: upload(api, item, c, k), chance.uniform(0, usual * 1.5)
-        )  # type: ignore[misc]
-        server = ServerProcess(url, folder, TOKEN)
+        content, key = os.urandom(UPLOAD), f"k{number}"
+        came = killed(server, TOKEN, lambda api, c=content, k=key: upload(api, item, c, k), moments.next())
+        server = ForkedServer(url, folder, TOKEN)
         with Api(server.base_url, TOKEN) as api:
             newest = api.get(f"/api/items/{item}/revisions?limit=1")[0]["revision_number"]
             assert newest in (number + 1, number + 2), "a revision is lost or doubled"
-            assert not came or newest == number + 2, "an answer was given for what is not there"
-            answered, there = answered + came, there + (newest == number + 2)
-            assert upload(api, item, content, key).status == 201  # type: ignore[attr-defined]
+            done = newest == number + 2
+            assert done or not came, "an answer was given for what is not there"
+            if done:
+                assert api.call("GET", f"/api/items/{item}/file").body == content, "a torn file"
+            moments.was(done=done)
+            answered, there = answered + came, there + done
+            assert upload(api, item, content, key).status == 201
             assert api.get(f"/api/items/{item}/revisions?limit=1")[0]["revision_number"] == number + 2
             assert api.call("GET", f"/api/items/{item}/file").body == content, "a torn file"
     server.stop()
-    return (
-        f"{kills} kills: {there} there, {kills - there} not, {answered} answered; no file torn, none doubled"
-    )
+    return f"{kills} kills: {kills - there} old, {there} new, {answered} answered; no file torn, none doubled"
 
 
 def kill_imports(url: str, folder: Path, kills: int) -> str:
     """After each kill the BOM is the old one or the CSV's."""
-    chance = random.Random(3)
-    new = 0
-    server = ServerProcess(url, folder, TOKEN)
+    answered = new = 0
+    server = ForkedServer(url, folder, TOKEN)
     with Api(server.base_url, TOKEN) as api:
         children = api.items(LINES)
         parent = api.item("IMPORTED")
-        usual = 0.0
         for quantity in (1, 2):
             started = time.perf_counter()
             import_csv(api, parent, children, quantity)
-            usual = time.perf_counter() - started
+            moments = Moments(3, time.perf_counter() - started)
     for number in range(kills):
         before, after = number + 2, number + 3
-        killed(
-            server, lambda api, n=after: import_csv(api, parent, children, n), chance.uniform(0, usual * 1.3)
-        )  # type: ignore[misc]
-        server = ServerProcess(url, folder, TOKEN)
+        came = killed(
+            server, TOKEN, lambda api, n=after: import_csv(api, parent, children, n), moments.next()
+        )
+        server = ForkedServer(url, folder, TOKEN)
         with Api(server.base_url, TOKEN) as api:
-            found = set(api.quantities(parent).values())
+            state = api.quantities(parent)
+            found = set(state.values())
+            assert len(state) == LINES, f"{LINES - len(state)} lines are lost"
             assert found in ({before}, {after}), f"the BOM is between old and new: {found}"
-            new += found == {after}
+            assert found == {after} or not came, "an answer was given for what is not there"
+            moments.was(done=found == {after})
+            answered, new = answered + came, new + (found == {after})
             if found == {before}:
                 import_csv(api, parent, children, after)
             newest = api.get(bom(parent, "history") + "?limit=1")[0]["id"]
             past = {line["quantity"] for line in api.get(bom(parent, f"history/{newest}/bom"))}
             assert past == {after}, "the history does not fold to the state"
     server.stop()
-    return f"{kills} kills: {kills - new} old, {new} new, 0 between"
+    return f"{kills} kills: {kills - new} old, {new} new, {answered} answered; none between"
 
 
 def import_csv(api: Api, parent: str, children: list[str], quantity: int) -> None:
@@ -440,64 +439,80 @@ def import_csv(api: Api, parent: str, children: list[str], quantity: int) -> Non
 
 
 def kill_restores(url: str, folder: Path, kills: int) -> str:
-    """After each kill of ``silo-mod restore`` the database is the one before or the backup, whole."""
-    chance = random.Random(4)
+    """After each kill of ``silo-mod restore`` the state is the one before or the backup's, with its file."""
     folder.mkdir()
     backups: list[Path] = []
-    states: list[dict[str, float]] = []
-    with ServerProcess(url, folder / "files", TOKEN) as server, Api(server.base_url, TOKEN) as api:
+    states: list[tuple[list[float], bytes | None]] = []
+    with ForkedServer(url, folder / "files", TOKEN) as server, Api(server.base_url, TOKEN) as api:
         children = api.items(LINES)
         parent = api.item("RESTORED")
         for turn in (1, 2):
             api.merge(parent, {child: turn * 10 + n % 7 for n, child in enumerate(children)})
-            states.append(api.quantities(parent))
+            content = os.urandom(UPLOAD)
+            upload(api, parent, content, f"turn {turn}")
+            states.append((list(api.quantities(parent).values()), content))
             backups.append(folder / f"backup-{turn}")
             run_cli("backup", str(backups[-1]), url, folder)
     started = time.perf_counter()
     run_cli("restore", str(backups[0]), url, folder, "--replace")
-    usual = time.perf_counter() - started
+    moments = Moments(4, time.perf_counter() - started)
     counts = [0, 0]
     at = 0
     for _ in range(kills):
+        # The restore has to bring the file of the other state itself.
+        for path in (folder / "files").glob("??/??/*"):
+            if path.read_bytes() != states[at][1]:
+                path.unlink()
         process = start_cli("restore", str(backups[1 - at]), url, folder, "--replace")
-        time.sleep(chance.uniform(0.3, 1.1) * usual)  # the moment of the kill is the random input here
+        time.sleep(moments.next())  # the moment of the kill is the random input here
         process.kill()
-        process.wait()
-        found = quantities(url, "RESTORED")
-        assert found in (list(states[0].values()), list(states[1].values())), "between two states"
-        now = 0 if found == list(states[0].values()) else 1
+        process.join()
+        found = kept(url, folder / "files", "RESTORED")
+        assert found in states, "between two states, or without its file"
+        now = states.index(found)
+        moments.was(done=now != at)
         counts[now != at] += 1
         at = now
+    run_cli("restore", str(backups[1 - at]), url, folder, "--replace")
+    assert kept(url, folder / "files", "RESTORED") == states[1 - at]
     shutil.rmtree(folder)
-    return f"{kills} kills: {counts[0]} before, {counts[1]} restored, 0 between"
+    return f"{kills} kills: {counts[0]} old, {counts[1]} new; none between, none without its file"
 
 
-def quantities(url: str, parent: str) -> list[float]:
-    """The BOM's quantities, read from the database itself."""
+def kept(url: str, files: Path, parent: str) -> tuple[list[float], bytes | None]:
+    """The BOM's quantities and the newest file, read from the database and the folder themselves."""
+    from silo.bom.errors import NotFoundError
     from silo_server.db.engine import Database
+    from silo_server.files import FileStore
     from silo_server.services.bom.lines import lines_of
     from silo_server.services.items import get_item
+    from silo_server.services.revisions import newest_file
     from silo_server.settings import Settings
 
     db = Database(Settings(database_url=url))
     try:
         with db.read() as tx:
-            return [line.state.quantity for line in lines_of(tx, get_item(tx, parent))]
+            item = get_item(tx, parent)
+            checksum = newest_file(tx, item).file_checksum
+            assert checksum is not None
+            quantities = [line.state.quantity for line in lines_of(tx, item)]
+        with suppress(NotFoundError):
+            return quantities, FileStore(files).path_of(checksum).read_bytes()
+        return quantities, None
     finally:
         db.close()
 
 
-def start_cli(command: str, place: str, url: str, folder: Path, *more: str) -> subprocess.Popen[bytes]:
+def start_cli(command: str, place: str, url: str, folder: Path, *more: str) -> BaseProcess:
     """``silo-mod`` as a process of its own."""
-    args = [command, place, "--database", url, "--files", str(folder / "files"), *more]
-    code = "import sys; from silo.cli.main import main; sys.exit(main(sys.argv[1:]))"
-    quiet = subprocess.DEVNULL
-    return subprocess.Popen([sys.executable, "-P", "-c", code, *args], stdout=quiet, stderr=quiet)
+    return forked(command_line, [command, place, "--database", url, "--files", str(folder / "files"), *more])
 
 
 def run_cli(command: str, place: str, url: str, folder: Path, *more: str) -> None:
     """Run it to its end."""
-    assert start_cli(command, place, url, folder, *more).wait() == 0
+    process = start_cli(command, place, url, folder, *more)
+    process.join()
+    assert process.exitcode == 0, (command, process.exitcode)
 
 
 KILLS = {"merge": kill_merges, "upload": kill_uploads, "import": kill_imports, "restore": kill_restores}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""``kill -9`` of the server in the middle of merges (benchmarks/server_kill.py does a hundred)."""
+"""``kill -9`` of the server in the middle of merges (benchmarks/server_faults.py does hundreds)."""
 
 from __future__ import annotations
 

@@ -12,12 +12,13 @@ import http.client
 import random
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from server_testing.caller import Api, bom, merge_body
-from server_testing.process import ServerProcess
+from server_testing.process import ForkedServer
 
 TOKEN = "silo_kill"
 LINES = 300
@@ -33,10 +34,48 @@ class KillReport:
     answered: int
 
 
+class Moments:
+    """Random moments to kill at, most of them around the commit.
+
+    The commit is found by trying: a kill before it makes the next moments later, one after it makes them
+    earlier. One moment in four is anywhere between the beginning and there.
+    """
+
+    def __init__(self, seed: int, first: float) -> None:
+        self._chance = random.Random(seed)
+        self._commit = first
+
+    def next(self) -> float:
+        """Seconds after the work begins."""
+        if self._chance.random() < 0.25:
+            return self._chance.uniform(0, self._commit)
+        return self._commit * self._chance.uniform(0.6, 1.4)
+
+    def was(self, *, done: bool) -> None:
+        """What the kill at the last moment found."""
+        self._commit *= 0.93 if done else 1.07
+
+
+def killed(server: ForkedServer, token: str, work: Callable[[Api], object], after: float) -> bool:
+    """Kill the server so many seconds after ``work`` begins; True where its answer had come."""
+    came = threading.Event()
+
+    def run() -> None:
+        with Api(server.base_url, token) as api, suppress(OSError, http.client.HTTPException):
+            work(api)
+            came.set()
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    time.sleep(after)  # the moment of the kill is the random input here, not a synchronisation
+    server.kill()
+    thread.join()
+    return came.is_set()
+
+
 def kill_rounds(database_url: str, files_dir: Path, kills: int, seed: int) -> KillReport:
     """Do ``kills`` rounds; AssertionError where a BOM is between, or a retry's answer wrong."""
-    chance = random.Random(seed)
-    server = ServerProcess(database_url, files_dir, TOKEN)
+    server = ForkedServer(database_url, files_dir, TOKEN)
     with Api(server.base_url, TOKEN) as api:
         children = api.items(LINES)
         parent = api.item("KILL-ASM")
@@ -44,46 +83,29 @@ def kill_rounds(database_url: str, files_dir: Path, kills: int, seed: int) -> Ki
         api.merge(parent, states[0])
         started = time.perf_counter()
         api.merge(parent, states[1])
-        usual = time.perf_counter() - started
+        moments = Moments(seed, time.perf_counter() - started)
         api.merge(parent, states[0])
     old = new = answered = 0
-    for round_number in range(kills):
-        before, after = states[round_number % 2], states[1 - round_number % 2]
-        sync_id = f"round-{seed}-{round_number}"
-        answered += _kill_during(server, parent, after, sync_id, chance.uniform(0, usual * 1.3))
-        server = ServerProcess(database_url, files_dir, TOKEN)
+    for number in range(kills):
+        before, after = states[number % 2], states[1 - number % 2]
+        body = merge_body(after, sync_id=f"round-{seed}-{number}")
+        came = killed(
+            server, TOKEN, lambda api, sent=body: api.good("POST", bom(parent, "merge"), sent), moments.next()
+        )
+        server = ForkedServer(database_url, files_dir, TOKEN)
         with Api(server.base_url, TOKEN) as api:
             found = api.quantities(parent)
-            assert found in (before, after), f"round {round_number}: the BOM is between old and new"
+            assert found in (before, after), f"round {number}: the BOM is between old and new"
+            assert found == after or not came, f"round {number}: an answer was given for what is not there"
+            moments.was(done=found == after)
             _check_history(api, parent)
-            old, new = old + (found == before), new + (found == after)
-            answer = api.merge(parent, after, sync_id=sync_id)
+            old, new, answered = old + (found == before), new + (found == after), answered + came
+            answer = api.good("POST", bom(parent, "merge"), body)
             changed = {c["part_number"]: c["new_quantity"] for c in answer["diff"]["quantity_changed"]}
-            assert changed == after, f"round {round_number}: the retry's answer is wrong"
+            assert changed == after, f"round {number}: the retry's answer is wrong"
             assert api.quantities(parent) == after
     server.stop()
     return KillReport(kills, old, new, answered)
-
-
-def _kill_during(
-    server: ServerProcess, parent: str, after: Mapping[str, float], sync_id: str, delay: float
-) -> bool:
-    came = threading.Event()
-
-    def merge() -> None:
-        with Api(server.base_url, TOKEN) as api:
-            try:
-                api.good("POST", bom(parent, "merge"), merge_body(after, sync_id=sync_id))
-            except (OSError, http.client.HTTPException):
-                return
-            came.set()
-
-    thread = threading.Thread(target=merge)
-    thread.start()
-    time.sleep(delay)  # the moment of the kill is the random input here, not a synchronisation
-    server.kill()
-    thread.join()
-    return came.is_set()
 
 
 def _check_history(api: Api, parent: str) -> None:

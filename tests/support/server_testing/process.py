@@ -1,14 +1,20 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""A server in a process of its own."""
+"""A server in a process of its own; and processes forked from one that has loaded everything already."""
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
 import subprocess
 import sys
+from collections.abc import Callable, Sequence
+from functools import cache
+from multiprocessing.connection import Connection
+from multiprocessing.context import ForkServerContext
+from multiprocessing.process import BaseProcess
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 TIMEOUT = 60
 
@@ -59,3 +65,95 @@ class ServerProcess:
         assert self._process.stdout is not None
         self._process.stdout.close()
         return code
+
+
+class ForkedServer:
+    """A server like :class:`ServerProcess` that starts in a tenth of its time, for those who kill hundreds.
+
+    It is forked from a process that has loaded the server and done nothing else, and is killed by the same
+    SIGKILL. ``user_id``: serve as this user of the machine (needs root).
+    """
+
+    def __init__(
+        self, database_url: str, files_dir: Path, token: str, *, user_id: int | None = None, **settings: str
+    ) -> None:
+        environ = {"SILO_API_TOKEN": token, "SILO_STORAGE_ROOT_DIR": str(files_dir), **settings}
+        ours, theirs = _loaded().Pipe()
+        self._process = forked(_serve, database_url, environ, user_id, theirs)
+        theirs.close()
+        try:
+            assert ours.poll(TIMEOUT), "the server did not start in time"
+            said = ours.recv()
+        except EOFError:
+            said = "the server ended before it answered"
+        finally:
+            ours.close()
+        if not said.startswith("http"):
+            self._end()
+            raise AssertionError(f"the server did not start: {said}")
+        self.base_url: str = said
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    def kill(self) -> None:
+        """``kill -9``, and wait until it is gone."""
+        self._process.kill()
+        self._end()
+
+    def stop(self) -> int | None:
+        """Ask it to end, and wait; its exit code."""
+        self._process.terminate()
+        return self._end()
+
+    def _end(self) -> int | None:
+        self._process.join(TIMEOUT)
+        code = self._process.exitcode
+        assert code is not None, "the server does not end"
+        return code
+
+
+def forked(work: Callable[..., None], *args: Any) -> BaseProcess:
+    """``work(*args)`` in a process of its own, forked from the loaded one; it ends with this process."""
+    process = _loaded().Process(target=work, args=args, daemon=True)
+    process.start()
+    return process
+
+
+def command_line(args: Sequence[str]) -> None:
+    """What ``silo-mod`` does with these arguments, without a word; for :func:`forked`."""
+    from silo.cli.main import main
+
+    with open(os.devnull, "w", encoding="utf-8") as nowhere:
+        sys.stdout = sys.stderr = nowhere
+        sys.exit(main(args))
+
+
+@cache
+def _loaded() -> ForkServerContext:
+    context = multiprocessing.get_context("forkserver")
+    modules = [
+        "psycopg",
+        "silo.cli.main",
+        "silo.cli.backup",
+        "silo_server.operation.backup",
+        "silo_server.run",
+    ]
+    context.set_forkserver_preload(modules)
+    return context
+
+
+def _serve(database_url: str, environ: dict[str, str], user_id: int | None, said: Connection) -> None:
+    from silo.bom.errors import SiloError
+    from silo_server.run import serve
+
+    os.environ.update(environ)
+    if user_id is not None:
+        os.setuid(user_id)
+    try:
+        serve(port=0, database_url=database_url, tell=lambda greeting: said.send(greeting.url))
+    except SiloError as error:
+        said.send(str(error))
