@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from typing import Any
 
 from silo.bom.errors import RejectedError
@@ -17,7 +18,9 @@ from silo.bom.errors import RejectedError
 MAX_DEPTH = 32
 MAX_BYTES = 256 * 1024
 MAX_KEY = 200
-MAX_WHOLE = 2**63
+# JSON does not tell 1e300 from a whole number of 301 digits, and so neither do we: what a double can hold.
+MAX_NUMBER = sys.float_info.max
+_DIGITS = 309
 
 
 def dumps(value: Any) -> str:
@@ -89,8 +92,8 @@ def _scalar_problem(value: Any) -> str | None:
         return None if _is_text(value) else "wanted text, got a character that is no valid Unicode (or NUL)"
     if isinstance(value, float) and not math.isfinite(value):
         return f"wanted finite numbers, got {value}"
-    if isinstance(value, int) and not -MAX_WHOLE <= value < MAX_WHOLE:
-        return "wanted whole numbers of at most 63 bits, got a longer one; send it as text"
+    if isinstance(value, int) and not -MAX_NUMBER <= value <= MAX_NUMBER:
+        return f"wanted numbers of at most {_DIGITS} digits, got a longer one; send it as text"
     return None
 
 
@@ -114,7 +117,7 @@ def _float(text: str) -> float | str:
 
 
 def _whole(text: str) -> int | str:
-    return int(text) if len(text) < 20 else text
+    return int(text) if len(text.lstrip("-")) <= _DIGITS else text
 
 
 def _cut(value: Any, levels: int) -> Any:

@@ -32,7 +32,7 @@ HOSTILE = {
     "an infinite number": '{"m": 1e999}',
     "a long key": json.dumps({"k" * 201: 1}),
     "a deep long key": json.dumps({"a": [{"k" * 201: 1}]}),
-    "a long whole number": '{"m": ' + "9" * 100 + "}",
+    "a long whole number": '{"m": ' + "9" * 309 + "}",
     "a whole number that Python refuses": '{"m": ' + "9" * 5000 + "}",
     "half a surrogate pair": '{"m": "\\ud800"}',
     "NUL": '{"m": "\\u0000"}',

@@ -11,7 +11,7 @@ from typing import Any
 
 from silo.api.wire import MergeRequest
 from silo.bom.numbers import LARGEST_QUANTITY
-from silo_server.json_values import MAX_KEY, MAX_WHOLE
+from silo_server.json_values import MAX_KEY, MAX_NUMBER
 from silo_server.schema.catalog import ITEM_TYPES, find_schema
 from silo_server.services.access.accounts import MAX_PASSWORD, MIN_PASSWORD, USERNAME_FORM
 from silo_server.services.numbering import NUMBER_FORM, RESERVED
@@ -97,12 +97,12 @@ _KEY = {"maxLength": MAX_KEY, "pattern": NO_NUL}
 # pydantic has no way to refer to a schema that it did not make; :func:`complete` puts the reference in.
 JSON_OBJECT: Schema = {"type": "object", "propertyNames": _KEY, "additionalProperties": _ANY_JSON}
 _JSON_VALUE: Schema = {
-    "description": "JSON of at most 32 levels and 256 KiB, with numbers of at most 63 bits"
+    "description": "JSON of at most 32 levels and 256 KiB, with numbers that a double can hold"
     " (send longer ones as text)",
     "anyOf": [
         NOTHING,
         {"type": "boolean"},
-        {"type": "number", "minimum": -MAX_WHOLE, "exclusiveMaximum": MAX_WHOLE},
+        {"type": "number", "minimum": -MAX_NUMBER, "maximum": MAX_NUMBER},
         {"type": "string", "pattern": NO_NUL},
         {"type": "array", "items": {"$ref": _JSON}},
         {"type": "object", "propertyNames": _KEY, "additionalProperties": {"$ref": _JSON}},
