@@ -237,18 +237,21 @@ def test_a_backup_that_fails_leaves_nothing(tmp_path: Path, databases: Databases
     assert sorted(path.name for path in tmp_path.iterdir()) == []
 
 
-def test_a_backup_of_an_older_schema_is_brought_up_to_date(tmp_path: Path, databases: Databases) -> None:
+@pytest.mark.parametrize("schema", ["0001", "0003"])
+def test_a_backup_of_an_older_schema_is_brought_up_to_date(
+    tmp_path: Path, databases: Databases, schema: str
+) -> None:
     """Made before an update, restored after it."""
     import sqlite3
 
-    dump = Path(__file__).parent / "released" / "0.1.0.sqlite.sql"
+    dump = Path(__file__).parent / "released" / f"schema-{schema}.sqlite.sql"
     old = Settings(database_url=databases.new("sqlite"), files_dir=tmp_path / "files")
     assert old.sqlite_path is not None
     with sqlite3.connect(old.sqlite_path) as connection:
         connection.executescript(dump.read_text("utf-8"))
     connection.close()
     made = backup.back_up(old, tmp_path / "saved")
-    assert made.schema == "0001"
+    assert made.schema == schema
     assert len(made.missing_files) == 2  # the dump has no files beside it
     new = Settings(database_url=databases.new("sqlite"), files_dir=tmp_path / "new")
     backup.restore(new, tmp_path / "saved")

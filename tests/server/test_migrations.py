@@ -19,14 +19,18 @@ from silo_server.__main__ import main
 from silo_server.bootstrap import prepare
 from silo_server.db.engine import Database
 from silo_server.db.migrate import alembic_config, newest_revision, upgrade
-from silo_server.db.tables import events, items, metadata
+from silo_server.db.tables import events, items, metadata, sessions
+from silo_server.services.access.credentials import actor_by_token
 from silo_server.services.bom.history import list_changes, state_at
+from silo_server.services.bom.last_sync import last_sync
 from silo_server.services.bom.lines import lines_of
 from silo_server.services.items import get_item
+from silo_server.services.search import search_for
 from silo_server.settings import Settings
+from silo_server.values import Role, Scope
 
 FOLDER = Path(__file__).parent / "released"
-RELEASES = sorted({path.name.removesuffix(".sql").rpartition(".")[0] for path in FOLDER.glob("*.sql")})
+SCHEMAS = sorted({path.name.split(".")[0] for path in FOLDER.glob("*.sql")})
 
 # A revision as a later version may bring it: two filled tables that refer to each other are made anew.
 REBUILD = '''
@@ -63,7 +67,7 @@ def upgrade():
 '''
 
 
-@pytest.fixture(params=RELEASES)
+@pytest.fixture(params=SCHEMAS)
 def released(request: pytest.FixtureRequest, url: str, tmp_path: Path) -> Iterator[Database]:
     """A database as a released version left it, on the kind of ``url``, not yet brought up to date."""
     db = Database(Settings(database_url=url, files_dir=tmp_path))
@@ -82,10 +86,10 @@ def released(request: pytest.FixtureRequest, url: str, tmp_path: Path) -> Iterat
     db.close()
 
 
-def test_there_are_dumps_of_every_release() -> None:
-    """The released schemas are kept here, of both databases; without them the tests below test nothing."""
-    assert RELEASES == ["0.1.0"]
-    assert len(list(FOLDER.iterdir())) == 2 * len(RELEASES)
+def test_there_are_dumps_of_every_schema_that_filled_tables_changed_after() -> None:
+    """They are kept here, of both databases; without them the tests below test nothing."""
+    assert SCHEMAS[:3] == ["schema-0001", "schema-0003", "schema-0004"]
+    assert len(list(FOLDER.iterdir())) == 2 * len(SCHEMAS)
 
 
 def test_the_migrations_make_the_tables(url: str) -> None:
@@ -112,7 +116,9 @@ def test_every_step_up_can_be_taken_alone_and_repeated(url: str) -> None:
     db.close()
 
 
-def test_a_released_database_comes_up_with_its_data(released: Database) -> None:
+def test_a_released_database_comes_up_with_its_data(
+    released: Database, request: pytest.FixtureRequest
+) -> None:
     """A database as an earlier version left it: every row is still there, the code works with it."""
     before = _counts(released)
     assert min(before.values()) > 0, "a table of the fixture is empty: run scripts/dump_release.py"
@@ -122,7 +128,20 @@ def test_a_released_database_comes_up_with_its_data(released: Database) -> None:
     assert differences == []
     assert {name: after[name] for name in before} == before
     prepare(released, "silo_released_token")
+    actor = actor_by_token(released, "silo_released_token", "127.0.0.1")
+    assert actor is not None
+    # A token of before scopes may do what it could.
+    assert (actor.username, actor.role, actor.scope) == ("admin", Role.ADMIN, Scope.ADMIN)
     with released.read() as tx:
+        found = search_for(tx, "unicode7")
+        assert found is not None
+        assert tx.conn.scalars(select(items.c.part_number).where(found.condition)).all() == ["Ünïcode-7"]
+        assert set(tx.conn.scalars(select(items.c.version))) <= set(range(1, 9))
+        assert not any(tx.conn.scalars(select(sessions.c.by_link)))
+        top = last_sync(tx, get_item(tx, "ASM-TOP"))
+        assert top.at is not None
+        told_since = request.node.callspec.params["released"] >= "schema-0003"
+        assert [gap["name"] for gap in top.left_out] == (["Lid"] if told_since else [])
         item = get_item(tx, "asm-001")
         lines = {line.child_part_number: line.state for line in lines_of(tx, item)}
         newest = list_changes(tx, item)[0]
