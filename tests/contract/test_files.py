@@ -126,6 +126,9 @@ def test_what_is_no_upload_is_refused(api: Api) -> None:
     api.bad(400, "POST", path, {"file": "x"})
     body, headers = form_body({"comment": "no file"})
     assert "'file'" in api.bad(400, "POST", path, body=body, headers=headers)["message"]
+    body, headers = form_body({"file": ("a", b"x"), "properties": "{}", "properties2": '{"a": 1}'})
+    error = api.bad(400, "POST", path, body=body.replace(b"properties2", b"properties"), headers=headers)
+    assert "properties: wanted one part of this name" in error["message"]
     body, headers = form_body({"file": ("a", b"x"), "properties": "[1]"})
     assert "properties" in api.bad(400, "POST", path, body=body, headers=headers)["message"]
     assert upload(api, "NO-SUCH", b"x").status == 404

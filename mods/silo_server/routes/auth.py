@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Request
-from pydantic import Field, WithJsonSchema
+from pydantic import Field, StrictBool, WithJsonSchema
 from starlette.responses import Response
 
 from silo.api.wire import ErrorBody
@@ -75,7 +75,7 @@ class UserChangeBody(Body):
 
     role: Role | None = None
     display_name: Short | None = None
-    active: bool | None = None
+    active: StrictBool | None = None
     password: NewPassword | None = None
 
 

@@ -39,9 +39,17 @@ def part_number(*, or_empty: bool = False) -> Schema:
         "type": "string",
         "maxLength": 200,
         "pattern": f"^(\\s*{NUMBER_FORM.pattern}\\s*){optional}$",
-        "not": {"enum": [".", "..", *sorted(RESERVED)]},
+        "not": {"pattern": f"^\\s*(\\.|\\.\\.|{'|'.join(map(_in_any_case, sorted(RESERVED)))})\\s*$"},
         "description": "1 to 64 characters, none of / \\ ? # % and no control characters; unique in any case",
     }
+
+
+def _in_any_case(word: str) -> str:
+    """A pattern of the texts that are ``word`` when case does not count; ſ is an s."""
+    same = {"s": "sSſ", "k": "kK\u212a"}
+    return "".join(
+        f"[{same.get(c, c + c.upper())}]" if c.isalpha() else "\\" + c if c == "." else c for c in word
+    )
 
 
 def refused(reason: str) -> Schema:

@@ -47,6 +47,23 @@ BINARY: dict[int | str, dict[str, Any]] = {
     304: {"description": "The file is still the one that If-None-Match names"},
     416: {"description": "The file has no such range"},
 }
+_FORM: document.Schema = {
+    "file": {"type": "string", "format": "binary"},
+    "comment": document.text(10_000),
+    "properties": {"type": "string", "description": "a JSON object"},
+    "sha256": {**document.SHA256, "description": "of the file; another content is refused"},
+    "base_revision": {
+        "type": "integer",
+        "minimum": 0,
+        "maximum": 1_000_000,
+        "description": "what the file was made from; 409 where a newer file is there",
+    },
+    "path": document.text(1000, description="where the file is in its project, with /"),
+    "links": {
+        "type": "string",
+        "description": "a JSON list of the linked files: path, item (UUID), sha256",
+    },
+}
 UPLOAD = {
     **document.refused(
         "properties that are no JSON object, links that are no such list, "
@@ -55,32 +72,7 @@ UPLOAD = {
     "requestBody": {
         "required": True,
         "content": {
-            "multipart/form-data": {
-                "schema": {
-                    "type": "object",
-                    "required": ["file"],
-                    "properties": {
-                        "file": {"type": "string", "format": "binary"},
-                        "comment": document.text(10_000),
-                        "properties": {"type": "string", "description": "a JSON object"},
-                        "sha256": {
-                            **document.SHA256,
-                            "description": "of the file; another content is refused",
-                        },
-                        "base_revision": {
-                            "type": "integer",
-                            "minimum": 0,
-                            "maximum": 1_000_000,
-                            "description": "what the file was made from; 409 where a newer file is there",
-                        },
-                        "path": document.text(1000, description="where the file is in its project, with /"),
-                        "links": {
-                            "type": "string",
-                            "description": "a JSON list of the linked files: path, item (UUID), sha256",
-                        },
-                    },
-                }
-            }
+            "multipart/form-data": {"schema": {"type": "object", "required": ["file"], "properties": _FORM}}
         },
     },
 }
@@ -135,6 +127,11 @@ async def upload_file(server: ServerDep, caller: Editor, part_number: str, reque
     The form is read here and not by a parameter, so that nobody without a role fills the disk.
     """
     async with request.form(max_files=1, max_fields=20, max_part_size=_MAX_FIELD) as form:
+        twice = [name for name in _FORM if len(form.getlist(name)) > 1]
+        if twice:
+            raise RejectedError(
+                f"{', '.join(twice)}: wanted one part of this name, got several"
+            )
         file, comment, raw = form.get("file"), form.get("comment"), form.get("properties")
         sha256 = form.get("sha256")
         if not isinstance(file, UploadFile):

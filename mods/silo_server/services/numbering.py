@@ -24,7 +24,7 @@ UNSEEN = (
     "\\u180b-\\u180f\\u2000-\\u200f\\u2028-\\u202f\\u205f-\\u206f\\u2800\\u3000\\u3164\\ufe00-\\ufe0f\\ufeff\\uffa0"
     "\\ufff9-\\ufffb\U0001bca0-\U0001bca3\U0001d173-\U0001d17a\U000e0000-\U000e0fff"
 )
-_INSIDE = rf"/\\?#%\x00-\x1f\x7f{UNSEEN}"
+_INSIDE = rf"/\\?#%\x00-\x1f\x7f-\x9f{UNSEEN}"
 NUMBER_FORM = re.compile(rf"[^\s{_INSIDE}](?:[^{_INSIDE}]{{0,62}}[^\s{_INSIDE}])?")
 _UNSEEN = re.compile(f"[{UNSEEN}]")
 
