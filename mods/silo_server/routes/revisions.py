@@ -129,9 +129,7 @@ async def upload_file(server: ServerDep, caller: Editor, part_number: str, reque
     async with request.form(max_files=1, max_fields=20, max_part_size=_MAX_FIELD) as form:
         twice = [name for name in _FORM if len(form.getlist(name)) > 1]
         if twice:
-            raise RejectedError(
-                f"{', '.join(twice)}: wanted one part of this name, got several"
-            )
+            raise RejectedError(f"{', '.join(twice)}: wanted one part of this name, got several")
         file, comment, raw = form.get("file"), form.get("comment"), form.get("properties")
         sha256 = form.get("sha256")
         if not isinstance(file, UploadFile):
