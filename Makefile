@@ -9,12 +9,13 @@ BIN := $(VENV)/bin
 DEV := $(VENV)/.installed-dev
 SERVER := $(VENV)/.installed-server
 
-.PHONY: help demo test test-machine check translations setup docs clean
+.PHONY: help demo test test-machine test-windows-files check translations setup docs clean
 
 help:
 	@echo "make demo   set up and sync a real assembly with the embedded server (DEMO=--keep leaves it running)"
 	@echo "make test   set up and run the tests"
 	@echo "make test-machine  the tests that need FreeCAD or Chromium on the machine"
+	@echo "make test-windows-files  the tests with the file semantics of Windows, simulated"
 	@echo "make check  ruff, mypy, import directions"
 	@echo "make translations  bring the files for translators up to date"
 
@@ -39,6 +40,12 @@ demo: $(SERVER)
 
 test: setup
 	$(BIN)/python -m pytest $(SPREAD) --dist worksteal -m "not freecad and not browser"
+
+# The suites that read and write files, with files as Windows has them; PostgreSQL's test library is POSIX only.
+test-windows-files: setup
+	PYTHONPATH=tests/support $(BIN)/python -m pytest -p windows_files $(SPREAD) --dist worksteal -k "not postgres" \
+		-m "not freecad and not browser" tests/api tests/cli tests/contract tests/fcstd tests/outbox tests/server \
+		tests/vault tests/workbench tests/test_*.py
 
 test-machine: setup
 	$(BIN)/python -m pytest $(SPREAD) --dist loadscope -m "freecad or browser"

@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+import importlib.util
+import os
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -18,3 +21,73 @@ settings.load_profile("unhurried")
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     """``-n 2 --dist loadscope`` keeps tests together by what they share, and not by their files."""
     return scheduler(config, log) if config.getoption("dist") == "loadscope" else None
+
+
+def _needs(what: str, there: bool) -> None:
+    if not there:
+        pytest.skip(f"needs {what}, which this system does not have; NOT tested here")
+
+
+def _importable(module: str) -> bool:
+    try:
+        return importlib.util.find_spec(module) is not None
+    except ValueError:  # hidden by the simulation of Windows
+        return False
+
+
+@pytest.fixture(scope="session")
+def needs_symlinks(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Windows makes links for administrators and developers only."""
+    folder = tmp_path_factory.mktemp("links")
+    try:
+        (folder / "link").symlink_to(folder)
+    except OSError:
+        _needs("symlinks", False)
+
+
+@pytest.fixture(scope="session")
+def needs_modes() -> None:
+    """Modes that say who may read, write or start a file."""
+    _needs("POSIX modes", os.name == "posix" and hasattr(os, "fchmod"))
+
+
+@pytest.fixture(scope="session")
+def needs_user_without_rights() -> None:
+    """An administrator may read and write anything."""
+    _needs("a user who is no administrator", hasattr(os, "geteuid") and os.geteuid() != 0)
+
+
+@pytest.fixture(scope="session")
+def needs_signals() -> None:
+    """``kill -9``, ``SIGSTOP``, process groups."""
+    _needs("POSIX signals", hasattr(os, "killpg"))
+
+
+@pytest.fixture(scope="session")
+def needs_limits() -> None:
+    """Limits of a process, from ``resource``."""
+    _needs("POSIX limits", _importable("resource"))
+
+
+@pytest.fixture(scope="session")
+def needs_locks() -> None:
+    """File locks of POSIX, from ``fcntl``."""
+    _needs("POSIX locks", _importable("fcntl"))
+
+
+@pytest.fixture(scope="session")
+def needs_pty() -> None:
+    """A terminal that a test can type at."""
+    _needs("a pseudo-terminal", _importable("pty") and hasattr(os, "openpty"))
+
+
+@pytest.fixture(scope="session")
+def needs_pipes() -> None:
+    """Named pipes in a folder."""
+    _needs("named pipes", hasattr(os, "mkfifo"))
+
+
+@pytest.fixture(scope="session")
+def needs_dev_full() -> None:
+    """A device that is always full."""
+    _needs("/dev/full", Path("/dev/full").exists())

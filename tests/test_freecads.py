@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
@@ -62,7 +61,13 @@ def test_macos_bundles_of_the_system_and_of_the_user(tmp_path: Path) -> None:
 def test_linux_packages_snap_and_flatpak(tmp_path: Path) -> None:
     home = tmp_path / "home"
     env = {"HOME": str(home), "PATH": str(tmp_path / "path")}
-    wanted = [program(tmp_path / "path" / "freecadcmd"), program(tmp_path / "snap" / "bin" / "freecad.cmd")]
+    wanted = [
+        program(tmp_path / "path" / "freecadcmd"),
+        program(tmp_path / "snap" / "bin" / "freecad.cmd"),
+        program(tmp_path / "var/lib/flatpak/exports/bin/org.freecad.FreeCAD"),
+        program(home / "Applications" / "FreeCAD_1.10.0-Linux-x86_64-py311.AppImage"),
+        program(home / "Applications" / "FreeCAD_1.9.2-Linux-x86_64-py311.AppImage"),
+    ]
     assert list(commands(env, "linux", tmp_path)) == wanted
     flatpak = tmp_path / "var/lib/flatpak/app/org.freecad.FreeCAD/current/active/files"
     cards = [
@@ -81,7 +86,7 @@ def test_nothing_is_there(tmp_path: Path, platform: str) -> None:
     assert list(material_folders(env, platform, tmp_path)) == []
 
 
-@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="needs POSIX modes")
+@pytest.mark.usefixtures("needs_modes")
 def test_what_cannot_be_started_is_no_command(tmp_path: Path) -> None:
     Path(program(tmp_path / "snap" / "bin" / "freecad.cmd")).chmod(0o644)
     assert list(commands({"HOME": str(tmp_path), "PATH": ""}, "linux", tmp_path)) == []

@@ -11,7 +11,7 @@ from running_freecad import UID, held, opened
 
 from silo.open_in_freecad import OpenInFreecad, open_in_others
 
-pytest.importorskip("fcntl")
+pytestmark = pytest.mark.usefixtures("needs_locks")
 
 PATH = "/vault/Cover.FCStd"
 # SHA-1 of that path begins so.
@@ -53,6 +53,7 @@ def test_without_a_document_of_our_own_nothing_is_said(folder: str) -> None:
     assert not open_in_others(folder).has(PATH)
 
 
+@pytest.mark.usefixtures("needs_symlinks")
 def test_the_file_is_known_by_each_of_its_paths(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """FreeCAD has the file by its real path; the user names it by a link, or from its folder."""
     file, link = tmp_path / "Cover.FCStd", tmp_path / "Link.FCStd"

@@ -18,12 +18,14 @@ import pytest
 from silo.bom.report import relative
 from silo.platform import (
     child_options,
+    copy_rights,
     end,
     how_it_ended,
     is_locked,
     limit_this_process,
     own_the_port,
     patiently,
+    swap,
 )
 
 MODS = Path(__file__).resolve().parents[1] / "mods"
@@ -92,6 +94,7 @@ def test_a_limit_that_macos_refuses_does_not_take_the_others_with_it() -> None:
     assert macos.set == {macos.RLIMIT_CORE: (0, 0), macos.RLIMIT_CPU: (60, 65)}
 
 
+@pytest.mark.usefixtures("needs_limits")
 def test_the_limits_hold_where_they_can_be_set() -> None:
     """In a process of its own: allocating more than the limit fails."""
     code = (
@@ -100,7 +103,7 @@ def test_the_limits_hold_where_they_can_be_set() -> None:
         "try: bytearray(400 << 20)\nexcept MemoryError: print('refused')"
     )
     if sys.platform != "linux":
-        pytest.skip("address space is limited on Linux")
+        pytest.skip("only Linux limits the address space")
     env = {**os.environ, "PYTHONPATH": str(MODS)}
     done = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "refused"
@@ -115,6 +118,7 @@ def test_on_windows_the_port_is_taken_for_ourselves() -> None:
     assert told == [(socket.SOL_SOCKET, -5, 1), (socket.SOL_SOCKET, 4, 1)]
 
 
+@pytest.mark.usefixtures("needs_locks")
 def test_a_lock_of_another_process_is_seen(tmp_path: Path) -> None:
     path = tmp_path / "x.lock"
     path.touch()
@@ -124,7 +128,6 @@ def test_a_lock_of_another_process_is_seen(tmp_path: Path) -> None:
         "import fcntl, sys\nfile = open(sys.argv[1], 'r+b')\nfcntl.lockf(file, fcntl.LOCK_EX)\n"
         "print('held', flush=True)\nsys.stdin.read()"
     )
-    pytest.importorskip("fcntl")
     command = [sys.executable, "-c", holder, str(path)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
         assert process.stdout is not None
@@ -134,9 +137,8 @@ def test_a_lock_of_another_process_is_seen(tmp_path: Path) -> None:
     assert is_locked(str(path)) is False
 
 
+@pytest.mark.usefixtures("needs_signals")
 def test_a_child_ends_with_its_own_children() -> None:
-    if not hasattr(os, "killpg"):
-        pytest.skip("process groups of POSIX")
     inner = "import time; print('up', flush=True); time.sleep(600)"
     outer = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {inner!r}])"
     process = subprocess.Popen(
@@ -202,3 +204,113 @@ def test_no_other_module_asks_for_the_platform() -> None:
 )
 def test_the_check_sees_each_way_to_ask(text: str) -> None:
     assert asks_for_the_platform(text)
+
+
+# What a test uses that not every system has, and the fixture of tests/conftest.py that says so.
+_NEEDED = {
+    "symlink_to": "needs_symlinks",
+    "mkfifo": "needs_pipes",
+    "killpg": "needs_signals",
+    "SIGSTOP": "needs_signals",
+    "setrlimit": "needs_limits",
+    "openpty": "needs_pty",
+    "lockf": "needs_locks",
+}
+_POSIX_MODULES = {"fcntl", "resource", "pty", "termios", "pwd", "grp"}
+TESTS = Path(__file__).parent
+
+
+def unsaid(text: str) -> list[str]:
+    """Tests that use what not every system has without a fixture that says so; imports at the top too."""
+    tree = ast.parse(text)
+    found = [
+        f"line {node.lineno} imports {alias.name}"
+        for node in tree.body
+        if isinstance(node, ast.Import)
+        for alias in node.names
+        if alias.name in _POSIX_MODULES
+    ]
+    everywhere = {w.value for n in tree.body if isinstance(n, ast.Assign) for w in _words(n)}
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
+            said = everywhere | {w.value for d in node.decorator_list for w in _words(d)}
+            used = {_NEEDED.get(n.attr, "") for n in ast.walk(node) if isinstance(n, ast.Attribute)}
+            found += [f"{node.name} lacks {need}" for need in sorted(used - said - {""})]
+    return found
+
+
+def _words(node: ast.AST) -> list[ast.Constant]:
+    return [one for one in ast.walk(node) if isinstance(one, ast.Constant)]
+
+
+def test_tests_say_what_they_need_of_the_system() -> None:
+    """FreeCAD's and the browser's tests run where those are, which is Linux."""
+    found = {
+        str(path.relative_to(TESTS)): missing
+        for path in TESTS.rglob("*.py")
+        if path.parts[len(TESTS.parts)] not in ("freecad", "browser", "support")
+        and path != Path(__file__)
+        and (missing := unsaid(path.read_text("utf-8")))
+    }
+    assert found == {}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "import pty",
+        "def test_x(tmp_path):\n    tmp_path.symlink_to('b')",
+        "@usefixtures('needs_modes')\ndef test_x():\n    os.mkfifo('a')",
+    ],
+)
+def test_the_check_sees_what_is_not_said(text: str) -> None:
+    assert unsaid(text)
+
+
+def test_children_open_no_console_window() -> None:
+    """Each start of a process takes the options of ``silo.platform.child_options``."""
+    starts = [
+        f"{path.relative_to(MODS)}:{node.lineno}"
+        for path in MODS.rglob("*.py")
+        if path != ASKED_THERE
+        for node in ast.walk(ast.parse(path.read_text("utf-8")))
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Attribute)
+        and isinstance(node.func.value, ast.Name)
+        and (node.func.value.id, node.func.attr) in _STARTS
+        and "child_options" not in ast.dump(node)
+    ]
+    assert starts == []
+
+
+_STARTS = {("subprocess", name) for name in ("run", "Popen", "call", "check_call", "check_output")}
+
+
+def test_a_file_keeps_its_rights_and_tags_on_macos(tmp_path: Path) -> None:
+    """Python has no access lists and no extended attributes there; the C library copies them."""
+    old, new = tmp_path / "old", tmp_path / "new"
+    old.touch()
+    new.touch()
+    calls: list[tuple[object, ...]] = []
+    copy_rights(str(old), str(new), library=SimpleNamespace(copyfile=lambda *words: calls.append(words)))
+    assert calls == [(os.fsencode(old), os.fsencode(new), None, 1 | 4)]
+
+
+def test_a_file_keeps_its_rights_and_streams_on_windows(tmp_path: Path) -> None:
+    """A call of Windows puts the new content below the old name; where a share cannot, it is replaced."""
+    old, new = tmp_path / "old", tmp_path / "new"
+    for code, content in ((0, "old"), (1175, "new")):
+        old.write_text("old")
+        new.write_text("new")
+        calls: list[tuple[str, str]] = []
+        swap(str(new), str(old), merge=lambda *words, c=calls, k=code: (c.append(words), k)[1])
+        assert calls == [(str(new), str(old))]
+        assert old.read_text() == content
+
+
+def test_a_file_that_is_open_elsewhere_is_waited_for_on_windows(tmp_path: Path) -> None:
+    old, new = tmp_path / "old", tmp_path / "new"
+    answers = [32, 5, 0]
+    waited: list[float] = []
+    patiently(lambda: swap(str(new), str(old), merge=lambda *_: answers.pop(0)), wait=waited.append)
+    assert (answers, len(waited)) == ([], 2)

@@ -76,6 +76,7 @@ def test_where_names_differ_by_case_they_are_two_files(tmp_path: Path) -> None:
         assert real(tmp_path / name) == str(tmp_path / name)
 
 
+@pytest.mark.usefixtures("needs_symlinks")
 def test_hard_links_and_symlinks(tmp_path: Path) -> None:
     """Both names of a hard link are listed, so each stays what it is; a symlink is its target."""
     (tmp_path / "Bolt.FCStd").write_text("x")

@@ -19,6 +19,7 @@ from pathlib import Path
 
 from silo.bom.errors import ConfigError, InputError
 from silo.freecadcmd.run import find_freecadcmd
+from silo.freecads import exchange_folder, start
 from silo.platform import child_options, python_beside
 
 # As package.xml declares them to the Addon Manager.
@@ -62,11 +63,14 @@ class Place:
 def ask_freecad(freecadcmd: str | None = None, data: Path | None = None) -> Place:
     """Ask FreeCAD for its folders and versions. ``data`` stands for the data folder that it names."""
     command = find_freecadcmd(freecadcmd)
-    with tempfile.TemporaryDirectory(prefix="silo-ask-") as folder:
+    shared = exchange_folder(command)
+    if shared is not None:
+        os.makedirs(shared, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix="silo-ask-", dir=shared) as folder:
         out = Path(folder) / "answer.json"
         try:
             run = subprocess.run(
-                [command, "-c", _ASK],
+                [*start(command), "-c", _ASK],
                 env={**os.environ, "SILO_ASK_OUT": str(out)},
                 stdin=subprocess.DEVNULL,
                 capture_output=True,
@@ -75,6 +79,7 @@ def ask_freecad(freecadcmd: str | None = None, data: Path | None = None) -> Plac
                 timeout=_ASK_SECONDS,
                 cwd=folder,
                 check=False,
+                **child_options(),
             )
         except (OSError, subprocess.TimeoutExpired) as error:
             raise ConfigError(f"{command} does not answer: {error}") from error

@@ -20,6 +20,7 @@ _FLATPAK = "org.freecad.FreeCAD"
 _ROOT = Path("/")
 _MOVED_CACHES = (("FREECAD_USER_TEMP", ""), ("FREECAD_USER_HOME", "temp"))
 _WINDOWS_CACHES = (("LOCALAPPDATA", "/cache"), ("TEMP", ""))
+_APPIMAGES = ("~/Applications", "~/AppImages", "~/.local/bin", "/opt")
 _BUNDLES = ("/Applications", "~/Applications")
 
 
@@ -38,7 +39,26 @@ def _command_places(env: Mapping[str, str], platform: str) -> tuple[str, ...]:
         return tuple(f"{base}/bin/{name}.exe" for base in _windows(env) for name in _COMMANDS[:2])
     if platform == "darwin":
         return tuple(f"{base}/FreeCAD*.app/Contents/Resources/bin/freecadcmd" for base in _BUNDLES)
-    return ("/snap/bin/freecad.cmd", "/usr/local/bin/freecadcmd", "~/.local/bin/freecadcmd")
+    return (
+        "/snap/bin/freecad.cmd",
+        "/usr/local/bin/freecadcmd",
+        "~/.local/bin/freecadcmd",
+        *(f"{base}/exports/bin/{_FLATPAK}" for base in _flatpak_bases()),
+        *(
+            f"{folder}/FreeCAD*.AppImage"
+            for folder in ("~/Applications", "~/AppImages", "~/.local/bin", "/opt")
+        ),
+    )
+
+
+def start(command: str) -> list[str]:
+    """The words that start FreeCAD without its window: some packages need more than a path."""
+    name = os.path.basename(command)
+    if name.casefold().endswith(".appimage"):
+        return [command, "freecadcmd"]  # an AppImage runs the program that its first argument names
+    if name == _FLATPAK:
+        return ["flatpak", "run", "--die-with-parent", "--command=FreeCADCmd", _FLATPAK]
+    return [command]
 
 
 def material_folders(
@@ -97,7 +117,7 @@ def exchange_folder(command: str, env: Mapping[str, str] = os.environ) -> str | 
     home = Path(env.get("HOME") or Path.home())
     if command.startswith(("/snap/", "/var/lib/snapd/")) or os.path.basename(real) == "snap":
         return str(home / "snap" / "freecad" / "common")
-    if "flatpak" in command or "flatpak" in real:
+    if os.path.basename(command) == _FLATPAK or "flatpak" in command or "flatpak" in real:
         return str(home / ".var" / "app" / _FLATPAK / "cache")
     return None
 

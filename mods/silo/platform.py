@@ -7,11 +7,13 @@ instead of the platform's name, so that tests can put either in its place.
 
 from __future__ import annotations
 
+import ctypes
 import errno
 import importlib
 import os
 import signal
 import socket
+import stat
 import subprocess
 import sys
 import time
@@ -27,6 +29,9 @@ MODES_COUNT = os.name == "posix"
 # Another program has the file open: a virus scanner, an indexer, a colleague. ERROR_ACCESS_DENIED,
 # ERROR_SHARING_VIOLATION, ERROR_LOCK_VIOLATION of Windows; POSIX has no such error.
 _IN_USE = (5, 32, 33)
+_IGNORE_MERGE_ERRORS = 0x2  # ReplaceFileW: a right that cannot be copied is no reason to fail
+_CANNOT_MERGE = 1175  # ERROR_UNABLE_TO_REMOVE_REPLACED
+_COPYFILE_ACL, _COPYFILE_XATTR = 1, 4  # copyfile.h of macOS
 _WAITS_S = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6)
 
 
@@ -68,6 +73,59 @@ def patiently(act: Callable[[], None], *, wait: Callable[[float], None] = time.s
                 raise
         wait(seconds)
     act()
+
+
+def copy_rights(source: str, copy: str, *, library: Any = None) -> None:
+    """Give a copy the owner, modes, access list and tags of its source, as far as the system allows it.
+
+    library
+        stands for the C library of macOS; None where this is no macOS. Windows keeps them in :func:`swap`.
+    """
+    status = os.stat(source)
+    with suppress(OSError, AttributeError):  # only an administrator may give files away
+        os.chown(copy, status.st_uid, status.st_gid)
+    with suppress(OSError):  # FAT and some shares have no modes to keep
+        os.chmod(copy, stat.S_IMODE(status.st_mode))
+    library = library or (ctypes.CDLL("/usr/lib/libSystem.dylib") if NAME == "darwin" else None)
+    if library is not None:
+        # copyfile(3); Python offers neither access lists nor Finder tags there.
+        library.copyfile(os.fsencode(source), os.fsencode(copy), None, _COPYFILE_ACL | _COPYFILE_XATTR)
+    elif hasattr(os, "listxattr"):  # Linux keeps access lists there too
+        names: list[str] = []
+        with suppress(OSError):  # FUSE and CIFS may have no extended attributes
+            names = os.listxattr(source)
+        for name in names:
+            with suppress(OSError):  # some belong to the system
+                os.setxattr(copy, name, os.getxattr(source, name))
+
+
+def swap(source: str, target: str, *, merge: Callable[[str, str], int] | None = None) -> None:
+    """Put a new file in the place of an old one. Raises OSError.
+
+    On Windows the file keeps the access list, streams and attributes that it had: ``merge`` stands for the
+    call that does it there, and returns an error number of Windows or 0.
+    """
+    merge = merge or (_replace_file if WINDOWS else None)
+    code = merge(source, target) if merge is not None else _CANNOT_MERGE
+    if code in _IN_USE:
+        raise InUseError(code, target)
+    if code:  # shares of other systems cannot merge the two
+        os.replace(source, target)
+
+
+def _replace_file(source: str, target: str) -> int:
+    windows: Any = ctypes  # its loader is known to type checkers on Windows only
+    kernel = windows.WinDLL("kernel32", use_last_error=True)
+    done = kernel.ReplaceFileW(target, source, None, _IGNORE_MERGE_ERRORS, None, None)
+    return 0 if done else int(windows.get_last_error())
+
+
+class InUseError(PermissionError):
+    """Another program has the file open; :func:`patiently` waits for it."""
+
+    def __init__(self, code: int, path: str) -> None:
+        super().__init__(errno.EACCES, "another program has it open", path)
+        self.winerror = code
 
 
 def sync_folder(folder: str | os.PathLike[str]) -> None:

@@ -74,7 +74,7 @@ def test_the_check_may_name_a_file_that_exists(path: Path, tmp_path: Path) -> No
     assert resolve_server(env={}, path=path).verify is False
 
 
-@pytest.mark.skipif(os.name != "posix", reason="file modes are POSIX")
+@pytest.mark.usefixtures("needs_modes")
 def test_the_file_is_private(path: Path, caplog: pytest.LogCaptureFixture) -> None:
     """Mode 0600 from the first byte, in a folder of its own; an open one is warned about."""
     save_config("http://h", "silo_x", path=path)
@@ -88,6 +88,7 @@ def test_the_file_is_private(path: Path, caplog: pytest.LogCaptureFixture) -> No
     assert path.stat().st_mode & 0o777 == 0o600
 
 
+@pytest.mark.usefixtures("needs_modes")
 def test_the_rest_of_the_file_stays(path: Path) -> None:
     """Other settings are not ours to drop; a token that is not given any more is."""
     path.parent.mkdir()

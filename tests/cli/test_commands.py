@@ -120,11 +120,11 @@ def test_register_twice_creates_nothing_twice(run: Any, silo: Any, gearbox: Path
     assert len(silo.client.search_items()) == 9
 
 
+@pytest.mark.usefixtures("needs_locks")
 def test_register_leaves_alone_what_freecad_has_open(
     run: Any, silo: Any, gearbox: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Saving there would undo it. Nothing is made on the server for it, and the others are registered."""
-    pytest.importorskip("fcntl")
     monkeypatch.setenv("FREECAD_USER_TEMP", str(tmp_path / "cache"))
     before = gearbox.read_bytes()
     with opened(tmp_path / "cache", gearbox):

@@ -37,7 +37,7 @@ def test_a_reader_that_has_seen_enough_is_no_failure(gearbox: Path, option: str)
     assert len(ran.stdout.splitlines()) == 1
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+@pytest.mark.usefixtures("needs_dev_full")
 @pytest.mark.parametrize("option", ["", "--json"])
 def test_a_full_disk_is_one_sentence(gearbox: Path, option: str) -> None:
     """And not exit code 0: the answer did not arrive."""
@@ -92,6 +92,7 @@ def test_a_report_that_cannot_be_written_is_one_sentence(run: Any, silo: Any, ge
     assert "Traceback" not in ran.err
 
 
+@pytest.mark.usefixtures("needs_symlinks")
 def test_paths_are_those_of_the_caller(
     run: Any, gearbox: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

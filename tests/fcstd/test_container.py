@@ -58,13 +58,14 @@ def test_a_folder_with_the_name_of_a_document_is_refused(tmp_path: Path) -> None
     assert refused(tmp_path / "folder.FCStd") == "it is a folder, not a FreeCAD document"
 
 
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes on this system")
+@pytest.mark.usefixtures("needs_pipes")
 def test_a_named_pipe_does_not_hang(tmp_path: Path) -> None:
     """Opening a pipe that nobody writes to would wait for ever."""
     os.mkfifo(tmp_path / "pipe.FCStd")
     assert "no regular file" in refused(tmp_path / "pipe.FCStd")
 
 
+@pytest.mark.usefixtures("needs_symlinks")
 def test_a_symlink_loop_is_an_error(tmp_path: Path) -> None:
     """Symlinks in a circle end in an error of the system, told in its words."""
     (tmp_path / "a.FCStd").symlink_to("b.FCStd")

@@ -150,6 +150,7 @@ def test_file_names_of_all_kinds(tmp_path: Path) -> None:
     assert target(tmp_path, name).Name == "Box"
 
 
+@pytest.mark.usefixtures("needs_symlinks")
 def test_joined_as_text_like_freecad(tmp_path: Path) -> None:
     """``..`` takes a name away before symlinks are followed, as FreeCAD does (observed, 0.20)."""
     part(uuid="right").save(tmp_path / "project" / "parts" / "p.FCStd")
@@ -160,6 +161,7 @@ def test_joined_as_text_like_freecad(tmp_path: Path) -> None:
     assert found.Document.Meta == {"SiloUUID": "right"}
 
 
+@pytest.mark.usefixtures("needs_symlinks")
 def test_found_from_where_the_owner_really_lies(tmp_path: Path) -> None:
     """A top file that was opened by a symlink still finds its parts."""
     part().save(tmp_path / "project" / "part.FCStd")
@@ -208,6 +210,7 @@ def test_links_within_the_root(tmp_path: Path, inside: str) -> None:
 @pytest.mark.parametrize(
     "way", ["../secret.FCStd", "absolute", "symlink.FCStd", "folder/secret.FCStd", "../none.FCStd"]
 )
+@pytest.mark.usefixtures("needs_symlinks")
 def test_links_that_leave_the_root(tmp_path: Path, way: str) -> None:
     """By name or by symlink; whether there is a file out there is not told either."""
     secret = part().save(tmp_path / "secret.FCStd")

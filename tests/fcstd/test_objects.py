@@ -266,6 +266,7 @@ def test_the_table_of_types_has_one_root() -> None:
         assert all(kind not in ancestors(parent) for parent in ancestors(kind) - {kind})
 
 
+@pytest.mark.usefixtures("needs_symlinks")
 def test_the_same_file_is_the_same_document(tmp_path: Path) -> None:
     """One file, one document object, whatever the path; so ``is`` tells parts apart."""
     part().save(tmp_path / "lib" / "part.FCStd")

@@ -25,8 +25,6 @@ from silo.fcstd.rewrite import replaced_entry
 from silo.fcstd.stamp import _read_back
 from silo.platform import sync_folder
 
-ROOT = hasattr(os, "geteuid") and os.geteuid() == 0
-
 
 def with_entries(folder: Path) -> Path:
     """A file with side entries of all kinds, Document.xml in the middle."""
@@ -160,7 +158,7 @@ def test_read_only_files_stay(tmp_path: Path) -> None:
     assert refused(path) == "it is read-only; nothing was written"
 
 
-@pytest.mark.skipif(ROOT, reason="an administrator may write anywhere")
+@pytest.mark.usefixtures("needs_modes", "needs_user_without_rights")
 def test_read_only_folders_stay(tmp_path: Path) -> None:
     """No rights in the folder: a plain sentence."""
     path = part().save(tmp_path / "in" / "p.FCStd")
@@ -200,9 +198,11 @@ def test_a_copy_without_the_identity_is_thrown_away(tmp_path: Path) -> None:
     assert os.listdir(tmp_path) == ["p.FCStd"]
 
 
+@pytest.mark.usefixtures("needs_limits")
 def test_a_full_disk_leaves_the_file(tmp_path: Path) -> None:
     """An error of the system while writing leaves no half file and no rest."""
-    resource = pytest.importorskip("resource", reason="needs limits of POSIX")
+    import resource
+
     path = part().save(tmp_path / "p.FCStd")
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))
@@ -213,7 +213,7 @@ def test_a_full_disk_leaves_the_file(tmp_path: Path) -> None:
     assert found == "it cannot be written: File too large"
 
 
-@pytest.mark.skipif(not hasattr(os, "fchmod"), reason="needs POSIX modes")
+@pytest.mark.usefixtures("needs_modes", "needs_symlinks")
 def test_rights_and_links_stay(tmp_path: Path) -> None:
     """Mode bits are kept; a symlink stays a symlink and its file is stamped."""
     path = part().save(tmp_path / "store" / "p.FCStd")

@@ -255,6 +255,7 @@ def test_freecad_reads_a_stamp_where_meta_was_missing(freecad: Run, tmp_path: Pa
     assert freecad(SHAPES, path=str(path))["meta"] == {"SiloUUID": "u-1"}
 
 
+@pytest.mark.usefixtures("needs_symlinks")
 def test_links_by_symlinks_as_freecad(freecad: Run, tmp_path: Path) -> None:
     """Relative paths are joined as FreeCAD 0.20 and 1.0 join them: as text, from the folder as it was opened.
 

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import json
 import os
@@ -50,6 +49,8 @@ def _said(freecad: Window) -> Iterator[dict[str, Any]]:
 @contextmanager
 def another_freecad(freecad: Window) -> Iterator[str]:
     """What a second FreeCAD that has Construction.FCStd open keeps in the user's cache."""
+    import fcntl
+
     cache = freecad.home / "temp"
     digest = hashlib.sha1(bytes(freecad.vault / "Construction.FCStd")).hexdigest()
     (cache / f"FreeCAD_Doc_{uuid.uuid4()}_{digest[:6]}_1").mkdir()

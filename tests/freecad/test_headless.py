@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 import os
-import pty
 import re
 import shutil
 import subprocess
@@ -326,7 +325,7 @@ def test_a_terminal_sees_how_far_the_run_is(
 ) -> None:
     """Each file is named when it is begun, on a terminal only; the results stay clean on standard output."""
     _use(machines.need("1.0"), tmp_path, monkeypatch)
-    ours, theirs = pty.openpty()
+    ours, theirs = os.openpty()
     try:
         done = subprocess.run(
             [sys.executable, "-m", "silo.cli.main", "sync", "--via", via, "--json", str(vault.folder)],

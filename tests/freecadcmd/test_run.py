@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import os
 import stat
 import sys
 from pathlib import Path
@@ -74,6 +75,38 @@ def test_each_file_gives_its_extraction_in_order(tmp_path: Path, freecadcmd: str
     assert all(found == GOOD for _, found in results)
     assert isinstance(results[0][1], Extraction)
     assert results[0][1].assembly.label == "Main"
+
+
+@pytest.mark.usefixtures("needs_modes")
+def test_an_appimage_runs_the_program_that_its_first_argument_names(tmp_path: Path, freecadcmd: str) -> None:
+    appimage = tmp_path / "FreeCAD_1.1.1-Linux-x86_64-py311.AppImage"
+    appimage.write_text(f'#!/bin/sh\n[ "$1" = freecadcmd ] || exit 9\nshift\nexec {freecadcmd} "$@"\n')
+    appimage.chmod(0o755)
+    ((_, found),) = run_freecad(tops(tmp_path, "good"), command=str(appimage))
+    assert found == GOOD
+
+
+@pytest.mark.usefixtures("needs_modes")
+def test_flatpak_starts_its_freecad_and_finds_the_job(
+    tmp_path: Path, freecadcmd: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What Flatpak exports starts the window; and a Flatpak sees a part of the home, not our ``/tmp``."""
+    exported = tmp_path / "flatpak" / "exports" / "bin" / "org.freecad.FreeCAD"
+    exported.parent.mkdir(parents=True)
+    exported.write_text("#!/bin/sh\nexit 9\n")
+    exported.chmod(0o755)
+    flatpak = tmp_path / "bin" / "flatpak"
+    flatpak.parent.mkdir()
+    flatpak.write_text(
+        '#!/bin/sh\n[ "$*" != "${*#run --die-with-parent --command=FreeCADCmd org.freecad.FreeCAD -c}" ] '
+        f'|| exit 8\ncase "$SILO_ARGS_FILE" in "$HOME"/.var/app/*) ;; *) exit 7 ;; esac\n'
+        f'shift 4\nexec {freecadcmd} "$@"\n'
+    )
+    flatpak.chmod(0o755)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("PATH", f"{flatpak.parent}{os.pathsep}{os.environ['PATH']}")
+    ((_, found),) = run_freecad(tops(tmp_path, "good"), command=str(exported))
+    assert found == GOOD
 
 
 def test_a_file_that_kills_freecad_does_not_stop_the_rest(tmp_path: Path, freecadcmd: str) -> None:

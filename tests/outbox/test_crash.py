@@ -15,7 +15,7 @@ import pytest
 from silo.api.client import SiloClient
 from silo.fcstd import Library
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="kill -9 is POSIX")
+pytestmark = pytest.mark.usefixtures("needs_signals")
 
 ITEMS = {"Assembly1": "A01", "Assembly2": "A01", "Bolt": "F01", "Plate": "M01", "Shaft": "M01"}
 

@@ -127,8 +127,8 @@ for hold in (True, False):
 """
 
 
-@pytest.mark.skipif(os.name != "posix", reason="users and limits are POSIX")
 @pytest.mark.parametrize("trouble", ["disk full", "folder read-only"])
+@pytest.mark.usefixtures("needs_modes", "needs_limits")
 def test_a_disk_that_takes_nothing_is_told_and_loses_nothing(
     proxy: Proxy, client: SiloClient, trouble: str
 ) -> None:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import sqlite3
 import sys
 import threading
@@ -168,7 +167,7 @@ def test_a_file_that_cannot_be_read_is_told_and_nothing_is_kept(outbox: Outbox, 
     assert list(outbox.copies.iterdir()) == []
 
 
-@pytest.mark.skipif(os.name != "posix", reason="file modes are POSIX")
+@pytest.mark.usefixtures("needs_modes")
 def test_nobody_else_can_read_it(outbox: Outbox, model: Path) -> None:
     """Designs and comments are private: database, its companions, copies, folder."""
     outbox.entries()

@@ -250,7 +250,7 @@ def test_a_full_disk_under_the_database_loses_nothing(store: Store, document: Pa
     assert (store.entries(), len(silo.revisions("A01-0001"))) == ((), 1)
 
 
-@pytest.mark.skipif(os.name != "posix", reason="file modes are POSIX")
+@pytest.mark.usefixtures("needs_modes")
 def test_commits_are_private(store: Store, document: Path) -> None:
     """They hold other people's documents."""
     entry = store.add(commit(document))

@@ -99,6 +99,7 @@ def test_the_last_use_of_a_token_is_noted_when_it_can_be(db: Database) -> None:
 
 
 @pytest.mark.postgres
+@pytest.mark.usefixtures("needs_signals")
 def test_a_frozen_postgres_stops_neither_health_nor_us(databases: Databases, tmp_path: Path) -> None:
     """Every process of the database stopped: health answers, ready says no, a request ends with 503."""
     url = databases.new("postgres")

@@ -17,7 +17,7 @@ from typing import Any
 
 _POSIX_ONLY = ("fchmod", "fchown", "killpg", "setsid")
 _HIDDEN = ("fcntl", "resource")
-# Libraries of the tests themselves may do as they like.
+# Libraries may do as they like, those of the tests and those that we call.
 _OURS = (os.sep + "silo" + os.sep, os.sep + "silo_server" + os.sep)
 
 
@@ -54,7 +54,7 @@ def _by_us(depth: int = 3) -> bool:
         name = frame.f_code.co_filename
         if any(part in name for part in _OURS):
             return True
-        if os.sep + "tests" + os.sep in name:
+        if os.sep + "tests" + os.sep in name or os.sep + "site-packages" + os.sep in name:
             return False
         frame = frame.f_back
     return False

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from silo.api.events import ConnectionState
     from silo.api.sse import ServerEvent
 
+# Windows takes Ctrl-C between two waits, never within one.
+_CTRL_C_S = 0.5
+
 
 def register(commands: Commands) -> None:
     """Add the command."""
@@ -60,7 +63,10 @@ def _print(
 
     shown = 0
     while args.count is None or shown < args.count:
-        event = events.get()
+        try:
+            event = events.get(timeout=_CTRL_C_S)
+        except queue.Empty:
+            continue
         if isinstance(event, ConnectionState):
             if event.kind is Connection.UNSUPPORTED:
                 raise RouteMissingError(f"there is no live connection: {event.message}")

@@ -15,12 +15,13 @@ from collections.abc import Callable, Iterable
 from typing import BinaryIO
 
 from silo.bom.errors import DocumentError
-from silo.durable import remove_patiently, replace_patiently, sync_folder
+from silo.durable import remove_patiently, sync_folder
 from silo.fcstd.container import DOCUMENT_XML, ContainerFile, Entry, FileState
 from silo.fcstd.inflate import Inflater
 from silo.fcstd.limits import Limits
 from silo.fcstd.problem import FcstdError
 from silo.fcstd.rewrite import Piece
+from silo.platform import copy_rights, patiently, swap
 
 _BLOCK = 1 << 20
 
@@ -88,12 +89,12 @@ def _write(path: str, state: FileState, content: Iterable[Piece], check: Callabl
         with os.fdopen(descriptor, "wb") as file:
             _put(path, content, file)
             file.flush()
-            _keep_rights(path, file.fileno())
+            copy_rights(path, temporary)
             os.fsync(file.fileno())
         check(temporary)
         if _state(path) != state:
             raise changed(path)
-        replace_patiently(temporary, path)
+        patiently(lambda: swap(temporary, path))
     except BaseException:
         with contextlib.suppress(OSError):
             remove_patiently(temporary)
@@ -115,23 +116,6 @@ def _put(path: str, content: Iterable[Piece], file: BinaryIO) -> None:
                     raise changed(path)
                 file.write(block)
                 left -= len(block)
-
-
-def _keep_rights(path: str, descriptor: int) -> None:
-    status = os.stat(path)
-    if hasattr(os, "fchown"):
-        with contextlib.suppress(OSError):  # only an administrator may give files away
-            os.fchown(descriptor, status.st_uid, status.st_gid)
-    if hasattr(os, "fchmod"):
-        with contextlib.suppress(OSError):  # FAT and some shares have no rights to keep
-            os.fchmod(descriptor, stat.S_IMODE(status.st_mode))
-    if hasattr(os, "listxattr"):
-        names: list[str] = []
-        with contextlib.suppress(OSError):  # FUSE and CIFS may have no extended attributes
-            names = os.listxattr(path)
-        for name in names:
-            with contextlib.suppress(OSError):  # some belong to the system
-                os.setxattr(descriptor, name, os.getxattr(path, name))
 
 
 def _state(path: str) -> FileState | None:

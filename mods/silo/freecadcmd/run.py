@@ -24,7 +24,7 @@ from silo import platform
 from silo.bom.errors import CancelledError, ConfigError, DocumentError, InputError, SiloError
 from silo.bom.model import Extraction
 from silo.bom.snapshot import from_plain
-from silo.freecads import commands, exchange_folder
+from silo.freecads import commands, exchange_folder, start
 
 HEADLESS = Path(__file__).resolve().parents[1] / "workbench" / "headless.py"
 # FreeCAD opens large assemblies in minutes; this is per file.
@@ -39,14 +39,16 @@ def find_freecadcmd(given: str | None = None, env: Mapping[str, str] = os.enviro
     if wanted:
         found = shutil.which(wanted)
         if found is None:
-            raise ConfigError(f"{wanted} cannot be run; SILO_FREECADCMD must name FreeCAD's freecadcmd")
+            raise ConfigError(
+                f"{wanted} cannot be run; SILO_FREECADCMD must name FreeCAD's freecadcmd, its AppImage "
+                "or what Flatpak exports (…/flatpak/exports/bin/org.freecad.FreeCAD)"
+            )
         return found
     found = next(commands(env), None)
     if found is None:
         raise ConfigError(
             "no FreeCAD found: freecadcmd is not on the PATH, nor where FreeCAD is usually installed. "
-            "Install FreeCAD, or set SILO_FREECADCMD to its freecadcmd (for an AppImage or Flatpak to a "
-            "script that starts it)"
+            "Install FreeCAD, or set SILO_FREECADCMD to its freecadcmd or AppImage"
         )
     return found
 
@@ -190,7 +192,7 @@ class FreeCADRun:
         try:
             with open(self._log, "wb") as log:
                 self._process = subprocess.Popen(
-                    [self.freecadcmd, "-c", _CODE],
+                    [*start(self.freecadcmd), "-c", _CODE],
                     stdin=subprocess.DEVNULL,
                     stdout=log,
                     stderr=subprocess.STDOUT,

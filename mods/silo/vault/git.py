@@ -19,7 +19,7 @@ from pathlib import Path, PurePosixPath
 from typing import BinaryIO
 
 from silo.bom.errors import InputError
-from silo.platform import WINDOWS
+from silo.platform import WINDOWS, child_options
 
 _CHUNK = 1 << 20
 _POINTER = re.compile(rb"version https://git-lfs\.github\.com/spec/v1\n(?:.*\n)*?oid sha256:([0-9a-f]{64})\n")
@@ -97,6 +97,7 @@ def _batch(repository: str) -> Iterator[tuple[BinaryIO, BinaryIO]]:
         cwd=repository,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
+        **child_options(),
     ) as process:
         assert process.stdin is not None  # both are pipes
         assert process.stdout is not None
@@ -138,7 +139,10 @@ def _git(repository: str, *words: str) -> bytes:
     program = shutil.which("git")
     if program is None:
         raise InputError("git is not on the PATH; it is needed to read revisions.")
-    done = subprocess.run([program, *words], cwd=repository, capture_output=True, check=False)
+    command = [program, *words]
+    done: subprocess.CompletedProcess[bytes] = subprocess.run(
+        command, cwd=repository, capture_output=True, check=False, **child_options()
+    )
     if done.returncode:
         said = done.stderr.decode(errors="replace").strip() or "it does not know this revision"
         raise InputError(f"git {words[0]} {_last(words)} failed in {repository}: {said}")

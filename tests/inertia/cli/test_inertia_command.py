@@ -7,7 +7,6 @@ import csv
 import json
 import math
 import os
-import pty
 import signal
 import subprocess
 import sys
@@ -373,10 +372,11 @@ def reader_of(pid: int) -> int:
     raise AssertionError(f"{pid} started no process that loads the geometry kernel")
 
 
+@pytest.mark.usefixtures("needs_pty", "needs_signals")
 def test_ctrl_c_is_a_plain_sentence(arm: Path) -> None:
     """Cancelled while reading: exit 130, one line, no trace, no child left behind."""
     # A terminal of its own makes the progress bar appear: it says when the reading has begun.
-    parent, child = pty.openpty()
+    parent, child = os.openpty()
     process = subprocess.Popen(
         [sys.executable, "-m", "silo.cli.main", "inertia", str(arm / "arm.step"), "--no-cache"],
         stdout=subprocess.PIPE,

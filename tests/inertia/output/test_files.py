@@ -13,6 +13,7 @@ from silo.bom.errors import InputError
 from silo.inertia.output.files import write_whole
 
 
+@pytest.mark.usefixtures("needs_modes")
 def test_a_new_file_gets_the_usual_mode_and_an_old_one_keeps_its_own(tmp_path: Path) -> None:
     """A report that only its writer can read is no report; a file that was private stays so."""
     usual = tmp_path / "usual"
@@ -47,6 +48,7 @@ def test_no_folder_is_a_plain_error(tmp_path: Path) -> None:
         write_whole(tmp_path / "gone" / "x.csv", b"1")
 
 
+@pytest.mark.usefixtures("needs_pipes")
 def test_a_pipe_is_written_to_and_stays_a_pipe(tmp_path: Path) -> None:
     """``--report >(program)`` of a shell is a pipe: it cannot be replaced by a file."""
     pipe = tmp_path / "pipe"

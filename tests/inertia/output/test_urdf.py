@@ -93,6 +93,7 @@ def test_line_ends_of_the_file_are_kept() -> None:
     assert data.count(b"\n") == data.count(b"\r\n")
 
 
+@pytest.mark.usefixtures("needs_modes")
 def test_written_in_place_and_elsewhere(tmp_path: Path) -> None:
     """Atomically, with the file's mode; a target of its own leaves the source alone."""
     path = tmp_path / "robot.urdf"
@@ -167,6 +168,7 @@ def test_what_is_there_twice_is_refused(data: bytes, words: str) -> None:
         fill_urdf(data, {"a": PROPS}, "x.urdf")
 
 
+@pytest.mark.usefixtures("needs_symlinks")
 def test_a_link_to_a_file_stays_one(tmp_path: Path) -> None:
     """A symbolic link is followed, not replaced by a file of its own."""
     (tmp_path / "robot.urdf").write_bytes(ROBOT)

@@ -79,6 +79,7 @@ def test_siblings_are_found_below_the_folder_to_a_depth(split: Path, read_in: An
     assert volume_mm3(read_in(split, sibling_depth=3)) == pytest.approx(22_000)
 
 
+@pytest.mark.usefixtures("needs_symlinks")
 def test_nothing_is_read_outside_of_the_folder(split: Path, read_in: Any) -> None:
     """A link that leaves the folder is no sibling, nor is a file one level up."""
     outside = split.parents[1] / "hand.STEP"
