@@ -6,12 +6,15 @@ from __future__ import annotations
 import json
 import os
 import unicodedata
+import uuid
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from fcstd_writer import Doc, XLink, locals_
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from other_disk import other_disk
 
 from silo.bom.report import bom_json
@@ -86,10 +89,11 @@ def test_hard_links_and_symlinks(tmp_path: Path) -> None:
     assert real(tmp_path / "link.FCStd") == str(tmp_path / "Bolt.FCStd")
 
 
-def project(folder: Path, *recorded: str) -> Path:
-    """An assembly with one link for each recorded spelling of ``Parts/Büchse.FCStd``."""
-    (folder / "Parts").mkdir()
-    Doc("part").add("Part::Box", "Box").save(folder / "Parts" / "Büchse.FCStd")
+def project(folder: Path, *recorded: str, names: tuple[str, ...] = ("Büchse",)) -> Path:
+    """An assembly with one link for each recorded spelling of ``Parts/Büchse.FCStd`` or another part."""
+    (folder / "Parts").mkdir(exist_ok=True)
+    for name in names:
+        Doc("part").add("Part::Box", "Box").save(folder / "Parts" / f"{name}.FCStd")
     top = Doc("top")
     for number, file in enumerate(recorded):
         top.add("App::Link", f"L{number}", LinkedObject=XLink(file, "Box"))
@@ -125,3 +129,32 @@ def test_how_the_user_spells_the_folder_is_no_matter_of_the_links(disk: Path) ->
     project(disk / "Vault", "Parts/Büchse.FCStd")
     found = read_assembly(str(disk / "VAULT" / "top.fcstd"))
     assert [f.code.value for f in found.findings if "differs" in f.message] == []
+
+
+NAMES = ("Büchse", "Ölwanne", "Straße", "M8x20")
+
+
+@st.composite
+def respelt(draw: st.DrawFn) -> str:
+    """A part's recorded path as some system may have spelt it."""
+    text = f"Parts/{draw(st.sampled_from(NAMES))}.FCStd"
+    other = "".join(
+        draw(st.sampled_from((c, c.lower(), c.upper() if len(c.upper()) == 1 else c))) for c in text
+    )
+    return unicodedata.normalize(draw(st.sampled_from(("NFC", "NFD"))), other)
+
+
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(recorded=st.lists(respelt(), min_size=1, max_size=6), folder=st.uuids())
+def test_any_spelling_gives_the_same_bom_on_every_disk(
+    disk: Path, tmp_path: Path, recorded: list[str], folder: uuid.UUID
+) -> None:
+    """What Linux counts as three spellings of one part, Windows and macOS find as that part: equal JSON."""
+    read: list[Any] = []
+    for place in (tmp_path / "usual" / folder.hex, disk / folder.hex):
+        place.mkdir(parents=True, exist_ok=True)
+        read.append(json.dumps(bom_json(read_assembly(str(project(place, *recorded, names=NAMES))))))
+        read[-1] = read[-1].replace(str(place), "")
+    assert read[0] == read[1]
+    table = json.loads(read[0])
+    assert "missing" not in json.dumps([f["code"] for f in table["findings"]])

@@ -103,6 +103,11 @@ class Spelling:
         return known
 
 
+def one_path(path: str) -> str:
+    """:meth:`Spelling.real` for a single look."""
+    return Spelling().real(path)
+
+
 def folded(name: str) -> str:
     """Equal for names that differ in case or normal form only."""
     return unicodedata.normalize("NFC", unicodedata.normalize("NFD", name).casefold())

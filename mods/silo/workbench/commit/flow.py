@@ -22,6 +22,7 @@ from typing import Any
 
 from silo.bom.errors import SiloError
 from silo.outbox.entry import Commit, new_key
+from silo.spelling import one_path
 from silo.workbench.commit.decisions import Decisions
 from silo.workbench.commit.desk import Desk
 from silo.workbench.commit.plan import Plan, Row, State, Taken, Taker, plan, refusal
@@ -108,7 +109,7 @@ class CommitFlow:
 
     def send(self, doc: Any, comment: str) -> None:
         """Send a document that has just been saved, as it is."""
-        path = os.path.realpath(doc.FileName)
+        path = one_path(doc.FileName)
         self.run((Row(doc, path, str(doc.Label), State.SAVED),), comment)
 
     def _turn(self) -> None:

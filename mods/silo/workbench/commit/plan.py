@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from silo.bom.errors import SiloError
+from silo.spelling import one_path
 from silo.workbench.commit.snapshot import Snapshot
 from silo.workbench.words import plain, translate
 
@@ -109,7 +110,7 @@ def plan(top: Any, documents: Documents) -> Plan:
     for doc in leaves_first(top) if changed else (top,):
         is_top = doc is top or doc == top
         if is_top or doc.Name in changed:
-            path = os.path.realpath(doc.FileName) if doc.FileName else ""
+            path = one_path(doc.FileName) if doc.FileName else ""
             rows.append(Row(doc, path, str(doc.Label), _state(doc, documents), is_top))
     return Plan(tuple(rows))
 

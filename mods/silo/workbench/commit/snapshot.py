@@ -17,6 +17,7 @@ from silo.bom.identity import META_KEY, identity_of
 from silo.bom.links import extract
 from silo.bom.model import Extraction
 from silo.bom.roots import NAME_ONE, choose_assembly
+from silo.spelling import one_path
 from silo.workbench.words import plain, translate
 
 
@@ -57,7 +58,7 @@ def take(doc: Any, *, assembly: Any = None, walk: Walk = extract) -> Snapshot:
     walk
         gives the BOM of a container (:func:`silo.workbench.freecad.live.extract_object`).
     """
-    path = os.path.realpath(doc.FileName) if doc.FileName else ""
+    path = one_path(doc.FileName) if doc.FileName else ""
     label = str(getattr(doc, "Label", "") or os.path.basename(path))
     try:
         container = _choose(doc, assembly)

@@ -8,7 +8,6 @@ is asked, whose method tells us. All of these only note the document; a moment l
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from typing import Any, Protocol
 
@@ -80,7 +79,9 @@ class CommitHook:
 
     def _saved(self, doc: Any, filename: str) -> None:
         # "Save a copy" tells another file than the document's own.
-        same = bool(doc.FileName) and os.path.realpath(filename) == os.path.realpath(doc.FileName)
+        from silo.spelling import one_path  # late: FreeCAD's start waits for this module
+
+        same = bool(doc.FileName) and one_path(filename) == one_path(doc.FileName)
         if same:
             self.note(doc, committed=False)
 

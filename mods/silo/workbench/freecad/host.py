@@ -117,13 +117,18 @@ def active_document() -> Any:
 
 
 def documents_by_path() -> dict[str, Any]:
-    """The open documents by the real paths of their files; one file may have been opened by several paths."""
-    return {os.path.realpath(doc.FileName): doc for doc in documents() if doc.FileName}
+    """The open documents by the paths of their files, each in the one spelling that its folder lists."""
+    from silo.spelling import Spelling  # late: FreeCAD's start waits for this module
+
+    real = Spelling().real
+    return {real(doc.FileName): doc for doc in documents() if doc.FileName}
 
 
 def find_document(path: str) -> Any:
     """The open document of a file, or None."""
-    return documents_by_path().get(os.path.realpath(path))
+    from silo.spelling import one_path
+
+    return documents_by_path().get(one_path(path))
 
 
 def linked_documents(doc: Any) -> list[Any]:

@@ -23,7 +23,7 @@ from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.links import extract
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.roots import choose_assembly
-from silo.spelling import Spelling
+from silo.spelling import Spelling, one_path
 from silo.workbench.freecad import host, saving
 from silo.workbench.freecad.cached import CachedDocument, FactCache
 
@@ -234,7 +234,7 @@ def saved_by(document: Any) -> tuple[int, int] | None:
 
 
 def _lost(document: Any, names: list[str]) -> Extraction:
-    path = os.path.realpath(document.FileName)
+    path = one_path(document.FileName)
     major, minor = host.version()
     message = (
         f"{document.Label} was saved by FreeCAD {document.getProgramVersion()}; this FreeCAD {major}.{minor} "

@@ -9,7 +9,6 @@ therefore told apart.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -19,6 +18,7 @@ from silo.bom.identity import walk_entries
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.roots import choose_assembly
 from silo.bom.walk.kinds import Kind, flattened
+from silo.spelling import one_path
 from silo.workbench.freecad import host
 from silo.workbench.freecad.live import cached_document
 
@@ -83,7 +83,7 @@ def accounts(extraction: Extraction) -> list[Account]:
 
 def _object(entry: BomEntry) -> Any:
     for doc in host.documents():
-        if os.path.realpath(doc.FileName) == entry.doc_path:
+        if one_path(doc.FileName) == entry.doc_path:
             return doc.getObject(entry.object_name)
     return None
 
