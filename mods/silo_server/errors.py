@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
-from silo.bom.errors import ConflictError, RejectedError, RemoteError
+from collections.abc import Sequence
+
+from silo.bom.errors import ConflictError, RejectedError, RemoteError, VersionConflictError
 
 
 class TooLargeError(RejectedError):
@@ -28,3 +30,11 @@ class DuplicateError(ConflictError):
     """409: there is one already."""
 
     code = "duplicate"
+
+
+class LinesChangedError(VersionConflictError):
+    """Lines are no longer as the person saw them, who therefore decides again; ``line_ids`` names them."""
+
+    def __init__(self, message: str, line_ids: Sequence[str]) -> None:
+        super().__init__(message)
+        self.line_ids = tuple(line_ids)

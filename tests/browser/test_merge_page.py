@@ -234,12 +234,12 @@ def test_what_is_wrong_is_said_and_nothing_typed_is_lost(api: Api, visit: Visit)
 
 
 def test_a_decision_on_an_old_page_does_nothing(case: Case, api: Api, visit: Visit) -> None:
-    """Somebody else was quicker: nothing is done, and the page shows how it stands now."""
+    """Somebody else was quicker: nothing is done, and the page shows how the line stands now."""
     page = visit("editor")
     page.goto(case.path)
-    api.good("PUT", bom(case.parent, case.used), {"notes": "changed meanwhile"})
+    api.good("PUT", bom(case.parent, case.gone[0]), {"notes": "changed meanwhile"})
     page.get_by_role("button", name=f"Remove {case.gone[0]}").click()
-    expect(page.get_by_role("alert")).to_contain_text("Somebody else changed this BOM")
+    expect(page.get_by_role("alert")).to_contain_text("changed while you were deciding")
     assert case.gone[0] in api.lines(case.parent)
     page.get_by_role("button", name=f"Remove {case.gone[0]}").click()
     expect(page.locator(".notice")).to_contain_text(f"{case.gone[0]} removed")

@@ -3,29 +3,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Any
+from urllib.parse import parse_qsl, urlencode
 
 from fastapi import APIRouter, Query, Request
 from starlette.datastructures import FormData
 from starlette.responses import Response
 
-from silo.bom.errors import ConflictError, NotFoundError, RejectedError, SiloError, VersionConflictError
+from silo.bom.errors import ConflictError, NotFoundError, RejectedError, SiloError
 from silo_server.db.engine import Tx
+from silo_server.errors import DuplicateError, LinesChangedError
 from silo_server.routes.context import Server, ServerDep
 from silo_server.services import events
 from silo_server.services.bom import edits, history
 from silo_server.services.bom import review as service
 from silo_server.services.bom.last_sync import in_sentences, last_sync
-from silo_server.services.bom.lines import LineId, line_of, lines_of
+from silo_server.services.bom.lines import LineId, component_of, line_of, lines_of, mark_of
 from silo_server.services.bom.review import Action, Decision
 from silo_server.services.items import get_item
-from silo_server.values import Actor, Line
-from silo_server.web.forms import Form, amount, back, text, texts, whole
+from silo_server.values import Actor, Item, Line
+from silo_server.web import line_form
+from silo_server.web.forms import AmbiguousError, Form, back, text, texts, whole
 from silo_server.web.guard import Reader, Writer
-from silo_server.web.render import page, plural, segment
+from silo_server.web.line_form import MINE, THEIRS, LineForm
+from silo_server.web.render import isolate, page, plural, segment
 from silo_server.web.words import FIELDS, sentences
 
 router = APIRouter(include_in_schema=False)
@@ -34,20 +38,43 @@ router = APIRouter(include_in_schema=False)
 FIRST_LINES = 500
 LATER_CHANGES = 5
 KEPT = "kept on purpose, not in the CAD model"
-CHANGED_MEANWHILE = (
-    "Somebody else changed this BOM while you were deciding. Nothing of yours was done; "
-    "this is how it stands now."
-)
 
 
 @dataclass(frozen=True)
 class Asked:
-    """What the page is asked to show besides the BOM: a problem, and the form that is being filled in."""
+    """What the page is asked to show besides the BOM: a problem, and the form that is being filled in.
+
+    edit
+        the line whose form is open; ``typed`` and ``why`` are what stands in it, ``clashes`` the fields that
+        somebody else changed as well.
+    view
+        the query of the page that the person came from, without ``edit``.
+    chosen, reasons
+        the boxes of a decision that was refused, and its reasons, by line ("" for that of all chosen ones).
+    story
+        what happened meanwhile, in words.
+    readings
+        the two numbers that a quantity can be read as.
+    """
 
     problem: str = ""
     edit: str = ""
-    show_all: bool = False
+    view: str = ""
     typed: Mapping[str, str] = field(default_factory=dict)
+    why: str = ""
+    clashes: Sequence[str] = ()
+    chosen: Collection[str] = ()
+    reasons: Mapping[str, str] = field(default_factory=dict)
+    story: Sequence[str] = ()
+    readings: Sequence[str] = ()
+
+
+class Refused(Exception):
+    """A form that was not carried out: how the page shows it again."""
+
+    def __init__(self, asked: Asked, status: int = 409) -> None:
+        super().__init__(asked.problem)
+        self.asked, self.status = asked, status
 
 
 def bom_path(part_number: str) -> str:
@@ -65,108 +92,169 @@ def merge_page(
     all: bool = False,
 ) -> Response:
     """Unreferenced lines, conflicts, the last sync in plain words, and all lines; ``edit`` opens one."""
-    return _show(request, server, caller, part_number, Asked(edit=edit, show_all=all))
+    return _show(request, server, caller, part_number, Asked(edit=edit, view=view_of(request.url.query)))
 
 
 @router.post("/items/{part_number}/bom/decide")
 def decide(request: Request, server: ServerDep, caller: Writer, part_number: str, form: Form) -> Response:
-    """Carry a decision out, for one line or for all chosen ones."""
+    """Carry a decision out, for one line or for all chosen ones, if they are as the person saw them."""
+    chosen = [value.partition(" ")[0] for value in texts(form, "chosen")]
+    reasons = {chosen[0] if chosen and "bulk" not in form else "": str(form.get("reason", ""))}
+    asked = Asked(chosen=chosen, reasons=reasons)
 
-    def work(tx: Tx) -> str:
-        names = {line.id: line.child_part_number for line in lines_of(tx, get_item(tx, part_number))}
+    def work(tx: Tx) -> tuple[str, int]:
+        parent = get_item(tx, part_number)
+        names = {line.id: line.child_part_number for line in lines_of(tx, parent)}
         decisions = decisions_of(form, names)
         if not decisions:
-            return "No line was chosen, so nothing was changed."
-        service.resolve(tx, part_number, decisions, whole(form, "version"))
-        return _done(decisions)
+            return "No line was chosen, so nothing was changed.", 0
+        try:
+            change, _ = service.resolve(tx, part_number, decisions)
+        except LinesChangedError as error:
+            story = line_form.meanwhile(tx, parent, error.line_ids, whole(form, "at") or 0)
+            gone = [names.get(one, "a line that is gone") for one in error.line_ids]
+            count = plural(len(gone), "line was", "lines were")
+            problem = f"Nothing was done: {count} changed while you were deciding. Look again, then decide."
+            told = [f"{names.get(one, 'A line')}: {said}" for one in story for said in story[one]] or gone
+            left = [one for one in chosen if one not in error.line_ids]
+            raise Refused(replace(asked, problem=problem, story=told, chosen=left), 412) from None
+        return _done(decisions), change
 
-    return _do(request, server, caller, part_number, work)
+    return _do(request, server, caller, part_number, form, work, asked)
 
 
 @router.post("/items/{part_number}/bom/undo")
 def undo(request: Request, server: ServerDep, caller: Writer, part_number: str, form: Form) -> Response:
     """Take a change back, as a new change."""
 
-    def work(tx: Tx) -> str:
+    def work(tx: Tx) -> tuple[str, int]:
         change_id = whole(form, "change_id")
         if change_id is None:
             raise RejectedError("change_id: wanted the number of a change, got none; load the page again")
-        history.undo(tx, part_number, change_id, None)
-        return "Undone."
+        return "Undone.", history.undo(tx, part_number, change_id, None)[0]
 
-    return _do(request, server, caller, part_number, work)
+    return _do(request, server, caller, part_number, form, work)
 
 
 @router.post("/items/{part_number}/bom/lines")
 def add_line(request: Request, server: ServerDep, caller: Writer, part_number: str, form: Form) -> Response:
-    """Add a manual line."""
+    """Add a manual line. Where the part has one already, that one is opened with what was typed."""
+    sent = line_form.read(form)
+    child = text(form, "child")
+    asked = Asked(typed={**sent.typed, "child": child}, why=sent.why)
 
-    def work(tx: Tx) -> str:
-        values = line_fields(form)
-        if not text(form, "child"):
+    def work(tx: Tx) -> tuple[str, int]:
+        if not child:
             raise RejectedError("part number: wanted the number of an item, got nothing")
-        new = edits.NewLine(child_part_number=text(form, "child"), **values)
-        added = edits.add_line(tx, part_number, new, whole(form, "version"))
-        return f"{added.line.child_part_number if added.line else 'The line'} added."
+        new = edits.NewLine(child_part_number=child, **line_form.values_of(sent.typed))
+        try:
+            added = edits.add_line(tx, part_number, new, why=sent.why or None)
+        except DuplicateError as error:
+            parent = get_item(tx, part_number)
+            line = component_of(lines_of(tx, parent), child, parent)
+            # Fields that were left empty keep what the line has.
+            typed = {**line_form.shown(line.state), **{k: v for k, v in sent.typed.items() if v}}
+            problem = f"{_sentence(error)} Its line is open here with what you typed."
+            raise Refused(replace(asked, problem=problem, edit=line.id, typed=typed)) from None
+        return f"{isolate(added.child_part_number)} added.", added.change_id
 
-    return _do(request, server, caller, part_number, work, Asked(typed=_typed(form)))
+    return _do(request, server, caller, part_number, form, work, asked)
 
 
 @router.post("/items/{part_number}/bom/lines/{line_id}")
 def change_line(
     request: Request, server: ServerDep, caller: Writer, part_number: str, line_id: str, form: Form
 ) -> Response:
-    """Change what a person may change on a line."""
+    """Change what the person changed in the form of a line; what two people changed is asked about."""
+    sent = line_form.read(form)
+    asked = Asked(edit=line_id, typed=sent.typed, why=sent.why)
 
-    def work(tx: Tx) -> str:
-        which = LineId(line_id)
-        edited = edits.change_line(tx, part_number, which, line_fields(form), whole(form, "version"))
+    def work(tx: Tx) -> tuple[str, int]:
+        parent = get_item(tx, part_number, lock=True)
+        line = _line_to_change(tx, parent, line_id, sent, asked, text(form, "child"))
+        # Without a choice, the choice is asked for again, with the fields that clash.
+        unmade = [name for name in sent.asked if sent.picked.get(name) not in (MINE, THEIRS)]
+        if unmade:
+            clashes = [other for name in unmade for other in line_form.group_of(name)]
+            raise Refused(replace(asked, problem="Choose yours or theirs, then save.", clashes=clashes), 400)
+        edit = line_form.edit_of(sent, line.state)
+        told = line_form.meanwhile(tx, parent, [line.id], sent.at).get(line.id, [])
+        if edit.clashes:
+            problem = (
+                f"Nothing was saved yet: somebody else changed {line.child_part_number} while you edited it. "
+                "Choose whose value stays."
+            )
+            raise Refused(replace(asked, problem=problem, story=told, clashes=edit.clashes), 412)
+        why = sent.why or None
+        edited = edits.change_line(tx, part_number, LineId(line.id), line_form.values_of(edit.mine), why=why)
+        also = f" Meanwhile: {'; '.join(told)}." if edit.theirs and told else ""
         if not edited.change_id or edited.line is None:
-            return "Nothing was different, so nothing was changed."
-        return f"{edited.line.child_part_number} changed."
+            return f"Nothing was different, so nothing was changed.{also}", 0
+        return f"{isolate(edited.child_part_number)} changed.{also}", edited.change_id
 
-    return _do(request, server, caller, part_number, work, Asked(edit=line_id, typed=_typed(form)))
+    return _do(request, server, caller, part_number, form, work, asked)
 
 
 @router.post("/items/{part_number}/bom/lines/{line_id}/remove")
 def remove_line(
     request: Request, server: ServerDep, caller: Writer, part_number: str, line_id: str, form: Form
 ) -> Response:
-    """Take a line out of the BOM."""
+    """Take a line out of the BOM, if it is as the person saw it."""
+    sent = line_form.read(form)
+    asked = Asked(edit=line_id, typed=sent.typed, why=sent.why)
 
-    def work(tx: Tx) -> str:
-        edited = edits.remove_line(tx, part_number, LineId(line_id), whole(form, "version"))
-        return f"{edited.child_part_number} removed."
+    def work(tx: Tx) -> tuple[str, int]:
+        parent = get_item(tx, part_number, lock=True)
+        line = _line_to_change(tx, parent, line_id, sent, asked, text(form, "child"))
+        try:
+            edited = edits.remove_line(
+                tx, part_number, LineId(line.id), seen=text(form, "mark") or None, why=sent.why or None
+            )
+        except LinesChangedError:
+            story = line_form.meanwhile(tx, parent, [line.id], sent.at).get(line.id, [])
+            problem = f"Nothing was removed: {line.child_part_number} was changed by somebody else meanwhile."
+            raise Refused(replace(asked, problem=problem, story=story), 412) from None
+        return f"{isolate(edited.child_part_number)} removed.", edited.change_id
 
-    return _do(request, server, caller, part_number, work)
+    return _do(request, server, caller, part_number, form, work, asked)
+
+
+def _line_to_change(tx: Tx, parent: Item, line_id: str, sent: LineForm, asked: Asked, child: str) -> Line:
+    """The line of a form; where it is gone, what was typed stays, in the form for a new one."""
+    try:
+        return line_of(lines_of(tx, parent), LineId(line_id), parent)
+    except NotFoundError:
+        story = line_form.meanwhile(tx, parent, [line_id], sent.at).get(line_id, [])
+        problem = "This line is no longer in the BOM. What you typed stands below, as a line to be added."
+        typed = {**sent.typed, "child": child}
+        raise Refused(replace(asked, problem=problem, story=story, edit="", typed=typed), 404) from None
+
+
+def view_of(query: str) -> str:
+    """The query of the page, without the line that is being edited: what the page goes back to."""
+    return urlencode([(name, value) for name, value in parse_qsl(query[:1000]) if name != "edit"])
 
 
 def decisions_of(form: FormData, names: Mapping[str, str]) -> list[Decision]:
     """The decisions in a submitted form: one action for each line (by its id, or its child) in ``chosen``.
 
     names
-        line id → part number, of the BOM's lines.
+        line id → part number, of the BOM's lines. After the id may stand the mark of what was seen.
     """
     try:
         action = Action(text(form, "action"))
     except ValueError:
         raise RejectedError("action: wanted one of the buttons, got none; load the page again") from None
     reason = text(form, "reason") or (KEPT if action is Action.KEEP else None)
-    return [
-        Decision(names.get(which, which), action, reason, which if which in names else None)
-        for which in texts(form, "chosen")
-    ]
-
-
-def line_fields(form: FormData) -> dict[str, Any]:
-    """The fields of a line that people fill in."""
-    return {
-        "quantity": amount(form, "quantity"),
-        "unit": text(form, "unit", 32) or None,
-        "reference_designators": tuple(text(form, "reference_designators", 10_000).replace(",", " ").split()),
-        "find_number": text(form, "find_number", 32) or None,
-        "notes": text(form, "notes", 10_000) or None,
-    }
+    decisions = []
+    for value in texts(form, "chosen"):
+        which, _, seen = value.partition(" ")
+        if seen:
+            decisions.append(Decision(names.get(which, ""), action, reason, which, seen))
+        else:
+            line_id = which if which in names else None
+            decisions.append(Decision(names.get(value, value), action, reason, line_id))
+    return decisions
 
 
 def _do(
@@ -174,19 +262,24 @@ def _do(
     server: Server,
     caller: Actor,
     part_number: str,
-    work: Callable[[Tx], str],
+    form: FormData,
+    work: Callable[[Tx], tuple[str, int]],
     asked: Asked | None = None,
 ) -> Response:
     """Do ``work`` and go back; where it cannot be done, the page says why and keeps what was typed."""
+    view = view_of(text(form, "view", 1000))
+    given = replace(asked or Asked(), view=view)
     try:
         with server.db.write(caller) as tx:
-            notice = work(tx)
+            notice, change_id = work(tx)
+    except Refused as refused:
+        shown = replace(refused.asked, view=view)
+        return _show(request, server, caller, part_number, shown, refused.status)
     except SiloError as error:
-        given = asked or Asked()
-        problem = CHANGED_MEANWHILE if isinstance(error, VersionConflictError) else _plain(error)
-        shown = Asked(problem, given.edit, typed=given.typed)
+        readings = error.readings if isinstance(error, AmbiguousError) else ()
+        shown = replace(given, problem=_sentence(error), readings=readings)
         return _show(request, server, caller, part_number, shown, error.status_hint)
-    return back(bom_path(part_number), notice)
+    return back(bom_path(part_number) + (f"?{view}" if view else ""), notice, undo=change_id)
 
 
 def _show(
@@ -201,6 +294,12 @@ def _show(
         merged = history.get_change(tx, item, merge.id)[1] if merge else []
         recent = history.list_changes(tx, item, LATER_CHANGES)
         seen = events.head(tx)
+    conflicts = {conflict.line.id: conflict for conflict in found.conflicts}
+    editing = _editing(lines, asked, item)
+    problem = asked.problem
+    if asked.edit and editing is None and not problem:
+        problem = "The line that you wanted to edit is not in this BOM any more."
+    shown = lines if "all=" in f"&{asked.view}" else lines[:FIRST_LINES]
     return page(
         request,
         "merge.html",
@@ -208,10 +307,16 @@ def _show(
         status=status,
         item=item,
         total=len(lines),
-        lines=lines if asked.show_all else lines[:FIRST_LINES],
-        editing=_editing(lines, asked, item),
-        typed=asked.typed,
-        problem=asked.problem,
+        lines=shown,
+        editing=editing,
+        editing_apart=editing is not None and editing.id not in {line.id for line in shown},
+        now=line_form.shown(editing.state) if editing else {},
+        mark=mark_of(editing.state) if editing else "",
+        marks=service.marks_of([*found.unreferenced, *(c.line for c in found.conflicts)], conflicts),
+        asked=replace(asked, problem=problem),
+        labels=FIELDS,
+        group_of=line_form.group_of,
+        at=recent[0].id if recent else 0,
         last=last,
         gaps=in_sentences(last.gaps),
         unreferenced=found.unreferenced,
@@ -233,10 +338,6 @@ def _editing(lines: list[Line], asked: Asked, item: Any) -> Line | None:
     return None
 
 
-def _typed(form: FormData) -> dict[str, str]:
-    return {name: str(form.get(name, "")) for name in ("child", *FIELDS)}
-
-
 def _done(decisions: list[Decision]) -> str:
     words = {
         Action.REMOVE: "removed",
@@ -244,11 +345,11 @@ def _done(decisions: list[Decision]) -> str:
         Action.TAKE_CAD: "set to what CAD says",
         Action.KEEP_SILO: "left as Silo says",
     }[decisions[0].action]
-    who = decisions[0].child_part_number
+    who = isolate(decisions[0].child_part_number)
     return f"{who if len(decisions) == 1 else plural(len(decisions), 'line', 'lines')} {words}."
 
 
-def _plain(error: SiloError) -> str:
+def _sentence(error: SiloError) -> str:
     problems = error.problems if isinstance(error, RejectedError) else ()
     message = "; ".join(
         problem.partition(": ")[2] if problem.startswith("decisions[") else problem for problem in problems

@@ -170,7 +170,7 @@ def page(
     Looks into the database for the server's mode, so not to be called on the event loop.
     """
     closed = _closed(request)
-    notice = unquote(request.cookies.get(NOTICE_COOKIE, ""))[:500]
+    undo, _, notice = unquote(request.cookies.get(NOTICE_COOKIE, ""))[:800].partition(" ")
     html = _TEMPLATES.get_template(template).render(
         actor=actor,
         may_edit=actor is not None and actor.role.covers(Role.EDITOR),
@@ -180,6 +180,7 @@ def page(
         csrf=masked(actor.csrf_token) if actor is not None and actor.csrf_token else "",
         here=request.url.path,
         notice=notice,
+        undo=int(undo) if undo.isascii() and undo.isdigit() and len(undo) < 16 else 0,
         **values,
     )
     # The one place that puts links below the sub-path. What people typed has no bare quote, so is no link.

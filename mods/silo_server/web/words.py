@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from silo_server.services.bom.history import ChangedLine
+from silo_server.services.bom.changes import ChangeKind
+from silo_server.services.bom.history import Change, ChangedLine
 from silo_server.values import LineState
 from silo_server.web.render import isolate, plural, quantity
 
@@ -24,6 +25,14 @@ _NAMES = {
     "child_revision": "revision",
     "rel_type": "type",
 }
+
+
+def by_whom(change: Change) -> str:
+    """``by ann, 2026-02-08 22:15: one spare``; a sync names its file."""
+    from_file = f", from {isolate(change.document_file)}" if change.document_file else ""
+    what = "sync " if change.kind == ChangeKind.MERGE else ""
+    why = f": {isolate(change.reason)}" if change.reason else ""
+    return f"{what}by {isolate(change.username)}, {change.at[:16].replace('T', ' ')}{from_file}{why}"
 
 
 def sentence(line: ChangedLine) -> tuple[str, str]:

@@ -10,7 +10,7 @@ from typing import Any
 from silo.bom.diff import same_quantity
 from silo.bom.errors import RejectedError
 from silo_server.db.engine import Tx
-from silo_server.errors import DuplicateError
+from silo_server.errors import DuplicateError, LinesChangedError
 from silo_server.json_values import json_problem
 from silo_server.services import events
 from silo_server.services.bom.changes import (
@@ -22,7 +22,7 @@ from silo_server.services.bom.changes import (
     check_version,
     new_line_id,
 )
-from silo_server.services.bom.lines import LineId, line_of, lines_of
+from silo_server.services.bom.lines import LineId, line_of, lines_of, mark_of
 from silo_server.services.bom.merge_json import quantity_problem
 from silo_server.services.items import get_item
 from silo_server.values import Item, Line, LineState, number
@@ -58,7 +58,9 @@ class Edited:
     child_part_number: str
 
 
-def add_line(tx: Tx, part_number: str, new: NewLine, expected: int | None = None) -> Edited:
+def add_line(
+    tx: Tx, part_number: str, new: NewLine, expected: int | None = None, *, why: str | None = None
+) -> Edited:
     """Add a line. Raises DuplicateError where the child is there already, CycleError, RejectedError."""
     parent = get_item(tx, part_number, lock=True)
     check_version(parent, expected)
@@ -83,11 +85,17 @@ def add_line(tx: Tx, part_number: str, new: NewLine, expected: int | None = None
     check_no_cycle(tx, parent, [child.id])
     change = LineChange(new_line_id(), child.id, None, state)
     text = f"{child.part_number} added, quantity {number(state.quantity)}"
-    return _apply(tx, parent, change, child.part_number, text)
+    return _apply(tx, parent, change, child.part_number, text, why)
 
 
 def change_line(
-    tx: Tx, part_number: str, which: str | LineId, changes: Mapping[str, Any], expected: int | None = None
+    tx: Tx,
+    part_number: str,
+    which: str | LineId,
+    changes: Mapping[str, Any],
+    expected: int | None = None,
+    *,
+    why: str | None = None,
 ) -> Edited:
     """Change the fields (those of LineState that people own) of the line with this id, or of this child.
 
@@ -103,20 +111,38 @@ def change_line(
         return Edited(parent, line, parent.bom_version, 0, line.child_part_number)
     if after.rel_type != line.state.rel_type:
         _check_free(tx, parent, line, after.rel_type)
-    what = ", ".join(sorted(k for k in changes if getattr(after, k) != getattr(line.state, k))) or "source"
+    fields = sorted(k for k in changes if getattr(after, k) != getattr(line.state, k))
     if not same_quantity(after.quantity, line.state.quantity):
-        what = f"quantity {number(line.state.quantity)} → {number(after.quantity)}"
+        quantity = f"quantity {number(line.state.quantity)} → {number(after.quantity)}"
+        fields = [quantity, *(name for name in fields if name != "quantity")]
+    what = ", ".join(name.replace("_", " ") for name in fields) or "source"
     change = LineChange(line.id, line.child_id, line.state, after, line.position)
-    return _apply(tx, parent, change, line.child_part_number, f"{line.child_part_number} changed: {what}")
+    return _apply(
+        tx, parent, change, line.child_part_number, f"{line.child_part_number} changed: {what}", why
+    )
 
 
-def remove_line(tx: Tx, part_number: str, which: str | LineId, expected: int | None = None) -> Edited:
-    """Remove the line with this id, or of this child; only people do this."""
+def remove_line(
+    tx: Tx,
+    part_number: str,
+    which: str | LineId,
+    expected: int | None = None,
+    *,
+    seen: str | None = None,
+    why: str | None = None,
+) -> Edited:
+    """Remove the line with this id, or of this child; only people do this.
+
+    seen
+        the :func:`mark_of` the line as the person saw it; LinesChangedError where it is another one by now.
+    """
     parent = get_item(tx, part_number, lock=True)
     check_version(parent, expected)
     line = line_of(lines_of(tx, parent), which, parent)
+    if seen is not None and seen != mark_of(line.state):
+        raise LinesChangedError(f"{line.child_part_number} was changed meanwhile", [line.id])
     change = LineChange(line.id, line.child_id, line.state, None, line.position)
-    return _apply(tx, parent, change, line.child_part_number, f"{line.child_part_number} removed")
+    return _apply(tx, parent, change, line.child_part_number, f"{line.child_part_number} removed", why)
 
 
 def edited_state(before: LineState, changes: Mapping[str, Any]) -> LineState:
@@ -163,8 +189,8 @@ def _check_free(tx: Tx, parent: Item, line: Line, rel_type: str) -> None:
             raise DuplicateError(f"{line.child_part_number} is in this BOM as {rel_type} already")
 
 
-def _apply(tx: Tx, parent: Item, change: LineChange, child: str, text: str) -> Edited:
-    note = ChangeNote(kind=ChangeKind.EDIT, summary=text)
+def _apply(tx: Tx, parent: Item, change: LineChange, child: str, text: str, why: str | None = None) -> Edited:
+    note = ChangeNote(kind=ChangeKind.EDIT, summary=text, reason=why)
     change_id, version = apply_changes(tx, parent, [change], note)
     events.bom_updated(tx, parent, ChangeKind.EDIT, text)
     after = None

@@ -7,13 +7,14 @@ Change 0 is the empty BOM before everything.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
 from sqlalchemy import func, select
 
 from silo.bom.errors import ConflictError, NotFoundError
+from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import bom_change_lines, bom_changes, bom_conflicts
 from silo_server.json_values import loads
@@ -102,11 +103,33 @@ def get_change(tx: Tx, parent: Item, change_id: int) -> tuple[Change, list[Chang
         .order_by(bom_change_lines.c.position)
     ).all()
     children = by_ids(tx, {row.child_id for row in rows})
-    lines = [
-        ChangedLine(row.line_id, children[row.child_id], row.position, _state(row.before), _state(row.after))
-        for row in rows
-    ]
-    return found[0], lines
+    return found[0], [_changed_line(row, children) for row in rows]
+
+
+def stories(
+    tx: Tx, parent: Item, line_ids: Collection[str], after: int = 0
+) -> dict[str, list[tuple[Change, ChangedLine]]]:
+    """What happened to these lines after change ``after``, newest first; lines without a story are absent."""
+    if not line_ids:
+        return {}
+    rows = tx.conn.execute(
+        select(bom_change_lines)
+        .join(bom_changes, bom_changes.c.id == bom_change_lines.c.change_id)
+        .where(
+            bom_changes.c.parent_id == parent.id,
+            bom_changes.c.id > after,
+            one_of(tx, bom_change_lines.c.line_id, line_ids),
+        )
+        .order_by(bom_change_lines.c.change_id.desc())
+    ).all()
+    ids = {row.change_id for row in rows}
+    known = {change.id: change for change in _changes(tx, [one_of(tx, bom_changes.c.id, ids)], len(ids))}
+    children = by_ids(tx, {row.child_id for row in rows})
+    found: dict[str, list[tuple[Change, ChangedLine]]] = {}
+    for row in rows:
+        line = _changed_line(row, children)
+        found.setdefault(row.line_id, []).append((known[row.change_id], line))
+    return found
 
 
 def last_merge(tx: Tx, parent: Item) -> Change | None:
@@ -271,6 +294,11 @@ def _changes(tx: Tx, conditions: Sequence[Any], limit: int) -> list[Change]:
         )
         for row in tx.conn.execute(query)
     ]
+
+
+def _changed_line(row: Any, children: Mapping[int, Item]) -> ChangedLine:
+    child = children[row.child_id]
+    return ChangedLine(row.line_id, child, row.position, _state(row.before), _state(row.after))
 
 
 def _difference(child: Item, before: LineState | None, after: LineState | None) -> Difference:

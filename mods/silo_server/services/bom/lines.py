@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -170,6 +171,16 @@ def state_to_json(state: LineState) -> dict[str, Any]:
     if state.metadata:
         stored["metadata"] = dict(state.metadata)
     return stored
+
+
+def mark_of(state: LineState, cad_quantity: float | None = None) -> str:
+    """What a person saw of a line, as a short mark: another state has another one.
+
+    cad_quantity
+        what a conflict says beside the line.
+    """
+    seen = dumps([state_to_json(state), cad_quantity])
+    return hashlib.sha256(seen.encode()).hexdigest()[:16]
 
 
 def stored_state(text: str) -> LineState:

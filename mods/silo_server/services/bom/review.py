@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -14,10 +14,11 @@ from silo.bom.errors import ConflictError, NotFoundError, RejectedError
 from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import bom_conflicts
+from silo_server.errors import LinesChangedError
 from silo_server.services import events
 from silo_server.services.bom.changes import ChangeKind, ChangeNote, LineChange, apply_changes, check_version
 from silo_server.services.bom.history import Change, last_merge
-from silo_server.services.bom.lines import LineId, component_of, lines_of
+from silo_server.services.bom.lines import LineId, component_of, lines_of, mark_of
 from silo_server.services.items import get_item
 from silo_server.values import Item, Line, LineState
 
@@ -35,12 +36,17 @@ class Action(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """One decision about one line: the one with ``line_id``, else the component line of the child."""
+    """One decision about one line: the one with ``line_id``, else the component line of the child.
+
+    seen
+        the :func:`mark_of` the line, and of what CAD said of it, as the person saw them; None: not known.
+    """
 
     child_part_number: str
     action: Action
     reason: str | None = None
     line_id: str | None = None
+    seen: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +115,8 @@ def resolve(
 ) -> tuple[int, int]:
     """Carry all ``decisions`` out as one change. Returns (change id, version).
 
-    Raises RejectedError with everything that does not fit; then nothing was changed.
+    Raises LinesChangedError where lines are not as they were seen, RejectedError with everything that does
+    not fit; then nothing was changed.
     """
     parent = get_item(tx, part_number, lock=True)
     check_version(parent, expected)
@@ -119,6 +126,13 @@ def resolve(
     problems: list[str] = []
     settled: list[Decision] = []
     seen: set[str] = set()
+    asked = {decision.line_id for decision in decisions if decision.seen}
+    marks = marks_of([line for line in lines if line.id in asked], conflicts)
+    stale = [d.line_id for d in decisions if d.line_id and d.seen and d.seen != marks.get(d.line_id)]
+    if stale:
+        raise LinesChangedError(
+            f"{len(stale)} of the lines were changed meanwhile; nothing was changed", stale
+        )
     for index, decision in enumerate(decisions):
         try:
             which = LineId(decision.line_id) if decision.line_id else decision.child_part_number
@@ -138,6 +152,12 @@ def resolve(
     if problems:
         raise RejectedError(f"nothing was changed: {problems[0]}", problems)
     return _write(tx, parent, settled, changes)
+
+
+def marks_of(lines: Sequence[Line], conflicts: Mapping[str, Conflict]) -> dict[str, str]:
+    """Line id → mark of what a page shows of it: its state, and what CAD says where they differ."""
+    told = {line_id: conflict.cad_quantity for line_id, conflict in conflicts.items()}
+    return {line.id: mark_of(line.state, told.get(line.id)) for line in lines}
 
 
 def _decided(line: Line, decision: Decision, conflict: Conflict | None) -> LineState | None:

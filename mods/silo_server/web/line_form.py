@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The form of a BOM line: what it shows, what a person changed in it, and what others did meanwhile.
+
+A form sends each field twice: as it stands now, and as it was shown. So only what the person changed is
+written, whatever happened to the line since, and only a field that two people changed needs a choice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from starlette.datastructures import FormData
+
+from silo.bom.diff import same_quantity
+from silo.bom.errors import RejectedError
+from silo.bom.numbers import read_quantity
+from silo_server.db.engine import Tx
+from silo_server.services.bom import history
+from silo_server.values import Item, LineState
+from silo_server.web.forms import Edit, amount, compared, text
+from silo_server.web.render import quantity
+from silo_server.web.words import FIELDS, by_whom, changes
+
+MOST = {"quantity": 100, "unit": 32, "find_number": 32}
+MOST_TEXT = 10_000
+# "6" and "m" mean something only together.
+TOGETHER = (("quantity", "unit"),)
+MINE, THEIRS = "mine", "theirs"
+
+
+@dataclass(frozen=True)
+class LineForm:
+    """What came back from the form of a line.
+
+    typed, seen
+        its fields as they stand now, and as they were shown; those that were not sent are absent.
+    picked
+        first field of a group that clashed → ``mine`` or ``theirs``.
+    asked
+        the groups for which a choice was asked for.
+    at
+        the newest change of the BOM when the form was shown.
+    """
+
+    typed: Mapping[str, str] = field(default_factory=dict)
+    seen: Mapping[str, str] = field(default_factory=dict)
+    picked: Mapping[str, str] = field(default_factory=dict)
+    asked: Sequence[str] = ()
+    why: str = ""
+    at: int = 0
+
+
+def shown(state: LineState) -> dict[str, str]:
+    """The fields of a line as its form shows them."""
+    return {
+        "quantity": quantity(state.quantity),
+        "unit": state.unit or "",
+        "reference_designators": " ".join(state.reference_designators),
+        "find_number": state.find_number or "",
+        "notes": state.notes or "",
+    }
+
+
+def read(form: FormData) -> LineForm:
+    """What came back; texts as they were typed."""
+    typed = {name: _text(form, name) for name in FIELDS if name in form}
+    if readings := _text(form, "quantity_is"):
+        typed["quantity"] = readings  # the answer to "which of the two numbers?"
+    at = _text(form, "at")
+    return LineForm(
+        typed,
+        {name: _text(form, f"was_{name}") for name in FIELDS if f"was_{name}" in form},
+        {name: _text(form, f"pick_{name}") for name in FIELDS if f"pick_{name}" in form},
+        _text(form, "asked").split(),
+        text(form, "why"),
+        int(at) if at.isascii() and at.isdigit() and len(at) < 16 else 0,
+    )
+
+
+def edit_of(sent: LineForm, now: LineState) -> Edit:
+    """What the form changes on the line as it is now; RejectedError where a choice was not made."""
+    unmade = [FIELDS[name] for name in sent.asked if sent.picked.get(name) not in (MINE, THEIRS)]
+    if unmade:
+        raise RejectedError(f"{', '.join(unmade)}: choose yours or theirs")
+    typed = dict(sent.typed)
+    for name, pick in sent.picked.items():
+        if pick == THEIRS:
+            for other in group_of(name):
+                typed[other] = sent.seen.get(other, typed.get(other, ""))
+    return compared(shown(now), sent.seen, typed, together=TOGETHER, same=_same)
+
+
+def group_of(name: str) -> Sequence[str]:
+    """The fields that mean something only together with this one, itself among them."""
+    return next((group for group in TOGETHER if name in group), (name,))
+
+
+def values_of(texts: Mapping[str, str]) -> dict[str, Any]:
+    """The texts of fields as a line has them; RejectedError where one is unusable."""
+    values: dict[str, Any] = {}
+    for name, written in texts.items():
+        most = MOST.get(name, MOST_TEXT)
+        if len(written) > most:
+            raise RejectedError(f"{FIELDS[name]}: wanted at most {most} characters, got {len(written)}")
+        if name == "quantity":
+            values[name] = amount(written, FIELDS[name])
+        elif name == "reference_designators":
+            values[name] = tuple(written.replace(",", " ").split())
+        else:
+            values[name] = written or None
+    return values
+
+
+def meanwhile(tx: Tx, parent: Item, line_ids: Sequence[str], after: int) -> dict[str, list[str]]:
+    """Line id → what happened to it after change ``after``, in words, newest first."""
+    return {
+        line_id: [f"{_became(line)}, {by_whom(change)}" for change, line in story]
+        for line_id, story in history.stories(tx, parent, line_ids, after).items()
+    }
+
+
+def _became(line: history.ChangedLine) -> str:
+    if line.before is None or line.after is None:
+        return "removed" if line.after is None else "added"
+    return ", ".join(changes(line.before, line.after)) or "changed"
+
+
+def _same(name: str, a: str, b: str) -> bool:
+    if a == b:
+        return True
+    if name == "quantity":
+        one, other = read_quantity(a).value, read_quantity(b).value
+        return one is not None and other is not None and same_quantity(one, other)
+    if name == "reference_designators":
+        return a.replace(",", " ").split() == b.replace(",", " ").split()
+    # An input of one line gives line breaks back as nothing.
+    return name != "notes" and a.replace("\n", "") == b.replace("\n", "")
+
+
+def _text(form: FormData, name: str) -> str:
+    value = form.get(name)
+    return value.replace("\x00", "").replace("\r\n", "\n").strip() if isinstance(value, str) else ""
