@@ -35,7 +35,7 @@ LOOSE = """() => {
     const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
     for (let node = walker.nextNode(); node; node = walker.nextNode()) {
         const text = node.data, parent = node.parentElement;
-        if (parent.closest("option, datalist, script")) continue;
+        if (parent.closest("option, datalist, textarea, script")) continue;
         const opened = (text.match(/[\\u2066-\\u2068]/g) || []).length;
         const closed = (text.match(/\\u2069/g) || []).length;
         if (/[\\u202a-\\u202e]/.test(text) || opened !== closed) found.push("turns: " + parent.outerHTML);
