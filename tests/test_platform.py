@@ -302,9 +302,14 @@ def test_a_file_keeps_its_rights_and_streams_on_windows(tmp_path: Path) -> None:
     for code, content in ((0, "old"), (1175, "new")):
         old.write_text("old")
         new.write_text("new")
-        calls: list[tuple[str, str]] = []
-        swap(str(new), str(old), merge=lambda *words, c=calls, k=code: (c.append(words), k)[1])
-        assert calls == [(str(new), str(old))]
+        calls: list[tuple[str, ...]] = []
+
+        def merge(*words: str, code: int = code, calls: list[tuple[str, ...]] = calls) -> int:
+            calls.append(words)
+            return code
+
+        patiently(lambda merge=merge: swap(str(new), str(old), merge=merge))
+        assert set(calls) == {(str(new), str(old))}
         assert old.read_text() == content
 
 

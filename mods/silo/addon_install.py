@@ -29,11 +29,12 @@ FOLDER = "Silo"
 CHECKOUT = Path(__file__).resolve().parents[2]
 
 _ASK = """
-import json, os, sys
+import importlib.util, json, os, sys
 import FreeCAD
+missing = [n for n in ("requests", "sseclient", "pydantic") if importlib.util.find_spec(n) is None]
 with open(os.environ["SILO_ASK_OUT"], "w", encoding="utf-8") as out:
     json.dump({"data": FreeCAD.getUserAppDataDir(), "freecad": FreeCAD.Version()[:2],
-               "python": list(sys.version_info[:2]), "prefix": sys.base_exec_prefix}, out)
+               "python": list(sys.version_info[:2]), "prefix": sys.base_exec_prefix, "missing": missing}, out)
 """
 _ASK_SECONDS = 60.0
 _PIP_SECONDS = 600.0
@@ -41,12 +42,16 @@ _PIP_SECONDS = 600.0
 
 @dataclass(frozen=True)
 class Place:
-    """A FreeCAD: its data folder, its version and its Python's, and where that Python may be started."""
+    """A FreeCAD: its data folder, its version and its Python's, where that Python may be started.
+
+    ``missing``: the packages of the add-on that it does not find.
+    """
 
     data: Path
     freecad: tuple[int, int]
     python: tuple[int, int]
     pythons: tuple[str, ...] = field(default=(), compare=False)
+    missing: tuple[str, ...] = field(default=(), compare=False)
 
     @property
     def mod(self) -> Path:
@@ -90,7 +95,7 @@ def ask_freecad(freecadcmd: str | None = None, data: Path | None = None) -> Plac
     major, minor = (int(part) for part in told["freecad"])
     pythons = (*python_beside(told["prefix"]), *python_beside(os.path.dirname(os.path.realpath(command))))
     python = (told["python"][0], told["python"][1])
-    return Place(data or Path(told["data"]), (major, minor), python, pythons)
+    return Place(data or Path(told["data"]), (major, minor), python, pythons, tuple(told["missing"]))
 
 
 def _run(command: list[str], seconds: float) -> subprocess.CompletedProcess[str]:

@@ -1,20 +1,32 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""``silo-mod doctor``: which server, whether it answers, who we are there, and what it can do."""
+"""``silo-mod doctor``: what is where on this machine, which server is meant, and what does not work.
+
+Each line that is not in order says what to do about it.
+"""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+import importlib.metadata
+import importlib.util
+import os
+import sys
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from silo.bom.errors import ForbiddenError, NotFoundError, SiloError
+from silo.bom.errors import ConfigError, ForbiddenError, NotFoundError, SiloError
 from silo.cli import common
 from silo.cli.common import Commands
 
 if TYPE_CHECKING:
+    from silo.addon_install import Place
     from silo.api.client import SiloClient
 
 NOBODY = "00000000-0000-4000-8000-000000000000"
+# One package of each extra, and what the extra is for.
+_EXTRAS = {"server": ("fastapi", "serve, demo"), "inertia": ("OCP", "inertia, mass, links")}
+Rows = dict[str, "str | SiloError"]
+T = TypeVar("T")
 
 
 def register(commands: Commands) -> None:
@@ -22,7 +34,7 @@ def register(commands: Commands) -> None:
     parser = common.add_command(
         commands,
         "doctor",
-        "show which server is meant, whether it answers, and what it can do; changes nothing",
+        "show what is where on this machine, which server is meant, and what does not work; changes nothing",
         "silo-mod doctor",
     )
     parser.add_argument("--schema", default="kindred-rd", help="part number schema (default: kindred-rd)")
@@ -33,29 +45,102 @@ def register(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print what was found; 3 where something that the commands need does not work."""
-    from silo.api.abilities import Abilities
-    from silo.api.config import resolve_server
-
-    where = resolve_server(args.server, args.token)
-    with common.client_of(args) as client:
-        client.abilities = Abilities()  # looked at anew, and kept for the other commands
-        found = look(client, args.schema)
-    rows = {
-        "address": f"{client.base_url} (from {where.url_from})",
-        "token": f"from {where.token_from}" if where.token else "none",
-        **{name: str(value) for name, value in found.items()},
-    }
-    failed = any(isinstance(value, SiloError) for value in found.values())
+    found = {**_machine(), **_server(args)}
+    failed = [name for name, value in found.items() if isinstance(value, SiloError)]
     if args.json:
-        common.print_json({"ok": not failed, **rows})
+        common.print_json({"ok": not failed, **{name: str(value) for name, value in found.items()}})
     else:
         from silo.cli import show
 
-        width = max(map(len, rows))
-        for name, text in rows.items():
-            mark = "✗" if isinstance(found.get(name), SiloError) else " "
-            print(f"{mark} {name:<{width}}  {show.plain(text)}")
+        width = max(map(len, found))
+        for name, value in found.items():
+            print(f"{'✗' if name in failed else ' '} {name:<{width}}  {show.plain(str(value))}")
     return 3 if failed else 0
+
+
+def _machine() -> Rows:
+    """This machine: versions, folders, extras, FreeCAD and the add-on in it."""
+    from silo.folders import cache_folder, data_folder
+    from silo.freecads import material_folders
+
+    place = _tried(_freecad)
+    return {
+        "silo-mod": f"{importlib.metadata.version('silo-mod')}, Python {sys.version.split()[0]}",
+        "configuration": _tried(_configuration),
+        "data": _folder(data_folder()),
+        "cache": _folder(cache_folder()),
+        **{name: _extra(name, *about) for name, about in _EXTRAS.items()},
+        "FreeCAD": place if isinstance(place, (str, SiloError)) else place[0],
+        **({} if isinstance(place, (str, SiloError)) else {"add-on": _tried(lambda: _addon(place[1]))}),
+        "materials": _listed(map(str, material_folders())),
+    }
+
+
+def _configuration() -> str:
+    from silo.api.config import config_path, load_config
+
+    path = config_path()
+    load_config(path)
+    return str(path) if path.exists() else f"{path} (none yet; everything has a default)"
+
+
+def _folder(path: os.PathLike[str]) -> str | SiloError:
+    """The folder, which need not be there yet; an error where nothing can be written to it."""
+    there = os.fspath(path)
+    while not os.path.lexists(there) and os.path.dirname(there) != there:
+        there = os.path.dirname(there)
+    if not (os.path.isdir(there) and os.access(there, os.W_OK)):
+        return ConfigError(f"{path}: {there} is no folder that you can write to; SILO_HOME names another one")
+    return str(path)
+
+
+def _extra(name: str, package: str, used_by: str) -> str:
+    if importlib.util.find_spec(package) is not None:
+        return f"the extra is installed ({used_by})"
+    return f"not installed ({used_by} need it): pip install 'silo-mod[{name}]'"
+
+
+def _freecad() -> str | tuple[str, Place]:
+    from silo.addon_install import ask_freecad
+    from silo.freecadcmd.run import find_freecadcmd
+    from silo.freecads import commands
+
+    if not os.environ.get("SILO_FREECADCMD") and next(commands(), None) is None:
+        return "none found (files are read without it; only --via freecad and the add-on need one)"
+    command = find_freecadcmd()
+    place = ask_freecad(command)
+    others = [one for one in commands() if one != command]
+    versions = "{}.{}, Python {}.{}".format(*place.freecad, *place.python)
+    return f"{command}: {versions}" + (f"; also {_listed(others)}" if others else ""), place
+
+
+def _addon(place: Place) -> str:
+    if not place.mod.exists():
+        return f"not in {place.mod}: silo-mod install-addon puts it there"
+    if place.missing:
+        return f"{place.mod}, without {', '.join(place.missing)}: silo-mod install-addon installs them"
+    return str(place.mod)
+
+
+def _listed(texts: Iterable[str]) -> str:
+    return ", ".join(texts) or "none found"
+
+
+def _server(args: argparse.Namespace) -> Rows:
+    from silo.api.abilities import Abilities
+    from silo.api.config import resolve_server
+
+    try:
+        where = resolve_server(args.server, args.token)
+        with common.client_of(args) as client:
+            client.abilities = Abilities()  # looked at anew, and kept for the other commands
+            return {
+                "address": f"{client.base_url} (from {where.url_from})",
+                "token": f"from {where.token_from}" if where.token else "none",
+                **look(client, args.schema),
+            }
+    except ConfigError as error:
+        return {"address": error}
 
 
 def look(client: SiloClient, schema: str) -> dict[str, Any]:
@@ -71,7 +156,7 @@ def look(client: SiloClient, schema: str) -> dict[str, Any]:
     }
 
 
-def _tried(ask: Callable[[], str]) -> str | SiloError:
+def _tried(ask: Callable[[], T]) -> T | SiloError:
     try:
         return ask()
     except SiloError as error:

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""``silo-mod doctor`` on this machine: what is where, and a remedy for what is not in order."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+from silo.cli.main import main
+
+FREECAD = """#!{python}
+import json, os
+with open(os.environ["SILO_ASK_OUT"], "w", encoding="utf-8") as out:
+    json.dump({{"data": {data!r}, "freecad": ["1", "1"], "python": [3, 13], "prefix": "/nowhere",
+               "missing": {missing!r}}}, out)
+"""
+
+
+@pytest.fixture(autouse=True)
+def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A user without configuration, server and FreeCAD."""
+    monkeypatch.setenv("SILO_HOME", str(tmp_path / "home"))
+    monkeypatch.setenv("HOME", str(tmp_path))
+    for name in ("SILO_API_URL", "SILO_API_TOKEN", "SILO_FREECADCMD"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    return tmp_path / "home"
+
+
+def freecad(folder: Path, monkeypatch: pytest.MonkeyPatch, *missing: str) -> Path:
+    command, data = folder / "freecadcmd", folder / "FreeCAD"
+    command.write_text(FREECAD.format(python=sys.executable, data=str(data), missing=list(missing)))
+    command.chmod(0o755)
+    monkeypatch.setenv("SILO_FREECADCMD", str(command))
+    return data
+
+
+def seen(capsys: pytest.CaptureFixture[str]) -> dict[str, str]:
+    assert main(["doctor", "--json"]) == 3  # there is no server
+    found: dict[str, str] = json.loads(capsys.readouterr().out)
+    return found
+
+
+def test_it_says_where_each_part_looks(home: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Also where no server is configured: that is one line among the others."""
+    found = seen(capsys)
+    assert found["configuration"].startswith(str(home / "config" / "config.toml"))
+    assert (found["data"], found["cache"]) == (str(home / "data"), str(home / "cache"))
+    assert "silo-mod serve" in found["address"]
+    assert f"Python {sys.version.split()[0]}" in found["silo-mod"]
+    assert not home.exists()
+
+
+def test_a_folder_that_cannot_be_made_is_named(home: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    home.write_text("a file in the way")
+    assert main(["doctor"]) == 3
+    lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("✗")]
+    assert [line.split()[1] for line in lines] == ["configuration", "data", "cache", "address"]
+    assert f"{home} is no folder that you can write to; SILO_HOME names another one" in lines[1]
+
+
+def test_a_damaged_configuration_hides_nothing_else(home: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (home / "config").mkdir(parents=True)
+    (home / "config" / "config.toml").write_text("[server\n")
+    found = seen(capsys)
+    assert "cannot be read" in found["configuration"]
+    assert found["data"] == str(home / "data")
+
+
+@pytest.mark.usefixtures("needs_modes")
+def test_the_add_on_and_its_packages(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data = freecad(tmp_path, monkeypatch)
+    found = seen(capsys)
+    assert found["FreeCAD"] == f"{os.environ['SILO_FREECADCMD']}: 1.1, Python 3.13"
+    assert found["add-on"] == f"not in {data / 'Mod' / 'Silo'}: silo-mod install-addon puts it there"
+    (data / "Mod" / "Silo").mkdir(parents=True)
+    assert seen(capsys)["add-on"] == str(data / "Mod" / "Silo")
+    freecad(tmp_path, monkeypatch, "pydantic", "sseclient")
+    assert seen(capsys)["add-on"].endswith(
+        "without pydantic, sseclient: silo-mod install-addon installs them"
+    )
+
+
+def test_a_freecad_that_does_not_start_is_a_trouble(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("SILO_FREECADCMD", str(tmp_path / "nowhere"))
+    assert "cannot be run" in seen(capsys)["FreeCAD"]
