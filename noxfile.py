@@ -31,6 +31,13 @@ def test(session: nox.Session) -> None:
 
 
 @nox.session
+def windows_files(session: nox.Session) -> None:
+    """On Linux: the suites that read and write files, with files as Windows has them."""
+    session.install("--editable", ".[dev]")
+    session.run("make", "test-windows-files", "VENV=" + session.virtualenv.location, external=True)
+
+
+@nox.session
 def platform(session: nox.Session) -> None:
     """What differs between platforms, run for real: demo, port, patterns, geometry."""
     session.install("--editable", ".[server,inertia]")
