@@ -17,8 +17,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from other_disk import other_disk
 
+from silo.bom.errors import DocumentError
 from silo.bom.report import bom_json
 from silo.cli.common import read_assembly
+from silo.fcstd import Library
 from silo.spelling import Spelling
 
 NFD = unicodedata.normalize("NFD", "Büchse")
@@ -129,6 +131,14 @@ def test_how_the_user_spells_the_folder_is_no_matter_of_the_links(disk: Path) ->
     project(disk / "Vault", "Parts/Büchse.FCStd")
     found = read_assembly(str(disk / "VAULT" / "top.fcstd"))
     assert [f.code.value for f in found.findings if "differs" in f.message] == []
+
+
+def test_the_folder_that_may_be_read_may_be_spelt_in_any_way(disk: Path) -> None:
+    (disk / "Vault").mkdir()
+    project(disk / "Vault", "Parts/Büchse.FCStd")
+    assert Library(root=disk / "VAULT").open(disk / "vault" / "top.fcstd").Objects
+    with pytest.raises(DocumentError, match="lies outside"):
+        Library(root=disk / "VAULT" / "parts").open(disk / "vault" / "top.fcstd")
 
 
 NAMES = ("Büchse", "Ölwanne", "Straße", "M8x20")

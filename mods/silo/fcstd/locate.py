@@ -54,7 +54,7 @@ class Locator:
 
     def __post_init__(self) -> None:
         if self.root is not None:
-            self.root = os.path.realpath(self.root)
+            self.root = self._spelling.real(self.root)
 
     def real(self, path: str) -> str:
         """The one path of a file: without symlinks, as its folders list it."""
