@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import base64
 import re
+import zlib
 from collections.abc import Iterator
 from urllib.parse import unquote, urlencode
 
@@ -14,6 +16,7 @@ from web_visitor import FORM, HTML, ROLES, Visitor, enter, visitors_of
 
 from silo_server.run import RunningServer, running_server
 from silo_server.settings import Settings
+from silo_server.web.forms import Kept, unpacked
 from silo_server.web.pages import ROUTERS
 
 TOKEN = "silo_pages"
@@ -171,6 +174,80 @@ def test_a_used_link_leads_on_where_the_session_lives(api: Api) -> None:
     cookie = browser.call("POST", path).headers["set-cookie"].split(";")[0]
     again = browser.call("POST", path, body=b"next=/activity", headers={"Cookie": cookie, **FORM})
     assert (again.status, again.headers["location"]) == (303, "/activity")
+
+
+@pytest.mark.parametrize("path", [path for path in CHANGING if ("GET", path) not in TABLE])
+def test_the_address_of_a_form_leads_to_its_page(visitors: dict[str, Visitor], path: str) -> None:
+    """Typed, reloaded or kept by a login: no address of ours is "Not found"."""
+    answer = visitors[ADMIN].get(fill(path))
+    assert answer.status == 303
+    page = answer.headers["location"]
+    pages = {fill(known) for method, known in TABLE if method == "GET"}
+    assert page in pages
+    assert fill(path).startswith(page)
+
+
+SAME_SITE = {"Sec-Fetch-Site": "same-origin"}
+
+
+def test_a_form_of_ours_is_kept_over_the_login_and_another_site_s_is_not(api: Api) -> None:
+    """Its text travels in the login form; what another site sent is forgotten."""
+    browser = api.as_(None)
+    body = urlencode({"csrf_token": "old", "child": "X", "notes": "a <b> & c"}).encode()
+    ours = browser.call(
+        "POST", "/items/X/bom/lines", body=body, headers={**FORM, **HTML, **SAME_SITE}
+    ).body.decode()
+    packed = re.search(r'name="kept" value="([^"]+)"', ours)
+    assert packed is not None
+    kept = unpacked(packed[1])
+    assert kept is not None
+    assert (kept.path, list(kept.fields)) == ("/items/X/bom/lines", [("child", "X"), ("notes", "a <b> & c")])
+    for headers in ({}, {"Sec-Fetch-Site": "cross-site"}, {"Origin": "https://elsewhere.example"}):
+        answer = browser.call("POST", "/items/X/bom/lines", body=body, headers={**FORM, **HTML, **headers})
+        assert answer.status == 303
+        assert answer.headers["location"].startswith("/login?next=")
+
+
+def test_an_old_form_of_ours_is_shown_and_not_carried_out(visitors: dict[str, Visitor], api: Api) -> None:
+    """Another session's secret: the text is there, with a button; the secret on it is the new one."""
+    parent, child = api.items(2)
+    visitor = visitors[EDITOR]
+    body = urlencode({"csrf_token": "another session's", "child": child, "quantity": "3"}).encode()
+    headers = {"Cookie": visitor.cookie, **FORM, **HTML, **SAME_SITE}
+    answer = visitor.api.call("POST", f"/items/{parent}/bom/lines", body=body, headers=headers)
+    assert answer.status == 403
+    assert "Send it now" in answer.body.decode()
+    assert "another session" not in answer.body.decode()
+    assert api.lines(parent) == {}
+
+
+@pytest.mark.parametrize(
+    "packed",
+    [
+        "%%%",
+        base64.b64encode(b"no zlib").decode(),
+        base64.b64encode(zlib.compress(b"[1, 2]")).decode(),
+        base64.b64encode(zlib.compress(b'["/x", [1], []]')).decode(),
+        base64.b64encode(zlib.compress(b" " * 60_000_000)).decode(),
+        base64.b64encode(zlib.compress(b"[" * 100_000)).decode(),
+        "ü",
+    ],
+)
+def test_a_kept_form_that_was_tampered_with(api: Api, packed: str) -> None:
+    """It is forgotten; the login works."""
+    browser = api.as_(None)
+    body = urlencode({"username": "x", "password": "y", "kept": packed}).encode()
+    answer = browser.call("POST", "/login", body=body, headers={**FORM, **HTML})
+    assert answer.status in (401, 429)
+    assert unpacked(packed) is None
+
+
+def test_a_kept_form_leads_nowhere_else() -> None:
+    """Its address is one of this server."""
+    for path in ("https://elsewhere", "//elsewhere", "/\\elsewhere", "javascript:alert(1)"):
+        kept = unpacked(Kept(path, [("a", "b")]).packed)
+        assert kept is not None
+        assert kept.path == "/"
 
 
 # --- a server that takes no changes -------------------------------------------------------------------------

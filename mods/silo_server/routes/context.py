@@ -66,6 +66,10 @@ def server_of(request: Request) -> Server:
 ServerDep = Annotated[Server, Depends(server_of)]
 
 
+class FormSecretError(ForbiddenError):
+    """The secret of a form is not that of the session: another site's form, or one of an earlier session."""
+
+
 class Guard:
     """A dependency that lets a caller of at least ``role`` in: Bearer token first, then session cookie."""
 
@@ -115,7 +119,7 @@ async def _check_csrf(request: Request, actor: Actor) -> None:
         sent = (await request.form()).get("csrf_token")
     wanted = actor.csrf_token or ""
     if not isinstance(sent, str) or not secrets.compare_digest(unmasked(sent), wanted.encode()):
-        raise ForbiddenError("the form's secret is missing or old; load the page again and repeat")
+        raise FormSecretError("the form's secret is missing or old; load the page again and repeat")
 
 
 def masked(secret: str) -> str:

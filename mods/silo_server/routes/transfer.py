@@ -113,7 +113,7 @@ async def import_csv(
             with server.db.read(caller) as tx:
                 return json_answer(plan_to_wire(imports.plan_import(tx, part_number, records), dry_run))
         with server.db.write(caller) as tx:
-            plan, version = imports.apply_import(tx, part_number, records, name, expected)
+            plan, _, version = imports.apply_import(tx, part_number, records, name, expected)
             return json_answer(plan_to_wire(plan, dry_run), headers={"ETag": etag_of(version)})
 
     return await anyio.to_thread.run_sync(work)

@@ -14,7 +14,15 @@ from silo_server.errors import TooManyAttemptsError
 from silo_server.routes.context import SESSION_COOKIE, Server, ServerDep
 from silo_server.services.access import accounts, credentials, logins
 from silo_server.values import Actor, Role, Scope
-from silo_server.web.forms import Form, back, text, whole
+from silo_server.web.forms import (
+    Form,
+    back,
+    back_with_secret,
+    secret_of,
+    take_away_secret,
+    text,
+    whole,
+)
 from silo_server.web.guard import Reader
 from silo_server.web.render import page
 
@@ -27,12 +35,14 @@ TokenId = Annotated[int, Path(ge=1, le=2**62)]
 @router.get("/account")
 def account_page(request: Request, server: ServerDep, caller: Reader) -> Response:
     """The own tokens, never their secrets, and a form for the password."""
-    return _show(request, server, caller)
+    fresh = secret_of(request)
+    response = _show(request, server, caller, fresh=fresh)
+    return take_away_secret(request, response, "/account") if fresh else response
 
 
 @router.post("/account/tokens")
 def create_token(request: Request, server: ServerDep, caller: Reader, form: Form) -> Response:
-    """Make a token. Its secret is on this answer and never again, so that there is no way back to it."""
+    """Make a token. Its secret is shown once, on the page that this leads to."""
     name, days = text(form, "name"), whole(form, "days")
     if not 0 < len(name) <= 200:
         return _show(request, server, caller, problem="A token needs a name of at most 200 characters.")
@@ -44,7 +54,7 @@ def create_token(request: Request, server: ServerDep, caller: Reader, form: Form
         return _show(request, server, caller, problem="Choose one of the scopes.")
     with server.db.write(caller, even_when_read_only=True) as tx:
         _, secret = credentials.create_own_token(tx, name, days=days, forever=days is None, scope=scope)
-    return _show(request, server, caller, fresh=(name, secret))
+    return back_with_secret(request, "/account", name, secret)
 
 
 @router.post("/account/tokens/{token_id}/revoke")

@@ -6,16 +6,18 @@ from __future__ import annotations
 import json
 from collections.abc import Awaitable, Callable
 from typing import Any, cast
+from urllib.parse import quote
 
 import anyio.to_thread
 from fastapi import FastAPI, Request
 from sqlalchemy.exc import SQLAlchemyError
-from starlette.responses import Response
+from starlette.responses import RedirectResponse, Response
+from starlette.routing import Match
 
 from silo_server.middleware import SECURITY_HEADERS
-from silo_server.routes.context import find_actor
+from silo_server.routes.context import SAFE_METHODS, find_actor
 from silo_server.values import Actor
-from silo_server.web.guard import LoginNeededError
+from silo_server.web.guard import LoginNeededError, OldFormError
 from silo_server.web.render import page
 
 Handler = Callable[[Request, Exception], Awaitable[Response]]
@@ -37,7 +39,7 @@ TITLES = {
 def install(app: FastAPI) -> None:
     """Give browsers pages where the handlers that ``app`` has give JSON."""
     for kind, handler in list(app.exception_handlers.items()):
-        if kind is not LoginNeededError:
+        if kind not in (LoginNeededError, OldFormError):
             app.add_exception_handler(kind, _for_browsers(cast(Handler, handler)))
 
 
@@ -49,6 +51,8 @@ def wants_page(request: Request) -> bool:
 def _for_browsers(handler: Handler) -> Handler:
     async def answer(request: Request, error: Exception) -> Response:
         plain = await handler(request, error)
+        if plain.status_code == 405 and request.method in SAFE_METHODS and wants_page(request):
+            return RedirectResponse(_page_above(request), 303)
         return await error_page(request, plain) if wants_page(request) else plain
 
     return answer
@@ -57,6 +61,8 @@ def _for_browsers(handler: Handler) -> Handler:
 async def error_page(request: Request, plain: Response) -> Response:
     """The page for an error that was answered as JSON."""
     told: dict[str, Any] = json.loads(bytes(plain.body))
+
+    kept = getattr(request.state, "kept", None)
 
     def draw() -> Response:
         return page(
@@ -68,6 +74,7 @@ async def error_page(request: Request, plain: Response) -> Response:
             message=_sentence(plain.status_code, told["message"], request),
             problems=told.get("problems", [])[:50],
             path=told.get("path", []),
+            kept=kept,
         )
 
     response = await anyio.to_thread.run_sync(draw)
@@ -77,6 +84,17 @@ async def error_page(request: Request, plain: Response) -> Response:
     # A fault is answered outside of the middleware that adds these otherwise.
     response.headers.update(SECURITY_HEADERS)
     return response
+
+
+def _page_above(request: Request) -> str:
+    """The page that the form of this address stands on: the nearest one above that can be looked at."""
+    path = request.scope["path"].rstrip("/")
+    while path:
+        path = path.rpartition("/")[0]
+        scope = {**request.scope, "path": path, "method": "GET"}
+        if any(route.matches(scope)[0] is Match.FULL for route in request.app.routes):
+            return quote(path)
+    return "/"
 
 
 def _sentence(status: int, message: str, request: Request) -> str:

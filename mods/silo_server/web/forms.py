@@ -3,10 +3,15 @@
 
 from __future__ import annotations
 
+import base64
+import binascii
+import json
+import re
+import zlib
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated
-from urllib.parse import quote
+from urllib.parse import quote, unquote, urlsplit
 
 from fastapi import Depends, Request
 from starlette.datastructures import FormData
@@ -14,9 +19,11 @@ from starlette.responses import RedirectResponse, Response
 
 from silo.bom.errors import RejectedError
 from silo.bom.numbers import parse_number, plain, read_quantity
+from silo_server.routes.context import server_of
 from silo_server.web.render import NOTICE_COOKIE
 
 NOTICE_SECONDS = 60
+SECRET_COOKIE = "silo_shown_once"
 # A browser takes no cookie beyond 4096 bytes, and a character may need twelve of them.
 MOST_NOTICE = 300
 
@@ -24,6 +31,8 @@ MOST_NOTICE = 300
 async def _form(request: Request) -> AsyncIterator[FormData]:
     # The guard read the form for its secret already; Starlette keeps it.
     form = await request.form(max_files=1)
+    # For a page that says why it was refused: a handler of errors may get a request without its body.
+    request.state.kept = kept_form(request.url.path, form)
     try:
         yield form
     finally:
@@ -53,6 +62,84 @@ def whole(form: FormData, name: str) -> int | None:
     """A whole number, None where there is none."""
     value = text(form, name)
     return int(value) if value.isascii() and value.isdigit() and len(value) < 16 else None
+
+
+# Forms with one of these fields are not kept: a password goes nowhere but where it was typed for.
+_PASSWORDS = frozenset({"password", "again", "current"})
+# Fields that no person typed.
+_MACHINE = re.compile(
+    r"csrf_token|at|view|mark|asked|bulk|version|packed|child_id|change_id|next|from|was_.*"
+)
+MOST_KEPT = 4 * 1024 * 1024
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """A form that was not carried out, to be sent again by the person who filled it in.
+
+    files
+        names of files in it, which have to be chosen again.
+    """
+
+    path: str
+    fields: Sequence[tuple[str, str]]
+    files: Sequence[str] = ()
+
+    @property
+    def typed(self) -> list[tuple[str, str]]:
+        """(field, text) of what a person typed or chose, in words."""
+        told = [(name, value) for name, value in self.fields if value and not _MACHINE.fullmatch(name)]
+        lines = [value for name, value in told if name == "chosen"]
+        shown = [(name.replace("_", " ").capitalize(), value) for name, value in told if name != "chosen"]
+        return shown + ([("Chosen lines", str(len(lines)))] if lines else [])
+
+    @property
+    def packed(self) -> str:
+        """As one text, which travels in the login form; "" for one that is too large."""
+        text = json.dumps([self.path, self.fields, self.files])
+        if len(text) > MOST_KEPT:
+            return ""
+        return base64.b64encode(zlib.compress(text.encode("utf-8", "surrogatepass"))).decode("ascii")
+
+
+def kept_form(path: str, form: FormData) -> Kept | None:
+    """What a form holds but its secret; None where it holds a password."""
+    if _PASSWORDS & form.keys():
+        return None
+    pairs = form.multi_items()
+    fields = [(name, value) for name, value in pairs if isinstance(value, str) and name != "csrf_token"]
+    files = [value.filename for _, value in pairs if not isinstance(value, str) and value.filename]
+    return Kept(path, fields, files)
+
+
+def unpacked(packed: str) -> Kept | None:
+    """What :attr:`Kept.packed` was made of; None where it was not, or leads elsewhere."""
+    unpacker = zlib.decompressobj()
+    try:
+        data = unpacker.decompress(base64.b64decode(packed, validate=True), MOST_KEPT * 4)
+        path, fields, files = json.loads(data.decode("utf-8", "surrogatepass"))
+        pairs = [(str(name), str(value)) for name, value in fields]
+        return Kept(local_path(path), pairs, [str(name) for name in files])
+    except (binascii.Error, ValueError, TypeError, AttributeError, RecursionError, zlib.error):
+        return None
+
+
+def local_path(target: str, otherwise: str = "/") -> str:
+    """``target`` where it is a path of this server, else the start page: nobody is sent elsewhere."""
+    plain = target.startswith("/") and not target.startswith(("//", "/\\"))
+    return target if plain and target.isprintable() else otherwise
+
+
+def own_site(request: Request) -> bool | None:
+    """True for a form that a page of ours sent, False for one of another site, None where nobody says.
+
+    Browsers say where a form comes from.
+    """
+    site = request.headers.get("sec-fetch-site")
+    if site is not None:
+        return site in ("same-origin", "none")
+    origin = request.headers.get("origin")
+    return None if origin is None else urlsplit(origin).netloc == request.headers.get("host")
 
 
 class AmbiguousError(RejectedError):
@@ -148,4 +235,38 @@ def back(path: str, notice: str = "", *, undo: int = 0) -> Response:
             httponly=True,
             samesite="lax",
         )
+    return response
+
+
+def back_with_secret(request: Request, path: str, name: str, secret: str) -> Response:
+    """Go to ``path`` (303), which shows a new secret once: to load that page again makes no second one.
+
+    The secret travels in a cookie for that page alone, which :func:`secret_of` reads and the page takes away.
+    """
+    server = server_of(request)
+    response = RedirectResponse(path, 303)
+    response.set_cookie(
+        SECRET_COOKIE,
+        quote(json.dumps([name, secret])),
+        max_age=NOTICE_SECONDS,
+        path=server.settings.root_path + path,
+        httponly=True,
+        samesite="strict",
+        secure=server.settings.secure_cookies or request.url.scheme == "https",
+    )
+    return response
+
+
+def secret_of(request: Request) -> tuple[str, str] | None:
+    """(name, secret) that waits to be shown on this page, None where there is none."""
+    try:
+        name, secret = json.loads(unquote(request.cookies.get(SECRET_COOKIE, "")))
+    except (ValueError, TypeError):
+        return None
+    return str(name), str(secret)
+
+
+def take_away_secret(request: Request, response: Response, path: str) -> Response:
+    """Take the cookie of :func:`back_with_secret` away, now that its secret was shown."""
+    response.delete_cookie(SECRET_COOKIE, path=server_of(request).settings.root_path + path)
     return response

@@ -8,10 +8,11 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request
 from starlette.responses import Response
 
-from silo.bom.errors import RejectedError
-from silo_server.routes.context import ServerDep
+from silo.bom.errors import RejectedError, VersionConflictError
+from silo_server.routes.context import Server, ServerDep
 from silo_server.services.bom import history
 from silo_server.services.items import get_item
+from silo_server.values import Actor
 from silo_server.web.forms import Form, back, text, whole
 from silo_server.web.guard import Reader, Writer
 from silo_server.web.merge_page import bom_path
@@ -66,6 +67,22 @@ def compare_page(
     all: bool = False,
 ) -> Response:
     """Two points of time, line by line; without ``old`` what the newest change did."""
+    return _compare(request, server, caller, part_number, (old, new), show_all=all)
+
+
+def _compare(
+    request: Request,
+    server: Server,
+    caller: Actor,
+    part_number: str,
+    wanted: tuple[int | None, int | None],
+    *,
+    show_all: bool = False,
+    problem: str = "",
+    reason: str = "",
+    status: int = 200,
+) -> Response:
+    old, new = wanted
     with server.db.read(caller) as tx:
         item = get_item(tx, part_number, include_archived=True)
         known = history.list_changes(tx, item, KNOWN)
@@ -78,12 +95,13 @@ def compare_page(
     shown = [
         (row, changes(row.before, row.after) if row.before and row.after else [])
         for row in rows
-        if all or row.status != "unchanged"
+        if show_all or row.status != "unchanged"
     ]
     return page(
         request,
         "compare.html",
         caller,
+        status=status,
         item=item,
         rows=shown,
         counts=counts,
@@ -91,8 +109,10 @@ def compare_page(
         old=first,
         new=second,
         known=known,
-        show_all=all,
+        show_all=show_all,
         latest=points[-1],
+        problem=problem,
+        reason=reason,
     )
 
 
@@ -100,13 +120,25 @@ STATUSES = ("added", "removed", "changed", "unchanged")
 
 
 @router.post("/items/{part_number}/restore")
-def restore(server: ServerDep, caller: Writer, part_number: str, form: Form) -> Response:
-    """Make the BOM again what it was; a new change, so nothing of the history is lost."""
-    change_id = whole(form, "change_id")
+def restore(request: Request, server: ServerDep, caller: Writer, part_number: str, form: Form) -> Response:
+    """Make the BOM again what it was, where nobody changed it since the page was shown; a new change."""
+    change_id, reason = whole(form, "change_id"), text(form, "reason")
     if change_id is None:
         raise RejectedError("change_id: wanted the number of a change, got none; load the page again")
-    with server.db.write(caller) as tx:
-        item = get_item(tx, part_number)
-        was = len(history.state_at(tx, item, change_id))
-        history.restore(tx, part_number, change_id, text(form, "reason") or None, None)
-    return back(bom_path(part_number), f"Restored: {plural(was, 'line', 'lines')} as of change {change_id}.")
+    try:
+        with server.db.write(caller) as tx:
+            item = get_item(tx, part_number)
+            was = len(history.state_at(tx, item, change_id))
+            expected = whole(form, "version")
+            made, _ = history.restore(tx, part_number, change_id, reason or None, expected)
+    except VersionConflictError:
+        problem = (
+            "Nothing was restored: somebody else changed this BOM meanwhile. Here is what differs now; "
+            "restore again if that, too, should be as it was."
+        )
+        points = (change_id, None)
+        return _compare(
+            request, server, caller, part_number, points, problem=problem, reason=reason, status=412
+        )
+    said = f"Restored: {plural(was, 'line', 'lines')} as of change {change_id}."
+    return back(bom_path(part_number), said, undo=made)

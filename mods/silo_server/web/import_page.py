@@ -25,7 +25,7 @@ from silo_server.values import Actor
 from silo_server.web.forms import Form, back, text, whole
 from silo_server.web.guard import Writer
 from silo_server.web.merge_page import bom_path
-from silo_server.web.render import page
+from silo_server.web.render import isolate, page
 from silo_server.web.words import changes
 
 router = APIRouter(include_in_schema=False)
@@ -68,14 +68,16 @@ def apply(request: Request, server: ServerDep, caller: Writer, part_number: str,
     try:
         records = imports.read_csv(upload.data, server.settings.max_merge_entries)
         with server.db.write(caller) as tx:
-            plan, _ = imports.apply_import(tx, part_number, records, upload.name, whole(form, "version"))
+            plan, change, _ = imports.apply_import(
+                tx, part_number, records, upload.name, whole(form, "version")
+            )
     except VersionConflictError:
         problem = "The BOM was changed by somebody else since the file was checked; nothing was imported."
         return _show(request, server, caller, part_number, upload, problem, 412)
     except SiloError as error:
         return _show(request, server, caller, part_number, upload, str(error), error.status_hint)
-    said = f"Imported {upload.name}: {plan.count('add')} added, {plan.count('change')} changed."
-    return back(bom_path(part_number), said)
+    said = f"Imported {isolate(upload.name)}: {plan.count('add')} added, {plan.count('change')} changed."
+    return back(bom_path(part_number), said, undo=change)
 
 
 def _show(

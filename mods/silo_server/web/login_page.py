@@ -14,7 +14,7 @@ from silo_server.errors import TooManyAttemptsError
 from silo_server.routes.auth import set_session_cookie
 from silo_server.routes.context import SESSION_COOKIE, ServerDep, client_address, find_actor
 from silo_server.services.access import logins
-from silo_server.web.forms import Form, back, text
+from silo_server.web.forms import Form, back, local_path, text, unpacked
 from silo_server.web.guard import Reader, own_form
 from silo_server.web.render import page
 
@@ -24,31 +24,42 @@ START = "/"
 Next = Annotated[str, Query(max_length=500)]
 
 
-def local_path(target: str) -> str:
-    """``target`` where it is a path of this server, else the start page: nobody is sent elsewhere."""
-    plain = target.startswith("/") and not target.startswith(("//", "/\\"))
-    return target if plain and target.isprintable() else START
-
-
 @router.get("/login")
 def login_form(request: Request, next: Next = START) -> Response:
     """The login form; who is logged in already goes on."""
     if find_actor(request) is not None:
         return back(local_path(next))
-    return page(request, "login.html", None, target=local_path(next), problem="")
+    return page(request, "login.html", None, target=local_path(next), problem="", kept=None)
 
 
 @router.post("/login", dependencies=[Depends(own_form)])
 def log_in(request: Request, server: ServerDep, form: Form) -> Response:
-    """Begin a session and go on to ``next``."""
+    """Begin a session and go on to ``next``, or to the form that was being sent when the last one ended."""
     target = local_path(text(form, "next"))
+    packed = form.get("kept")
+    kept = unpacked(packed) if isinstance(packed, str) and packed else None
+
+    def again(problem: str, status: int) -> Response:
+        values = {"target": target, "problem": problem, "kept": kept}
+        return page(request, "login.html", None, status=status, **values)
+
+    if "already" in form:
+        actor = find_actor(request)
+        if actor is None:
+            return again("You are not logged in yet in this browser.", 401)
+        return page(request, "again.html", actor, kept=kept) if kept else back(target)
     try:
         session = logins.log_in(
             server.db, text(form, "username", 200), _password(form), client_address(request)
         )
     except (AuthError, TooManyAttemptsError) as error:
-        return page(request, "login.html", None, status=error.status_hint, target=target, problem=str(error))
-    return _with_session(request, server, session, target)
+        return again(str(error), error.status_hint)
+    if kept is None:
+        return _with_session(request, server, session, target)
+    actor = logins.actor_by_session(server.db, session.secret, client_address(request))
+    shown = page(request, "again.html", actor, kept=kept)
+    set_session_cookie(shown, server, session, request)
+    return shown
 
 
 @router.get("/login/link/{secret}")
@@ -66,7 +77,7 @@ def use_link(request: Request, server: ServerDep, secret: str, form: Form) -> Re
     except AuthError as error:
         if find_actor(request) is not None:
             return back(target)
-        return page(request, "login.html", None, status=401, target=target, problem=str(error))
+        return page(request, "login.html", None, status=401, target=target, problem=str(error), kept=None)
     return _with_session(request, server, session, target)
 
 

@@ -8,7 +8,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request
 from starlette.responses import Response
 
-from silo.bom.errors import RejectedError, SiloError
+from silo.bom.errors import ConflictError, RejectedError, SiloError
 from silo_server.db.engine import mode_of
 from silo_server.db.state import put_state
 from silo_server.operation.housekeeping import last_run
@@ -17,7 +17,15 @@ from silo_server.services import events
 from silo_server.services.access import accounts, audit, credentials, logins
 from silo_server.values import Actor, Role
 from silo_server.web.account_page import password_of
-from silo_server.web.forms import Form, back, text
+from silo_server.web.forms import (
+    Form,
+    back,
+    back_with_secret,
+    compared,
+    secret_of,
+    take_away_secret,
+    text,
+)
 from silo_server.web.guard import Administrator
 from silo_server.web.render import page
 
@@ -29,8 +37,10 @@ MODES = ("normal", "read-only")
 
 @router.get("/users")
 def users_page(request: Request, server: ServerDep, caller: Administrator) -> Response:
-    """All users and tokens."""
-    return _show(request, server, caller)
+    """All users and tokens; a login link that was just made is shown once."""
+    link = secret_of(request)
+    response = _show(request, server, caller, link=link)
+    return take_away_secret(request, response, "/users") if link else response
 
 
 @router.post("/users")
@@ -55,26 +65,39 @@ def create_user(request: Request, server: ServerDep, caller: Administrator, form
 def change_user(
     request: Request, server: ServerDep, caller: Administrator, username: str, form: Form
 ) -> Response:
-    """Change a user's role, or whether anybody gets in under this name."""
+    """Change what the admin changed: a user's role, or whether anybody gets in under this name."""
+    typed = {name: text(form, name) for name in ("role", "active") if name in form}
+    seen = {name: text(form, f"was_{name}") for name in typed if f"was_{name}" in form}
     try:
         with server.db.write(caller, even_when_read_only=True) as tx:
+            user = accounts.get_user(tx, username)
+            now = {"role": user.role.value, "active": "yes" if user.active else "no"}
+            edit = compared(now, seen, typed)
+            if edit.clashes:
+                raise ConflictError(
+                    f"{username} was changed by somebody else meanwhile, and stays as this page shows it now"
+                )
+            role, active = edit.mine.get("role"), edit.mine.get("active")
             accounts.change_user(
-                tx, username, role=_role(text(form, "role")), active=text(form, "active") == "yes"
+                tx,
+                username,
+                role=_role(role) if role is not None else None,
+                active=active == "yes" if active is not None else None,
             )
     except SiloError as error:
         return _show(request, server, caller, problem=str(error), status=error.status_hint)
-    return back("/users", f"User {username} is changed.")
+    return back("/users", f"User {username} is changed." if edit.mine else "Nothing was different.")
 
 
 @router.post("/users/{username}/login-link")
 def create_login_link(request: Request, server: ServerDep, caller: Administrator, username: str) -> Response:
-    """A link that lets this user in once; on this answer and nowhere else."""
+    """A link that lets this user in once; it is shown once, on the page that this leads to."""
     with server.db.write(caller, even_when_read_only=True) as tx:
         secret = logins.create_login_link(tx, username)
         audit.note(tx, "login_link.created", username)
     # Not by the Host header, which the caller chooses: the link is sent on, and lets its holder in.
     link = f"{server.settings.public_url or ''}/login/link/{secret}"
-    return _show(request, server, caller, link=(username, link))
+    return back_with_secret(request, "/users", username, link)
 
 
 @router.post("/mode")

@@ -108,8 +108,8 @@ def plan_import(tx: Tx, part_number: str, records: Sequence[Record]) -> ImportPl
 
 def apply_import(
     tx: Tx, part_number: str, records: Sequence[Record], file_name: str | None, expected: int | None
-) -> tuple[ImportPlan, int]:
-    """Import the rows of :func:`read_csv` as one change. Returns what was done, and the BOM's version.
+) -> tuple[ImportPlan, int, int]:
+    """Import the rows of :func:`read_csv` as one change. Returns (what was done, change, version).
 
     RejectedError lists every problem, and then nothing was changed.
     """
@@ -132,9 +132,9 @@ def apply_import(
     check_no_cycle(tx, parent, [c.child_id for c in changes if c.before is None])
     text = f"imported: {plan.count('add')} added, {plan.count('change')} changed"
     note = ChangeNote(kind=ChangeKind.IMPORT, summary=text, document_file=file_name)
-    _, version = apply_changes(tx, parent, changes, note)
+    change_id, version = apply_changes(tx, parent, changes, note)
     events.bom_updated(tx, parent, ChangeKind.IMPORT, text)
-    return plan, version
+    return plan, change_id, version
 
 
 def read_csv(data: bytes, max_rows: int) -> list[Record]:
