@@ -125,6 +125,7 @@ class ItemChangeBody(Body):
     name: Short | None = None
     description: Text | None = None
     item_type: ItemType | None = None
+    category: Annotated[Short, WithJsonSchema(document.CATEGORY_OR_EMPTY)] | None = None
     sourcing_type: Short | None = None
     long_description: Text | None = None
     properties: Properties | None = None

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any
 
 import anyio.to_thread
@@ -29,7 +30,7 @@ from silo_server.routes.models import RevisionBody, RevisionOut
 from silo_server.services import items, revisions
 from silo_server.services.bom.merge_json import is_text
 from silo_server.services.revisions import Origin, revision_to_wire
-from silo_server.values import Actor, Revision
+from silo_server.values import Actor, Item, Revision
 
 router = APIRouter(prefix="/api/items/{part_number}", tags=["revisions"])
 
@@ -203,6 +204,25 @@ def _store(
     sha256: str,
     origin: Origin,
 ) -> Response:
+    def answer(item: Item, revision: Revision) -> Response:
+        return json_answer(revision_to_wire(item.part_number, revision, links=True), 201)
+
+    return store_file(server, caller, part_number, file, comment, answer, properties, key, sha256, origin)
+
+
+def store_file(
+    server: Server,
+    caller: Actor,
+    part_number: str,
+    file: UploadFile,
+    comment: str,
+    answer: Callable[[Item, Revision], Response],
+    properties: Mapping[str, Any] | None = None,
+    key: str | None = None,
+    sha256: str = "",
+    origin: Origin | None = None,
+) -> Response:
+    """An uploaded file as a new revision, for the API and the pages; ``answer`` is made before the commit."""
     with server.db.read(caller) as tx:
         items.get_item(tx, part_number)  # before anything is written to the disk
     stored = server.files.keep(file.filename or "file", file.file)
@@ -220,9 +240,9 @@ def _store(
             properties=merged,
             file=stored,
             idempotency_key=key,
-            origin=origin,
+            origin=origin or Origin(),
         )
-        return json_answer(revision_to_wire(item.part_number, revision, links=True), 201)
+        return answer(item, revision)
 
 
 def _idempotency_key(request: Request) -> str | None:

@@ -3,14 +3,16 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cache
 from importlib import resources
 from typing import Any
 
 from silo.bom.errors import NotFoundError, RejectedError
+from silo.bom.numbers import plain, read_number
 
 DEFAULT_SCHEMA = "kindred-rd"
 ITEM_TYPES = ("part", "assembly", "consumable", "tool")
@@ -28,6 +30,62 @@ class Category:
 
 
 @dataclass(frozen=True, slots=True)
+class PropertyField:
+    """A property that the schema knows, with its checks. ``categories`` are prefixes, none = all."""
+
+    name: str
+    type: str
+    label: str
+    unit: str = ""
+    description: str = ""
+    default: str = ""
+    minimum: float | None = None
+    maximum: float | None = None
+    pattern: str = ""
+    example: str = ""
+    options: tuple[str, ...] = ()
+    categories: tuple[str, ...] = ()
+
+    def fits(self, category: str | None) -> bool:
+        """True where items of this category have the field."""
+        return not self.categories or category is None or category.startswith(self.categories)
+
+    @property
+    def title(self) -> str:
+        """``Mass [kg]``."""
+        return f"{self.label} [{self.unit}]" if self.unit else self.label
+
+    def read(self, text: str) -> str | int | float:
+        """The value that somebody typed; RejectedError says what was wanted. ``text`` is not empty."""
+        if self.type in ("number", "integer"):
+            return self._number(text)
+        if self.options and text not in self.options:
+            raise RejectedError(f"{self.label}: wanted one of {', '.join(self.options)}, got {text!r}")
+        if self.pattern and not re.fullmatch(self.pattern, text):
+            example = f" such as {self.example}" if self.example else ""
+            raise RejectedError(f"{self.label}: wanted a value{example}, got {text!r}")
+        if self.type == "link" and not re.fullmatch(r"https?://[^\s/]+\S*", text):
+            raise RejectedError(f"{self.label}: wanted a web address (https://…), got {text!r}")
+        return text
+
+    def _number(self, text: str) -> int | float:
+        reading = read_number(text)
+        if reading.value is None:
+            raise RejectedError(f"{self.title}: {reading.problem}")
+        value = plain(reading.value)
+        if self.type == "integer" and not isinstance(value, int):
+            raise RejectedError(f"{self.title}: wanted a whole number, got {text!r}")
+        low, high = self.minimum, self.maximum
+        if (low is not None and value < low) or (high is not None and value > high):
+            ends = [
+                f"at least {low:g}" if low is not None else "",
+                f"at most {high:g}" if high is not None else "",
+            ]
+            raise RejectedError(f"{self.title}: wanted {' and '.join(filter(None, ends))}, got {text!r}")
+        return value
+
+
+@dataclass(frozen=True, slots=True)
 class Schema:
     """A part-number schema: ``<category><separator><serial>``."""
 
@@ -38,7 +96,7 @@ class Schema:
     serial_digits: int
     domains: Mapping[str, str]
     categories: Mapping[str, Category]
-    fields: tuple[Mapping[str, Any], ...]
+    fields: tuple[PropertyField, ...]
 
     def number(self, category: str, serial: int) -> str:
         """``F01-0001``. A serial beyond the digits simply grows; gaps are tolerated everywhere."""
@@ -85,8 +143,13 @@ def _parse(raw: Mapping[str, Any]) -> Schema:
         serial_digits=raw["serial_digits"],
         domains=raw["domains"],
         categories=categories,
-        fields=tuple(raw["fields"]),
+        fields=tuple(_parse_field(field) for field in raw["fields"]),
     )
+
+
+def _parse_field(raw: Mapping[str, Any]) -> PropertyField:
+    lists = {name: tuple(raw[name]) for name in ("options", "categories") if name in raw}
+    return PropertyField(**{**raw, **lists})
 
 
 def describe(schema: Schema) -> dict[str, Any]:
@@ -130,8 +193,9 @@ def _describe_domain(schema: Schema, code: str, label: str) -> dict[str, Any]:
     }
 
 
-def _field(raw: Mapping[str, Any]) -> dict[str, Any]:
-    return {"required": False, **raw}
+def _field(field: PropertyField) -> dict[str, Any]:
+    said = {name: value for name, value in asdict(field).items() if value not in ("", None, ())}
+    return {"required": False, **said}
 
 
 _ITEM_FIELDS: list[dict[str, Any]] = [

@@ -234,6 +234,7 @@ class ItemChange:
     name: str | None = None
     description: str | None = None
     item_type: str | None = None
+    category: str | None = None
     sourcing_type: str | None = None
     long_description: str | None = None
     properties: Mapping[str, Any] | None = None
@@ -387,6 +388,7 @@ def _changed_values(item: Item, change: ItemChange) -> dict[str, Any]:
         "name": change.name,
         "description": change.description,
         "item_type": _item_type(change.item_type, None) if change.item_type is not None else None,
+        "category": find_schema(item.schema).category(change.category).code if change.category else None,
         "sourcing_type": change.sourcing_type,
         "long_description": change.long_description,
     }

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import secrets
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
@@ -21,6 +22,7 @@ from silo_server.services.bom.last_sync import marks as marks_of
 from silo_server.services.items import get_item
 from silo_server.values import Item
 from silo_server.web.guard import Reader
+from silo_server.web.item_edit_page import shown_properties
 from silo_server.web.render import page, segment
 from silo_server.web.structure import Structure, Wanted, flat_page, level_counts, tree_page, usual_depth
 from silo_server.web.tables import Address
@@ -103,6 +105,8 @@ def item_page(
         uses=uses,
         used_from=used_from,
         most_uses=MOST_USES,
+        properties=shown_properties(item),
+        upload_key=secrets.token_urlsafe(16),  # a form that is sent twice makes one revision
         **shown,
     )
 

@@ -15,6 +15,7 @@ from silo_server.web import (
     guard,
     history_page,
     import_page,
+    item_edit_page,
     item_page,
     items_page,
     login_page,
@@ -25,6 +26,7 @@ from silo_server.web import (
 ROUTERS = (
     login_page.router,
     items_page.router,
+    item_edit_page.router,  # before item_page: /items/new is no part number
     item_page.router,
     merge_page.router,
     history_page.router,

@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Items made, renamed, described, re-categorised, given properties and files, archived and found again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from large_boms import fcstd_with_picture
+from playwright.sync_api import Page, expect
+from server_testing import Api
+
+Visit = Callable[..., Page]
+
+
+@pytest.mark.parametrize("script", [True, False])
+def test_an_item_is_made_and_changed(api: Api, visit: Visit, script: bool) -> None:
+    """A purchaser's whole job: make it, rename it, say what it costs and where it comes from."""
+    page = visit("editor", java_script_enabled=script)
+    page.goto("/items")
+    page.get_by_role("link", name="New item").click()
+    page.get_by_label("Name", exact=True).fill("Deep groove ball bearing 608")
+    page.locator("select[name=category]").select_option(label="R01 Bearings")
+    page.get_by_label("Mass [kg]").fill("0,012")
+    page.get_by_label("Standard cost").fill("1.35")
+    page.get_by_label("Lead time [days]").fill("14")
+    page.get_by_label("Supplier", exact=True).fill("Nordic Bearings")
+    page.get_by_label("Supplier's part number").fill("608-2RS")
+    page.get_by_role("button", name="Make the item").click()
+    expect(page.locator(".notice")).to_contain_text("made")
+    number = page.url.rpartition("/")[2]
+    assert number.startswith("R01-")
+    made = api.get(f"/api/items/{number}")
+    assert made["properties"] == {
+        "mass_kg": 0.012,
+        "standard_cost": 1.35,
+        "currency": "EUR",
+        "lead_time_days": 14,
+        "supplier": "Nordic Bearings",
+        "supplier_part_number": "608-2RS",
+    }
+    expect(page.locator(".properties")).to_contain_text("Lead time14 days")
+    page.get_by_role("link", name="Edit item").click()
+    page.get_by_label("Part number", exact=True).fill(f"B{number}")
+    page.locator("select[name=category]").select_option("F06")
+    page.get_by_label("Description", exact=True).fill("sealed on both sides")
+    page.get_by_label("Property").last.fill("RoHS")
+    page.get_by_label("Value").last.fill("yes")
+    page.get_by_label("Lead time [days]").fill("")
+    page.get_by_role("button", name="Save").click()
+    expect(page.get_by_role("heading", level=1)).to_contain_text(f"B{number}")
+    after = api.get(f"/api/items/B{number}")
+    assert after["id"] == made["id"]
+    assert (after["category"], after["description"]) == ("F06", "sealed on both sides")
+    kept = {name: value for name, value in made["properties"].items() if name != "lead_time_days"}
+    assert after["properties"] == {**kept, "RoHS": "yes"}
+
+
+def test_what_does_not_fit_is_asked_about_and_nothing_is_lost(api: Api, visit: Visit) -> None:
+    """All problems together, in words; what was typed stays; nothing was written."""
+    number = api.item(name="Spring")
+    page = visit("editor", java_script_enabled=False)
+    page.goto(f"/items/{number}/edit")
+    page.get_by_label("Name", exact=True).fill("Long spring")
+    page.get_by_label("Mass [kg]").fill("1,000")
+    page.get_by_label("Lead time [days]").fill("2.5")
+    page.get_by_label("Currency").fill("euro")
+    page.get_by_label("Sourcing link").fill("javascript:alert(1)")
+    page.get_by_role("button", name="Save").click()
+    said = page.get_by_role("alert")
+    for words in ("1000 or 1", "whole number", "such as EUR", "web address"):
+        expect(said).to_contain_text(words)
+    expect(page.get_by_label("Name", exact=True)).to_have_value("Long spring")
+    expect(page.get_by_label("Mass [kg]")).to_have_value("1,000")
+    assert api.get(f"/api/items/{number}")["name"] == "Spring"
+    page.get_by_label("Mass [kg]").fill("-1")
+    page.get_by_label("Lead time [days]").fill("20")
+    page.get_by_label("Currency").fill("CHF")
+    page.get_by_label("Sourcing link").fill("https://example.com/spring")
+    page.get_by_role("button", name="Save").click()
+    expect(said).to_contain_text("at least 0")
+    page.get_by_label("Mass [kg]").fill("0.2")
+    page.get_by_role("button", name="Save").click()
+    now = api.get(f"/api/items/{number}")
+    assert (now["name"], now["properties"]["mass_kg"], now["properties"]["currency"]) == (
+        "Long spring",
+        0.2,
+        "CHF",
+    )
+
+
+def test_two_people_edit_one_item(api: Api, visit: Visit) -> None:
+    """Different fields: both stay. The same field: nothing is saved until somebody who saw both decides."""
+    number = api.item(name="Lever")
+    api.good("PATCH", f"/api/items/{number}/properties", {"supplier": "Old", "mass_kg": 1})
+    mine, theirs = visit("editor"), visit("admin")
+    for page in (mine, theirs):
+        page.goto(f"/items/{number}/edit")
+    theirs.get_by_label("Name", exact=True).fill("Hand lever")
+    theirs.get_by_label("Supplier", exact=True).fill("Theirs")
+    theirs.get_by_role("button", name="Save").click()
+    mine.get_by_label("Mass [kg]").fill("2")
+    mine.get_by_label("Supplier", exact=True).fill("Mine")
+    mine.get_by_role("button", name="Save").click()
+    expect(mine.get_by_role("alert")).to_contain_text("admin changed this item while you were editing")
+    expect(mine.locator(".hint.warn")).to_have_text("Now in Silo: Theirs")
+    expect(mine.get_by_label("Name", exact=True)).to_have_value("Hand lever")
+    assert api.get(f"/api/items/{number}")["properties"] == {"supplier": "Theirs", "mass_kg": 1}
+    mine.get_by_role("button", name="Save").click()
+    after = api.get(f"/api/items/{number}")
+    assert (after["name"], after["properties"]) == ("Hand lever", {"supplier": "Mine", "mass_kg": 2})
+    # Another field alone is no clash at all.
+    mine.goto(f"/items/{number}/edit")
+    api.good("PUT", f"/api/items/{number}", {"name": "Lever 2"})
+    mine.get_by_label("Description", exact=True).fill("with a knob")
+    mine.get_by_role("button", name="Save").click()
+    expect(mine.locator(".notice")).to_contain_text("changed")
+    after = api.get(f"/api/items/{number}")
+    assert (after["name"], after["description"]) == ("Lever 2", "with a knob")
+
+
+def test_a_form_sent_twice_makes_one_item(api: Api, visit: Visit) -> None:
+    """As a double click or a browser that tries again sends it: the same item both times."""
+    page = visit("editor", java_script_enabled=False)
+    page.goto("/items/new?category=F01")
+    hidden = {name: page.locator(f"input[name={name}]").first.input_value() for name in ("csrf_token", "id")}
+    form = {**hidden, "name": "Sent twice", "category": "F01"}
+    first, second = (page.request.post("/items/new", form=form) for _ in range(2))
+    assert first.url == second.url
+    assert "was made already" in second.text()
+    assert len(api.get("/api/items?q=sent+twice")) == 1
+
+
+def test_a_file_becomes_a_revision(api: Api, visit: Visit) -> None:
+    """Uploaded with a comment; its picture is shown; an upload that was overtaken is refused."""
+    number = api.item()
+    page, late = visit("editor", java_script_enabled=False), visit("admin", java_script_enabled=False)
+    for one in (page, late):
+        one.goto(f"/items/{number}")
+    for one, name in ((page, "first.FCStd"), (late, "late.FCStd")):
+        one.get_by_label("File for a new revision").set_input_files(
+            {"name": name, "mimeType": "application/zip", "buffer": fcstd_with_picture(len(name))}
+        )
+        one.get_by_label("Comment").fill(f"<b>{name}</b>")
+        one.get_by_role("button", name="Upload").click()
+    expect(page.locator(".notice")).to_contain_text("first.FCStd is revision 1")
+    expect(page.locator(".portrait img")).to_have_count(1)
+    expect(page.locator("tr", has_text="<b>first.FCStd</b>")).to_have_count(1)
+    expect(late.locator("main")).to_contain_text("revision 1")
+    assert len(api.get(f"/api/items/{number}/revisions")) == 1
+
+
+def test_archived_and_found_again(api: Api, visit: Visit) -> None:
+    """Out of the list, found under "Archived", brought back; its place in BOMs stays."""
+    parent, number = api.item(), api.item("ARCH-77", name="Old clamp")
+    api.merge(parent, {number: 2})
+    page = visit("editor", java_script_enabled=False)
+    page.goto(f"/items/{number}/edit")
+    expect(page.locator("section[aria-labelledby=archive]")).to_contain_text("used in 1 BOM")
+    page.get_by_role("button", name=f"Archive {number}").click()
+    expect(page.locator(".notice")).to_contain_text("in the archive")
+    page.goto(f"/items/{parent}")
+    expect(page.locator("tr", has_text=number)).to_contain_text("archived")
+    page.goto("/items?q=ARCH-77")
+    expect(page.locator("#found")).to_contain_text("0 items")
+    page.get_by_label("Archived").check()
+    page.get_by_role("button", name="Search").click()
+    page.get_by_role("link", name=number, exact=True).click()
+    page.get_by_role("button", name="Bring it back").click()
+    expect(page.locator(".notice")).to_contain_text("is back")
+    assert api.get(f"/api/items/{number}")["name"] == "Old clamp"
+
+
+def test_viewers_change_no_item(api: Api, visit: Visit) -> None:
+    """They see properties, and no way to change them; the address is refused."""
+    number = api.item(name="Fixed")
+    page = visit("viewer")
+    page.goto(f"/items/{number}")
+    for name in ("Edit item", "New item", "Upload"):
+        expect(page.get_by_role("link", name=name).or_(page.get_by_role("button", name=name))).to_have_count(
+            0
+        )
+    for path in ("/items/new", f"/items/{number}/edit"):
+        answer = page.goto(path)
+        assert answer is not None
+        assert answer.status == 403
