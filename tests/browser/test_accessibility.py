@@ -92,7 +92,9 @@ def numbers(api: Api) -> dict[str, str]:
     return {"parent": parent, "child": child}
 
 
-@pytest.mark.parametrize(("scheme", "width"), [("light", 1440), ("dark", 1440), ("dark", 390), ("light", 320)])
+@pytest.mark.parametrize(
+    ("scheme", "width"), [("light", 1440), ("dark", 1440), ("dark", 390), ("light", 320)]
+)
 def test_no_page_has_a_finding(
     axe: str, numbers: dict[str, str], visit: Visit, scheme: str, width: int
 ) -> None:
