@@ -136,7 +136,7 @@ def _candidates(document: Any) -> list[tuple[tuple[int, bool], Any]]:
     objects = _known(document)
     inner = _members_of(objects, _CONTAINERS)
     in_folders = _members_of(objects, _FOLDERS)
-    reader = _silent_reader()
+    reader = silent_reader()
     found = []
     for obj, _ in objects:
         name = object_name(obj)
@@ -148,11 +148,13 @@ def _candidates(document: Any) -> list[tuple[tuple[int, bool], Any]]:
     return sorted(found, key=lambda candidate: candidate[0])
 
 
-def _silent_reader() -> Reader:
+def silent_reader(*, hardware: bool = True) -> Reader:
+    """For a look at documents whose findings nobody needs twice."""
+
     def path_of(obj: Any) -> str:
         return getattr(getattr(obj, "Document", None), "FileName", "") or ""
 
-    return Reader(Notes(path_of), lambda obj: (path_of(obj), object_name(obj)), None)
+    return Reader(Notes(path_of), lambda obj: (path_of(obj), object_name(obj)), None, hardware=hardware)
 
 
 def choose_assembly(document: Any, name: str | None = None) -> Any:
@@ -176,7 +178,7 @@ def _likely(document: Any) -> list[Any]:
     found = _candidates(document)
     if not found or found[0][0][0] > _HOLDS_NOTHING - 2:
         return []
-    reader = _silent_reader()
+    reader = silent_reader()
     best = [obj for standing, obj in found if standing == found[0][0]]
     return [obj for obj in best if _holds(obj, reader) == 2] or best
 

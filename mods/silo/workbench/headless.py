@@ -138,7 +138,7 @@ def _write_lines(job: Job, out: TextIO) -> int:
     def look(extraction: Extraction) -> None:
         from silo.workbench.freecad import witness
 
-        seen[:] = witness.accounts(extraction) if job.verify else []
+        seen[:] = witness.accounts(extraction, hardware=not job.no_hardware) if job.verify else []
 
     found = _extractions(tops, job, look)
     for top in tops:

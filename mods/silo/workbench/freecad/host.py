@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Set
 from contextlib import contextmanager
 from typing import Any
 
@@ -85,8 +85,64 @@ def save_parameters() -> None:
     FreeCAD.saveParameter()
 
 
+Leaves = dict[tuple[str, str], tuple[Any, int]]
+
+
+class ShownLeaves:
+    """The objects with a shape of their own that FreeCAD shows for an object, and how often each.
+
+    FreeCAD itself says what an object shows (``getSubObjects``), with all that it links to; what is hidden is
+    not shown. Its shape of a container (``Part.getShape``) would have twice what lies in a folder.
+
+    though_hidden
+        document and name of objects that are taken as shown wherever they lie, with all their elements.
+    """
+
+    def __init__(self, though_hidden: Set[tuple[str, str]] = frozenset()) -> None:
+        self._though_hidden = though_hidden
+        self._known: dict[tuple[str, str, bool], Leaves] = {}
+
+    def of(self, obj: Any, hidden: bool = False) -> Leaves:
+        """Document and name of each leaf → the leaf, and how often it is shown. ``hidden``: the object is."""
+        obj = getattr(obj, "real", obj)
+        linked = obj.getLinkedObject(True)
+        if linked is not None and linked != obj:
+            if hidden:
+                return {}
+            obj = linked
+        key = (obj.Document.Name, obj.Name, hidden)
+        if key not in self._known:
+            self._known[key] = {}  # what leads back to itself shows nothing
+            self._known[key] = self._inside(obj, hidden)
+        return self._known[key]
+
+    def _inside(self, obj: Any, hidden: bool) -> Leaves:
+        holds = "Group" in obj.PropertiesList or obj.isDerivedFrom("App::LinkGroup")
+        if hidden and not holds:
+            return {}
+        names = obj.getSubObjects()
+        is_link = obj.hasExtension("App::LinkBaseExtension")
+        if not names or (obj.isDerivedFrom("Part::Feature") and not is_link):
+            return {} if hidden else {(obj.Document.Name, obj.Name): (obj, 1)}
+        # A part lists what lies in its folders beside the folders.
+        skip_folders = "Group" in obj.PropertiesList and not obj.isDerivedFrom("App::DocumentObjectGroup")
+        whole = is_link and (obj.Document.Name, obj.Name) in self._though_hidden
+        leaves: Leaves = {}
+        for name in names:
+            shown = obj.getSubObject(name, retType=1)
+            if shown is None or (skip_folders and shown.isDerivedFrom("App::DocumentObjectGroup")):
+                continue
+            visible = obj.isElementVisible(name.rstrip("."))
+            is_hidden = hidden or visible == 0 or (visible < 0 and not shown.Visibility)
+            if whole or (holds and (shown.Document.Name, shown.Name) in self._though_hidden):
+                is_hidden = False
+            for key, (leaf, times) in self.of(shown, is_hidden).items():
+                leaves[key] = (leaf, times + (leaves[key][1] if key in leaves else 0))
+        return leaves
+
+
 def solids(obj: Any) -> int:
-    """How many solids FreeCAD shows for an object, with all that it links to; hidden ones have no shape."""
+    """How many solids the own shape of an object has."""
     import Part
 
     def count(shape: Any) -> int:
@@ -95,7 +151,7 @@ def solids(obj: Any) -> int:
             return 0
         return 1 if shape.ShapeType == "Solid" else sum(map(count, shape.SubShapes))
 
-    return count(Part.getShape(getattr(obj, "real", obj)))
+    return count(Part.getShape(obj))
 
 
 # --- documents -------------------------------------------------------------------------------------------
