@@ -169,8 +169,23 @@ def test_the_missing_column_is_named(api: Api, header: str, missing: str, there:
 
 
 def test_an_import_cannot_make_a_ring(api: Api) -> None:
-    """409 with the path, nothing imported."""
+    """The check says it of the row, with the path; the assembly itself is named too; nothing is imported."""
     top, sub = api.items(2)
     api.merge(top, {sub: 1})
-    body = f"Part number,Quantity\r\n{top},1\r\n".encode()
-    assert api.bad(409, "POST", bom(sub, "import"), body=body)["path"] == [sub, top, sub]
+    body = f"PN;Qty\r\n{top};1\r\n{sub};2\r\n".encode()
+    checked = api.good("POST", bom(sub, "import?dry_run=true"), body=body)
+    assert [row["status"] for row in checked["rows"]] == ["error", "error"]
+    problems = api.bad(400, "POST", bom(sub, "import"), body=body)["problems"]
+    assert f"{sub} → {top} → {sub}" in problems[0]
+    assert "the assembly itself" in problems[1]
+    assert api.lines(sub) == {}
+
+
+def test_a_flat_export_is_no_import(api: Api, tree: tuple[str, ...]) -> None:
+    """Its quantities are totals over all levels: as the lines of one level they would be wrong."""
+    flat = api.call("GET", bom(tree[0], "export.csv?view=flat")).body
+    assert "flat export" in api.bad(400, "POST", bom(tree[0], "import"), body=flat)["message"]
+    indented = api.call("GET", bom(tree[0], "export.csv?view=indented")).body
+    before = api.lines(tree[0])
+    api.good("POST", bom(tree[0], "import"), body=indented)
+    assert api.lines(tree[0]) == before

@@ -10,16 +10,20 @@ from __future__ import annotations
 import base64
 import binascii
 import zlib
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 from fastapi import APIRouter, Request
 from starlette.datastructures import FormData, UploadFile
 from starlette.responses import Response
 
 from silo.bom.errors import RejectedError, SiloError, VersionConflictError
+from silo.bom.numbers import Mark
 from silo_server.errors import TooLargeError
 from silo_server.routes.context import Server, ServerDep
-from silo_server.services.bom import imports
+from silo_server.services.bom import csv_file, imports
+from silo_server.services.bom.csv_file import Layout
 from silo_server.services.items import get_item
 from silo_server.values import Actor
 from silo_server.web.forms import Form, back, text, whole
@@ -54,30 +58,64 @@ def import_page(request: Request, server: ServerDep, caller: Writer, part_number
 
 @router.post("/items/{part_number}/import/check")
 def check(request: Request, server: ServerDep, caller: Writer, part_number: str, form: Form) -> Response:
-    """Say what the file would do; nothing is written."""
+    """Say what the file would do; nothing is written. The same file again, with other columns, comes back."""
+    upload, layout = None, None
     try:
-        return _show(request, server, caller, part_number, _uploaded(form))
+        upload = _carried(form) if "packed" in form else _uploaded(form)
+        layout = layout_of(form)
+        return _show(request, server, caller, part_number, upload, layout)
     except (RejectedError, TooLargeError) as error:
-        return _show(request, server, caller, part_number, None, str(error), error.status_hint)
+        shown = replace(Problem.of(error), upload=upload, layout=layout)
+        return _show(request, server, caller, part_number, None, problem=shown)
 
 
 @router.post("/items/{part_number}/import")
 def apply(request: Request, server: ServerDep, caller: Writer, part_number: str, form: Form) -> Response:
     """Write it; where the BOM changed since the check, check again instead."""
-    upload = _carried(form)
+    upload, layout = _carried(form), layout_of(form)
     try:
-        records = imports.read_csv(upload.data, server.settings.max_merge_entries)
+        records = csv_file.read_csv(upload.data, server.settings.max_merge_entries, layout)
         with server.db.write(caller) as tx:
             plan, change, _ = imports.apply_import(
                 tx, part_number, records, upload.name, whole(form, "version")
             )
     except VersionConflictError:
-        problem = "The BOM was changed by somebody else since the file was checked; nothing was imported."
-        return _show(request, server, caller, part_number, upload, problem, 412)
+        problem = Problem("The BOM was changed by somebody else since the file was checked; look again.", 412)
+        return _show(request, server, caller, part_number, upload, layout, problem)
     except SiloError as error:
-        return _show(request, server, caller, part_number, upload, str(error), error.status_hint)
+        return _show(request, server, caller, part_number, upload, layout, Problem.of(error))
     said = f"Imported {isolate(upload.name)}: {plan.count('add')} added, {plan.count('change')} changed."
     return back(bom_path(part_number), said, undo=change)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Why a file was not taken; with the file, where the person can say how to read it."""
+
+    words: str = ""
+    status: int = 200
+    upload: Upload | None = None
+    layout: Layout | None = None
+
+    @classmethod
+    def of(cls, error: SiloError) -> Problem:
+        words = str(error).removeprefix("file: ")
+        return cls(words[:1].upper() + words[1:] + ("" if words.endswith(".") else "."), error.status_hint)
+
+
+def layout_of(form: FormData) -> Layout | None:
+    """How the person said the file is to be read; None where nobody said."""
+    if "header" not in form:
+        return None
+    marks = {mark.value: mark for mark in Mark}
+    columns = {role: whole(form, f"column_{role}") for role in csv_file.ROLES}
+    delimiter = form.get("delimiter")
+    return Layout(
+        delimiter if isinstance(delimiter, str) and delimiter in csv_file.DELIMITERS else ",",
+        min(whole(form, "header") or 0, csv_file.HEADER_WITHIN - 1),
+        {role: at for role, at in columns.items() if at is not None and at < csv_file.MAX_COLUMNS},
+        marks.get(text(form, "mark")),
+    )
 
 
 def _show(
@@ -86,10 +124,10 @@ def _show(
     caller: Actor,
     part_number: str,
     upload: Upload | None,
-    problem: str = "",
-    status: int = 200,
+    layout: Layout | None = None,
+    problem: Problem = Problem(),
 ) -> Response:
-    records = imports.read_csv(upload.data, server.settings.max_merge_entries) if upload else ()
+    records = csv_file.read_csv(upload.data, server.settings.max_merge_entries, layout) if upload else ()
     with server.db.read(caller) as tx:
         item = get_item(tx, part_number)
         plan = imports.plan_import(tx, part_number, records) if upload else None
@@ -97,18 +135,44 @@ def _show(
     said = {row.row: changes(row.before, row.after) for row in rows if row.before and row.after}
     # What is wrong, and what would change, is worth reading; rows that are as they were are not.
     order = {"error": 0, "add": 1, "change": 1, "skip": 2, "same": 2}
+    file = upload or problem.upload
     return page(
         request,
         "import.html",
         caller,
-        status=status,
+        status=problem.status,
         item=item,
         upload=upload,
         plan=plan,
         rows=sorted(rows, key=lambda row: (order[row.status], row.row))[:MOST_ROWS],
         said=said,
-        problem=problem,
+        problem=problem.words,
+        file=file,
+        reading=_reading(file, layout or problem.layout) if file else None,
     )
+
+
+def _reading(file: Upload, layout: Layout | None) -> dict[str, Any]:
+    """How the file is read, for the form in which a person changes that."""
+    known = layout or csv_file.guess_of(file.data) or Layout(csv_file.likely_delimiter(file.data), 0)
+    lines = csv_file.first_lines(file.data, known.delimiter, known.header + 6)
+    header = lines[known.header] if known.header < len(lines) else []
+    width = max(map(len, lines), default=0)
+    samples = lines[known.header + 1 :]
+    return {
+        "layout": known,
+        "chosen": layout is not None,
+        "lines": [" | ".join(cells)[:60] for cells in lines],
+        "delimiters": csv_file.DELIMITERS,
+        "roles": [(role, role.replace("_", " ").capitalize()) for role in csv_file.ROLES],
+        "columns": [_name_of(index, header, samples) for index in range(width)],
+    }
+
+
+def _name_of(index: int, header: Sequence[str], samples: Sequence[Sequence[str]]) -> str:
+    name = header[index].strip() if index < len(header) else ""
+    example = next((row[index].strip() for row in samples if index < len(row) and row[index].strip()), "")
+    return f"{index + 1}: {name[:40]}" + (f" (such as {example[:20]})" if example else "")
 
 
 def _uploaded(form: FormData) -> Upload:

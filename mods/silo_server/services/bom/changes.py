@@ -124,24 +124,36 @@ def apply_changes(tx: Tx, parent: Item, changes: Sequence[LineChange], note: Cha
 def check_no_cycle(tx: Tx, parent: Item, child_ids: Collection[int]) -> None:
     """Raise CycleError where one of the children to be added contains the parent, or is it.
 
-    Looks upwards from the parent: its ancestors are few where its children may be thousands. The caller's
-    edges are added under the structure lock, so that two requests cannot close a ring together.
+    The caller's edges are added under the structure lock, so that two requests cannot close a ring together.
     """
     if not child_ids:
         return
     tx.lock_structure()
-    edges = _edges_above(tx, parent.id)
+    for ring in find_rings(tx, parent, child_ids).values():
+        raise CycleError(ring)
+
+
+def find_rings(tx: Tx, parent: Item, child_ids: Collection[int]) -> dict[int, list[str]]:
+    """Those of the children that contain the parent, or are it, each with the part numbers of the ring.
+
+    Looks upwards from the parent: its ancestors are few where its children may be thousands.
+    """
     wanted = set(child_ids)
+    if not wanted:
+        return {}
+    edges = _edges_above(tx, parent.id)
     above: dict[int, int] = {parent.id: parent.id}
     queue = [parent.id]
-    while queue:
+    found: list[int] = []
+    while queue and len(found) < len(wanted):
         node = queue.pop(0)
         if node in wanted:
-            raise CycleError(_ring(tx, parent.id, node, above))
+            found.append(node)
         for ancestor in edges.get(node, ()):
             if ancestor not in above:
                 above[ancestor] = node
                 queue.append(ancestor)
+    return {child_id: _ring(tx, parent.id, child_id, above) for child_id in found}
 
 
 def _edges_above(tx: Tx, item_id: int) -> dict[int, list[int]]:

@@ -7,22 +7,16 @@ does not name stay as they are. Our own single-level export, imported again, cha
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import islice
 from typing import Any
 
 from sqlalchemy import select
 
 from silo.bom.errors import RejectedError
-from silo.bom.headers import Role, find_roles, missing_columns
-from silo.bom.numbers import common_mark, parse_number, read_quantity
 from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import items
-from silo_server.errors import TooLargeError
 from silo_server.services import events
 from silo_server.services.bom.changes import (
     ChangeKind,
@@ -31,28 +25,14 @@ from silo_server.services.bom.changes import (
     apply_changes,
     check_no_cycle,
     check_version,
+    find_rings,
     new_line_id,
 )
+from silo_server.services.bom.csv_file import Record
 from silo_server.services.bom.edits import check_state, edited_state
-from silo_server.services.bom.exports import plain_cell
 from silo_server.services.bom.lines import lines_of
 from silo_server.services.items import get_item
-from silo_server.values import Line, LineState
-
-ROLES = (
-    *(Role.PART_NUMBER, Role.QUANTITY, Role.UNIT, Role.REFERENCE_DESIGNATORS, Role.FIND_NUMBER, Role.NOTES),
-    *(Role.TYPE, Role.REVISION, Role.LEVEL),
-)
-INCOMPLETE = "Incomplete"  # of silo_server.services.bom.exports
-NEEDED = (Role.PART_NUMBER, Role.QUANTITY)
-HEADER_WITHIN = 40
-"""The header must be among this many first lines (title blocks are a few lines long)."""
-
-
-MAX_COLUMNS = 200
-
-# (row number, field → text)
-Record = tuple[int, dict[str, str]]
+from silo_server.values import Item, Line, LineState
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +65,7 @@ class ImportPlan:
 
 
 def plan_import(tx: Tx, part_number: str, records: Sequence[Record]) -> ImportPlan:
-    """Say what an import of the rows of :func:`read_csv` would do, row by row; changes nothing."""
+    """Say what an import of the rows of ``csv_file.read_csv`` would do, row by row; changes nothing."""
     parent = get_item(tx, part_number)
     lines = {(line.child_part_number.casefold(), line.state.rel_type): line for line in lines_of(tx, parent)}
     keys = {record.get("part_number", "").casefold() for _, record in records}
@@ -94,6 +74,8 @@ def plan_import(tx: Tx, part_number: str, records: Sequence[Record]) -> ImportPl
         row.part_number_key: (row.id, row.archived_at is not None)
         for row in tx.conn.execute(query.where(one_of(tx, items.c.part_number_key, keys)))
     }
+    new = {known[key][0] for key in keys if key in known}
+    rings = find_rings(tx, parent, new - {line.child_id for line in lines.values()})
     rows: list[ImportRow] = []
     seen: set[tuple[str, str]] = set()
     for number, record in records:
@@ -102,6 +84,8 @@ def plan_import(tx: Tx, part_number: str, records: Sequence[Record]) -> ImportPl
         if row.status not in ("error", "skip") and key in seen:
             row = ImportRow(number, row.part_number, "error", (f"{row.part_number} stands here twice",))
         seen.add(key)
+        if row.status == "add" and row.child_id in rings:
+            row = ImportRow(number, row.part_number, "error", (_in_a_ring(parent, rings[row.child_id]),))
         rows.append(row)
     return ImportPlan(rows)
 
@@ -109,7 +93,7 @@ def plan_import(tx: Tx, part_number: str, records: Sequence[Record]) -> ImportPl
 def apply_import(
     tx: Tx, part_number: str, records: Sequence[Record], file_name: str | None, expected: int | None
 ) -> tuple[ImportPlan, int, int]:
-    """Import the rows of :func:`read_csv` as one change. Returns (what was done, change, version).
+    """Import the rows of ``csv_file.read_csv`` as one change. Returns (what was done, change, version).
 
     RejectedError lists every problem, and then nothing was changed.
     """
@@ -137,69 +121,10 @@ def apply_import(
     return plan, change_id, version
 
 
-def read_csv(data: bytes, max_rows: int) -> list[Record]:
-    """The rows that say anything; RejectedError where this is no BOM, TooLargeError beyond ``max_rows``.
-
-    Needs no database: to be called before a transaction begins, which others would wait for.
-    """
-    table, start, delimiter = _table(_decode(data), max_rows)
-    at = find_roles(table[start], ROLES)
-    gap_column = next((i for i, cell in enumerate(table[start]) if cell.strip() == INCOMPLETE), None)
-    records = []
-    for number, cells in enumerate(table[start + 1 :], start=start + 2):
-        record = {role.value: plain_cell(cells[i].strip()) for role, i in at.items() if i < len(cells)}
-        # Our own exports end with what a sync left out: rows that say so, and have no part number.
-        told = cells[gap_column].strip() if gap_column is not None and gap_column < len(cells) else ""
-        if any(record.values()) and (record.get("part_number") or not told):
-            records.append((number, record))
-    return _with_exact_quantities(records, points_are_decimal=delimiter == ",")
-
-
-def _with_exact_quantities(records: list[Record], *, points_are_decimal: bool) -> list[Record]:
-    """Quantities as plain numerals where they can be read; what is wrong with one stands beside it.
-
-    The whole column decides what "1,234" means; in a file separated by commas, a point is a decimal point.
-    """
-    texts = [record.get("quantity", "") for _, record in records]
-    mark = common_mark(number.mark for text in texts if (number := parse_number(text)))
-    for (_, record), text in zip(records, texts, strict=True):
-        reading = read_quantity(text, mark, points_are_decimal=points_are_decimal)
-        record["quantity"] = "" if reading.value is None else str(reading.value)
-        if reading.problem:
-            record["quantity_problem"] = reading.problem
-    return records
-
-
-def _table(text: str, max_rows: int) -> tuple[list[list[str]], int, str]:
-    """(cells, index of the header row, delimiter), by the delimiter with which there is a header."""
-    broken: csv.Error | None = None
-    near = ""
-    for delimiter in (",", ";", "\t"):
-        rows = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
-        try:
-            table: list[list[str]] = []
-            for index, row in enumerate(islice(rows, HEADER_WITHIN)):
-                table.append(row)
-                at = find_roles(row[:MAX_COLUMNS], ROLES)
-                missing = missing_columns(row[:MAX_COLUMNS], at, NEEDED)
-                # A line with one of the two, and another cell beside it, is a header that lacks the other.
-                if missing and len(row) > 1 and set(NEEDED) & at.keys():
-                    near = near or f"file: in line {index + 1}, {missing}"
-                if not missing:
-                    table.extend(islice(rows, max_rows + 1))
-                    if len(table) - index - 1 > max_rows:
-                        raise TooLargeError(f"file: this server takes at most {max_rows} rows, got more")
-                    return table, index, delimiter
-        except csv.Error as error:
-            broken = error
-    if near:
-        raise RejectedError(near)
-    if broken is not None:
-        raise RejectedError(f"file: wanted CSV, got something that does not read as such ({broken})")
-    raise RejectedError(
-        f"file: wanted a header row with 'Part number' and 'Quantity' among the first {HEADER_WITHIN} rows, "
-        "found none"
-    )
+def _in_a_ring(parent: Item, ring: Sequence[str]) -> str:
+    if len(ring) <= 2:
+        return f"Part number: {parent.part_number} is the assembly itself, which cannot be a part of itself"
+    return f"Part number: {ring[1]} contains {parent.part_number} itself ({' → '.join(ring)})"
 
 
 def _plan_row(
@@ -256,14 +181,3 @@ def _changes(record: Mapping[str, str], problems: list[str]) -> dict[str, Any]:
             problems.append(f"Revision: wanted a whole number, got {revision[:40]!r}")
         changes["child_revision"] = int(revision) if known else None
     return changes
-
-
-def _decode(data: bytes) -> str:
-    for mark, encoding in ((b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"), (b"", "utf-8-sig")):
-        if data.startswith(mark):
-            try:
-                return data.decode(encoding)
-            except UnicodeDecodeError:
-                break
-    # What spreadsheets in western Europe and America write when they are not asked for Unicode.
-    return data.decode("cp1252", errors="replace")
