@@ -18,7 +18,8 @@ from silo.bom.model import BomEntry, Extraction
 from silo.outbox.send import Sent
 from silo.registration import Registration
 from silo.testing import FakeSilo
-from silo.workbench.commit.plan import Plan, Row
+from silo.workbench.commit.desk import Answer
+from silo.workbench.commit.plan import Plan
 from silo.workbench.commit.snapshot import Snapshot
 from silo.workbench.preview.rows import Preview
 from silo.workbench.register.registering import Candidate, Offer, Order, Seen, State
@@ -83,6 +84,7 @@ class Document:
     content: bytes = b""
     identity: str = ""
     changed: bool = True
+    recomputed: bool = False
     closed: bool = False
     parts: dict[Document, int] = field(default_factory=dict)
     OutList: list[Document] = field(default_factory=list)
@@ -106,6 +108,9 @@ class Documents:
 
     def is_modified(self, doc: Any, /) -> bool:
         return bool(doc.changed)
+
+    def is_edited(self, doc: Any, _until: float, /) -> bool:
+        return not doc.recomputed
 
     def is_writable(self, _path: str, /) -> bool:
         return True
@@ -194,6 +199,7 @@ class Desk:
     turns: list[Callable[[], None]] = field(default_factory=list)
     warned: list[str] = field(default_factory=list)
     asked: list[str] = field(default_factory=list)
+    comments: list[str] = field(default_factory=list)
     willing: bool = True
     open: list[Document] = field(default_factory=list)
     previews: list[PreviewWindow] = field(default_factory=list)
@@ -244,9 +250,14 @@ class Desk:
     def save_as(self, _doc: Any) -> None:
         return
 
-    def ask(self, planned: Plan, note: str) -> tuple[tuple[Row, ...], str] | None:
+    def identity(self, doc: Any) -> str | None:
+        return str(doc.identity) or None
+
+    def ask(self, planned: Plan, note: str, comment: str) -> Answer | None:
         self.asked.append(note)
-        return (planned.rows, "a comment") if self.willing else None
+        self.comments.append(comment)
+        answer = Answer(planned.wanted, comment or "a comment", planned.unregistered)
+        return answer if self.willing else None
 
     def warn(self, _title: str, text: str) -> None:
         self.warned.append(text)

@@ -15,7 +15,7 @@ from silo.bom.errors import ConfigError, InputError
 
 _DEFAULT_PORTS = {"http": 80, "https": 443}
 _LOOPBACK = ("localhost", "::1")
-_ADVICE = "write it like https://silo.example.com or http://127.0.0.1:7480"
+_ADVICE = "write it like https://silo.example.com or http://127.0.0.1:8080"
 
 Origin = tuple[str, str, int]
 

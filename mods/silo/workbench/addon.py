@@ -54,6 +54,9 @@ class AddOn:
 
     def begin(self) -> None:
         """Go on once the window stands."""
+        from silo.workbench.freecad import saving
+
+        saving.watch_edits()
         qt.later(BEGIN_AFTER_MS, self._begin)
 
     def _begin(self) -> None:
@@ -117,7 +120,7 @@ class AddOn:
         if self._commits is None:
             from silo.workbench.commit.flow import CommitFlow
 
-            self._commits = CommitFlow(self.session, self.preferences, self.desk)
+            self._commits = CommitFlow(self.session, self.preferences, self.desk, register=self.register_path)
         return self._commits
 
     @property

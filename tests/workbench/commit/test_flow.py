@@ -6,8 +6,11 @@ from __future__ import annotations
 import pytest
 from desk import Office
 
+from silo.registration import Journal
 from silo.workbench.commit.flow import CommitFlow
 from silo.workbench.pane.activity import Do
+from silo.workbench.register.flow import RegisterFlow
+from silo.workbench.register.registering import Order
 
 
 @pytest.fixture(name="flow")
@@ -95,6 +98,44 @@ def test_without_a_number_it_is_saved_and_said(office: Office, flow: CommitFlow)
     office.settle()
     assert titles(office) == ["Saved, but not in Silo: New"]
     assert [action.do for action in office.session.shown.activity.entries[0].actions] == [Do.REGISTER]
+
+
+def test_a_recomputed_document_stays_as_it_is(office: Office, flow: CommitFlow) -> None:
+    """Only what was edited is saved and sent, and nothing has to be asked for that."""
+    leaf, top = office.document("Leaf"), office.document("Top")
+    leaf.recomputed, top.OutList = True, [leaf]
+    flow.start(top)
+    office.settle()
+    assert office.desk.documents.saved == ["Top"]
+    assert office.desk.asked == []
+
+
+def test_an_unregistered_one_is_registered_with_its_comment(office: Office) -> None:
+    """The dialog for its part number comes after it is saved; what a person wrote becomes the revision's."""
+    opened: list[str] = []
+    flow = CommitFlow(office.session, office.preferences, office.desk, register=opened.append)
+    new = office.document("New", registered=False)
+    flow.start(new)
+    office.settle()
+    assert opened == [new.FileName]
+    assert office.desk.documents.saved == ["New"]
+
+    # Not registered, and committed again: the comment is there to begin with.
+    office.desk.comments.clear()
+    flow.start(new)
+    office.settle()
+    assert office.desk.comments == ["a comment"]
+    registering = RegisterFlow(
+        office.session, office.preferences, flow, office.desk, journal=Journal(office.folder / "journal")
+    )
+    registering.start(new)
+    office.settle()
+    (window,) = office.desk.registers
+    window.wishes.register([Order(c, "New", "part", "M01") for c in window.offers[0].candidates])
+    office.settle()
+    (number,) = (s.item.part_number for s in office.silo.items.values())
+    assert [r.comment for r in office.silo.revisions(number) if r.file_name] == ["a comment"]
+    assert flow.comment_of(new.FileName) == ""
 
 
 def test_a_disk_that_does_not_take_it_is_a_box(office: Office, flow: CommitFlow) -> None:

@@ -43,6 +43,9 @@ class Documents:
     def is_modified(self, doc: Any, /) -> bool:
         return bool(doc.marks.get("changed"))
 
+    def is_edited(self, doc: Any, _until: float, /) -> bool:
+        return not doc.marks.get("recomputed")
+
     def is_partial(self, doc: Any, /) -> bool:
         return bool(doc.marks.get("partial"))
 
@@ -80,6 +83,23 @@ def test_a_saved_document_is_committed_all_the_same() -> None:
     assert planned.is_simple
 
 
+def test_what_was_only_recomputed_is_listed_and_not_wanted() -> None:
+    """A recompute marks a whole project; what cannot be saved anyway is not even listed."""
+    leaf = Doc("Leaf", changed=True, recomputed=True)
+    edited = Doc("Edited", changed=True)
+    half = Doc("Half", changed=True, recomputed=True, partial=True)
+    planned = plan(Doc("Top", leaf, edited, half, changed=True, recomputed=True), Documents())
+    assert names(planned) == ["Leaf", "Edited", "Top"]
+    assert [row.label for row in planned.wanted] == ["Edited", "Top"]
+    assert not planned.is_simple
+    assert plan(Doc("Top", leaf), Documents()).is_simple
+
+
+def test_an_unregistered_one_is_asked_about() -> None:
+    """Whether to register it as well."""
+    assert not plan(Doc("Top"), Documents(), unregistered=True).is_simple
+
+
 def test_a_leaf_below_untouched_documents_is_found() -> None:
     """What was changed three levels down belongs to the commit."""
     deep = Doc("Deep", changed=True)
@@ -105,6 +125,9 @@ def test_documents_that_link_to_each_other() -> None:
         (Doc("fixed", changed=True), State.READ_ONLY, False),
         (Doc("fixed"), State.SAVED, True),
         (Doc("T", changed=True, newer=True), State.LOST, False),
+        (Doc("T", changed=True, recomputed=True), State.RECOMPUTED, True),
+        (Doc("T", changed=True, recomputed=True, partial=True), State.SAVED, True),
+        (Doc("fixed", changed=True, recomputed=True), State.SAVED, True),
         (Doc("T", newer=True), State.SAVED, True),
     ],
     ids=lambda value: value.Name if isinstance(value, Doc) else str(value),
@@ -134,6 +157,14 @@ def test_each_is_saved_then_taken() -> None:
         ("Sub-id", "k0", Path("/held/k0")),
         ("Top-id", "k1", Path("/held/k1")),
     ]
+
+
+def test_what_was_only_recomputed_is_saved_where_a_person_wants_it() -> None:
+    """FreeCAD's mark goes away."""
+    documents, leaf = Documents(), Doc("Leaf", changed=True, recomputed=True)
+    planned = plan(Doc("Top", leaf), documents)
+    list(taker(documents).each(planned.rows))
+    assert documents.saved == ["Leaf"]
 
 
 def test_what_is_saved_already_is_not_saved_again() -> None:

@@ -8,10 +8,20 @@ With a desk of a test's own the flows run without FreeCAD and Qt. All calls are 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 from silo.workbench.commit.plan import Documents, Plan, Row
 from silo.workbench.commit.snapshot import Snapshot
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a person says in the commit dialog. ``register``: give it a part number as well."""
+
+    rows: tuple[Row, ...]
+    comment: str = ""
+    register: bool = False
 
 
 class Desk(Protocol):
@@ -29,8 +39,15 @@ class Desk(Protocol):
     def save_as(self, doc: Any, /) -> None:
         """Let a person give a document its first name."""
 
-    def ask(self, planned: Plan, note: str, /) -> tuple[tuple[Row, ...], str] | None:
-        """Which documents to commit, and the comment; None where the person does not want to."""
+    def identity(self, doc: Any, /) -> str | None:
+        """The item that a document belongs to, without looking at its components."""
+
+    def ask(self, planned: Plan, note: str, comment: str, /) -> Answer | None:
+        """Which documents to commit, with which comment; None where the person does not want to.
+
+        comment
+            what the person wrote before and is not in Silo yet.
+        """
 
     def warn(self, title: str, text: str, /) -> None:
         """A message that a person must have seen."""

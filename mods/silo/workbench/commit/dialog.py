@@ -4,11 +4,14 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
-from silo.workbench.commit.plan import Plan, Row
+from silo.workbench.commit.desk import Answer
+from silo.workbench.commit.plan import Plan, Row, State
 from silo.workbench.gui import widgets
-from silo.workbench.gui.qt import QtCore, QtGui, QtWidgets
+from silo.workbench.gui.qt import QShortcut, QtCore, QtGui, QtWidgets
 from silo.workbench.pane.activity import Tone
 from silo.workbench.words import counted, plain, tip, translate
 
@@ -16,7 +19,7 @@ from silo.workbench.words import counted, plain, tip, translate
 class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
     """Asks for a comment, and shows what will be saved and in which order."""
 
-    def __init__(self, plan: Plan, parent: Any, *, note: str = "") -> None:
+    def __init__(self, plan: Plan, parent: Any, *, note: str = "", comment: str = "") -> None:
         super().__init__(parent)
         self._plan = plan
         self.setObjectName("SiloCommitDialog")
@@ -29,28 +32,48 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         self.comment.setObjectName("comment")
         self.comment.setPlaceholderText(translate("Silo", "A comment for this revision (may stay empty)"))
         self.comment.setTabChangesFocus(True)
-        self.comment.setMaximumHeight(76)
+        self.comment.setMaximumHeight(5 * self.comment.fontMetrics().lineSpacing())
+        self.comment.setPlainText(comment)
         layout.addWidget(self.comment)
         layout.addWidget(widgets.label(self._heading(), wrap=True))
         self.files = self._make_files()
         layout.addWidget(self.files, 1)
+        if len(plan.rows) > 1:
+            layout.addLayout(self._make_selecting())
+        self.register = QtWidgets.QCheckBox(
+            translate("Silo", "Register it in Silo as well: it has no part number yet")
+        )
+        self.register.setObjectName("register")
+        self.register.setChecked(plan.unregistered)
+        self.register.setVisible(plan.unregistered)
+        layout.addWidget(self.register)
         if note:
             layout.addWidget(widgets.label(note, Tone.QUIET))
         layout.addWidget(self._make_buttons())
+        self.shortcuts = [QShortcut(QtGui.QKeySequence(keys), self) for keys in ("Ctrl+Return", "Ctrl+Enter")]
+        for shortcut in self.shortcuts:
+            shortcut.activated.connect(self.commit.click)
         self.comment.setFocus()
 
     def _heading(self) -> str:
-        below = len(self._plan.rows) - 1
-        if not below:
-            return translate("Silo", "This file is committed:")
-        one = translate(
-            "Silo", "This file is committed, and {n} file below it that has unsaved edits, that one first:"
-        )
-        many = translate(
-            "Silo",
-            "This file is committed, and {n} files below it that have unsaved edits, the lowest first:",
-        )
-        return counted(below, one, many)
+        edited = sum(row.state is not State.RECOMPUTED for row in self._plan.rows[:-1])
+        recomputed = len(self._plan.rows) - 1 - edited
+        told = [translate("Silo", "This file is committed:")]
+        if edited:
+            one = translate(
+                "Silo",
+                "This file is committed, and {n} file below it that has unsaved edits, that one first:",
+            )
+            many = translate(
+                "Silo",
+                "This file is committed, and {n} files below it that have unsaved edits, the lowest first:",
+            )
+            told = [counted(edited, one, many)]
+        if recomputed:
+            one = translate("Silo", "{n} more was only recomputed; check it to commit it all the same.")
+            many = translate("Silo", "{n} more were only recomputed; check them to commit them all the same.")
+            told.append(counted(recomputed, one, many))
+        return "\n".join(told)
 
     def _make_files(self) -> Any:
         tree = QtWidgets.QTreeWidget()
@@ -69,10 +92,36 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         tree.resizeColumnToContents(0)
         return tree
 
+    def _make_selecting(self) -> Any:
+        """Which files go along, all at once."""
+        layout = QtWidgets.QHBoxLayout()
+        layout.addWidget(widgets.label(translate("Silo", "Select:"), wrap=False))
+        for name, text, wanted in (
+            ("edited", translate("Silo", "edited"), lambda row: row.wanted),
+            ("all", translate("Silo", "all"), lambda row: row.can_commit),
+            ("none", translate("Silo", "none"), lambda row: False),
+            ("this", translate("Silo", "only this file"), lambda row: row.is_top),
+        ):
+            button = widgets.link_button(text, partial(self.select, wanted))
+            button.setObjectName(name)
+            layout.addWidget(button)
+        layout.addStretch(1)
+        return layout
+
+    def select(self, wanted: Callable[[Row], bool]) -> None:
+        """Check the files that are wanted and can be committed."""
+        for number, row in enumerate(self._plan.rows):
+            self._check(self.files.topLevelItem(number), row.can_commit and wanted(row))
+
+    def _check(self, item: Any, on: bool) -> None:
+        item.setCheckState(0, QtCore.Qt.CheckState.Checked if on else QtCore.Qt.CheckState.Unchecked)
+
+    def _selected(self, *_changed: Any) -> None:
+        self.commit.setEnabled(bool(self.chosen()))
+
     def _mark(self, item: Any, row: Row, tree: Any) -> None:
-        checked = QtCore.Qt.CheckState.Checked if row.can_commit else QtCore.Qt.CheckState.Unchecked
-        item.setCheckState(0, checked)
-        if row.is_top or not row.can_commit:
+        self._check(item, row.wanted)
+        if not row.can_commit:
             item.setFlags(item.flags() & ~QtCore.Qt.ItemFlag.ItemIsUserCheckable)
         if not row.can_commit:
             shade = widgets.colour(Tone.WARNING, tree)
@@ -88,11 +137,19 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         self.commit = box.addButton(translate("Silo", "Commit"), role.AcceptRole)
         self.commit.setObjectName("commit")
         self.commit.setDefault(True)
-        self.commit.setEnabled(self._plan.top.can_commit)
+        self.commit.setToolTip(translate("Silo", "Ctrl+Return"))
+        self.files.itemChanged.connect(self._selected)
+        self._selected()
         box.addButton(translate("Silo", "Cancel"), role.RejectRole)
         box.accepted.connect(self.accept)
         box.rejected.connect(self.reject)
         return box
+
+    def answer(self) -> Answer:
+        """What the person wants."""
+        chosen = self.chosen()
+        registering = self.register.isChecked() and any(row.is_top for row in chosen)
+        return Answer(chosen, self.text(), registering)
 
     def text(self) -> str:
         """The comment."""

@@ -15,7 +15,7 @@ from __future__ import annotations
 import os
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from silo.bom.errors import SiloError
 from silo.outbox.entry import Commit, new_key
 from silo.spelling import one_path
 from silo.workbench.commit.decisions import Decisions
-from silo.workbench.commit.desk import Desk
+from silo.workbench.commit.desk import Answer, Desk
 from silo.workbench.commit.plan import Plan, Row, State, Taken, Taker, plan, refusal
 from silo.workbench.commit.snapshot import Snapshot
 from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone
@@ -34,15 +34,28 @@ from silo.workbench.words import translate
 
 
 class CommitFlow:
-    """Commits documents, one commit after another."""
+    """Commits documents, one commit after another.
+
+    register
+        opens the Register Parts dialog for the document of this path.
+    """
 
     def __init__(
-        self, session: Session, preferences: Preferences, desk: Desk, *, path: Path | None = None
+        self,
+        session: Session,
+        preferences: Preferences,
+        desk: Desk,
+        *,
+        path: Path | None = None,
+        register: Callable[[str], None] = lambda _path: None,
     ) -> None:
         self._session, self._preferences, self._desk = session, preferences, desk
+        self._register = register
         self.decisions = Decisions(path)
         self._turns: deque[tuple[Iterator[Taken], str]] = deque()
         self._asked_for: set[str] = set()
+        # Path → what a person wrote about a file that has no item yet.
+        self._comments: dict[str, str] = {}
 
     @property
     def running(self) -> bool:
@@ -71,18 +84,29 @@ class CommitFlow:
         """Commit a document: ask where there is something to ask, then go on without waiting."""
         if not doc.FileName:
             self._desk.save_as(doc)
-        planned = plan(doc, self._desk.documents)
+        unregistered = bool(doc.FileName) and not self._desk.identity(doc)
+        planned = plan(doc, self._desk.documents, unregistered=unregistered)
         if text := refusal(planned):
             if planned.top.state is not State.UNNAMED:
                 self._desk.warn(translate("Silo", "Commit to Silo"), text)
             return
-        rows, comment = planned.rows, ""
+        answer: Answer | None = Answer(planned.wanted)
         if self._preferences.flag("AskComment") or not planned.is_simple:
-            answer = self._desk.ask(planned, self._note(planned))
-            if answer is None:
-                return
-            rows, comment = answer
-        self.run(rows, comment)
+            answer = self._desk.ask(planned, self._note(planned), self._comments.get(planned.top.path, ""))
+        if answer is None:
+            return
+        self.run(answer.rows, answer.comment)
+        if answer.register:
+            self._turns.append((self._registering(planned.top.path), ""))
+
+    def _registering(self, path: str) -> Iterator[Taken]:
+        """A turn after the documents are saved."""
+        self._register(path)
+        yield from ()
+
+    def comment_of(self, path: str) -> str:
+        """What a person wrote about a file when it had no item yet; told once."""
+        return self._comments.pop(path, "")
 
     def run(self, rows: tuple[Row, ...], comment: str = "") -> None:
         """Commit these documents, in order, after those of an earlier commit."""
@@ -93,6 +117,7 @@ class CommitFlow:
 
     def finish(self) -> None:
         """Do at once what is left to do: FreeCAD is about to close the documents."""
+        self._register = lambda _path: None
         while self._turns:
             self._step()
 
@@ -134,6 +159,8 @@ class CommitFlow:
             self._tell_error(taken.row.label, str(taken.error))
         elif taken.snapshot is not None and not taken.snapshot.identity:
             self._session.add(not_in_silo(taken.snapshot))
+            if comment:
+                self._comments[taken.snapshot.path] = comment
         else:
             self._keep(taken, comment)
 

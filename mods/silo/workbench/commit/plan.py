@@ -8,6 +8,7 @@ design decision 3). Nothing is lost: a document that FreeCAD cannot save whole i
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
@@ -19,6 +20,9 @@ from silo.spelling import one_path
 from silo.workbench.commit.snapshot import Snapshot
 from silo.workbench.words import plain, translate
 
+# Seconds of the GUI thread; what has not been compared with its file by then counts as edited.
+MOST_S = 0.08
+
 
 class Documents(Protocol):
     """What a commit needs of FreeCAD; :mod:`silo.workbench.freecad.saving` has it."""
@@ -28,6 +32,8 @@ class Documents(Protocol):
     def is_partial(self, doc: Any, /) -> bool: ...
 
     def is_modified(self, doc: Any, /) -> bool: ...
+
+    def is_edited(self, doc: Any, until: float, /) -> bool: ...
 
     def is_writable(self, path: str, /) -> bool: ...
 
@@ -40,6 +46,7 @@ class State(StrEnum):
     """How a document stands before a commit."""
 
     CHANGED = "changed"  # has edits; will be saved
+    RECOMPUTED = "recomputed"  # marked by FreeCAD, but nothing differs from the file
     SAVED = "saved"  # nothing to save; the file is sent as it is
     UNNAMED = "unnamed"  # never saved: it has no file yet
     PARTIAL = "partial"  # has edits, but FreeCAD has loaded it only in part and cannot save it
@@ -60,7 +67,12 @@ class Row:
     @property
     def can_commit(self) -> bool:
         """True where the file can be brought up to date and sent."""
-        return self.state in (State.CHANGED, State.SAVED)
+        return self.state in (State.CHANGED, State.RECOMPUTED, State.SAVED)
+
+    @property
+    def wanted(self) -> bool:
+        """Checked to begin with? What was only recomputed is as it is in Silo."""
+        return self.can_commit and (self.is_top or self.state is not State.RECOMPUTED)
 
     @property
     def note(self) -> str:
@@ -71,6 +83,7 @@ class Row:
 def _words() -> dict[State, str]:
     return {
         State.CHANGED: translate("Silo", "unsaved edits: will be saved"),
+        State.RECOMPUTED: translate("Silo", "recomputed only: nothing differs from the file"),
         State.SAVED: translate("Silo", "saved already"),
         State.UNNAMED: translate("Silo", "has no file yet: save it under a name first"),
         State.PARTIAL: translate(
@@ -87,9 +100,19 @@ def _words() -> dict[State, str]:
 
 @dataclass(frozen=True)
 class Plan:
-    """The documents of a commit, leaves first, the one that was asked for last."""
+    """The documents of a commit, leaves first, the one that was asked for last.
+
+    unregistered
+        the one that was asked for has no item in Silo yet.
+    """
 
     rows: tuple[Row, ...]
+    unregistered: bool = False
+
+    @property
+    def wanted(self) -> tuple[Row, ...]:
+        """What is committed unless a person says otherwise."""
+        return tuple(row for row in self.rows if row.wanted)
 
     @property
     def top(self) -> Row:
@@ -98,12 +121,14 @@ class Plan:
 
     @property
     def is_simple(self) -> bool:
-        """True where there is nothing to ask: one document that can be committed."""
-        return len(self.rows) == 1 and self.top.can_commit
+        """True where there is nothing to ask: one document that can be committed, the others unchanged."""
+        others = all(row.state is State.RECOMPUTED for row in self.rows[:-1])
+        return others and self.top.can_commit and not self.unregistered
 
 
-def plan(top: Any, documents: Documents) -> Plan:
+def plan(top: Any, documents: Documents, *, unregistered: bool = False) -> Plan:
     """Plan the commit of a document."""
+    until = time.thread_time() + MOST_S
     changed = {doc.Name for doc in documents.linked(top) if documents.is_modified(doc)} - {top.Name}
     rows = []
     # The order is asked for only where there is one to find.
@@ -111,8 +136,11 @@ def plan(top: Any, documents: Documents) -> Plan:
         is_top = doc is top or doc == top
         if is_top or doc.Name in changed:
             path = one_path(doc.FileName) if doc.FileName else ""
-            rows.append(Row(doc, path, str(doc.Label), _state(doc, documents), is_top))
-    return Plan(tuple(rows))
+            state = _state(doc, documents, until)
+            # What was only recomputed, and cannot be saved anyway, is nobody's concern.
+            if is_top or state is not State.SAVED:
+                rows.append(Row(doc, path, str(doc.Label), state, is_top))
+    return Plan(tuple(rows), unregistered)
 
 
 def refusal(plan: Plan) -> str:
@@ -162,16 +190,25 @@ def _walked(top: Any) -> Iterator[Any]:
             yield doc
 
 
-def _state(doc: Any, documents: Documents) -> State:
+def _state(doc: Any, documents: Documents, until: float) -> State:
     if not doc.FileName:
         return State.UNNAMED
     if not documents.is_modified(doc):
         return State.SAVED
+    edited = documents.is_edited(doc, until)
+    held = _held(doc, documents)
+    if held is not None:
+        return held if edited else State.SAVED
+    return State.CHANGED if edited else State.RECOMPUTED
+
+
+def _held(doc: Any, documents: Documents) -> State | None:
+    """Why a document cannot be saved; None where it can."""
     if documents.is_partial(doc):
         return State.PARTIAL
     if documents.lost_assemblies(doc):
         return State.LOST
-    return State.CHANGED if documents.is_writable(doc.FileName) else State.READ_ONLY
+    return None if documents.is_writable(doc.FileName) else State.READ_ONLY
 
 
 @dataclass(frozen=True)
@@ -221,7 +258,7 @@ class Taker:
             yield taken
 
     def _one(self, row: Row) -> Taken:
-        if row.state is State.CHANGED:
+        if row.state in (State.CHANGED, State.RECOMPUTED):
             self.documents.save(row.document)
         snapshot = self.take(row.document)
         key = self.new_key()

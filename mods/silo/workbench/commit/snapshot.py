@@ -72,6 +72,15 @@ def take(doc: Any, *, assembly: Any = None, walk: Walk = extract) -> Snapshot:
     return Snapshot(path, label, head.silo_uuid or part_identity(doc), _with_identity(extraction, doc))
 
 
+def identity(doc: Any, assembly: Any = None) -> str | None:
+    """The item that an open document belongs to, as :func:`take` finds it; None while unregistered."""
+    try:
+        container = _choose(doc, assembly)
+    except InputError:
+        return part_identity(doc)
+    return identity_of(container) or part_identity(doc)
+
+
 def _choose(doc: Any, hint: Any) -> Any:
     try:
         return choose_assembly(doc)

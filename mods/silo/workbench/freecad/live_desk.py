@@ -9,7 +9,8 @@ from functools import partial
 from typing import Any
 
 from silo.workbench.commit import snapshot
-from silo.workbench.commit.plan import Plan, Row
+from silo.workbench.commit.desk import Answer
+from silo.workbench.commit.plan import Plan
 from silo.workbench.commit.snapshot import Snapshot
 from silo.workbench.freecad import components, host, live, saving
 from silo.workbench.gui import qt
@@ -23,6 +24,7 @@ class LiveDocuments:
     linked = staticmethod(host.linked_documents)
     is_partial = staticmethod(host.is_partial)
     is_modified = staticmethod(saving.is_modified)
+    is_edited = staticmethod(saving.is_edited)
     is_writable = staticmethod(saving.is_writable)
     lost_assemblies = staticmethod(live.lost_assemblies)
     save = staticmethod(saving.save)
@@ -38,11 +40,13 @@ class LiveDesk:
     def snapshot(self, doc: Any) -> Snapshot:
         """The assembly that is active in the 3D view decides between several."""
         cached = live.cached_document(doc)
-        active = host.active_assembly() if host.has_gui() else None
-        hint = cached.getObject(active.Name) if active is not None and active.Document == doc else None
         hardware = self._count_hardware()
         walk = partial(live.extract_object, hardware=hardware)
-        return snapshot.take(cached, assembly=hint, walk=walk)
+        return snapshot.take(cached, assembly=self._hint(doc, cached), walk=walk)
+
+    def _hint(self, doc: Any, cached: Any) -> Any:
+        active = host.active_assembly() if host.has_gui() else None
+        return cached.getObject(active.Name) if active is not None and active.Document == doc else None
 
     find = staticmethod(host.find_document)
     look_at = staticmethod(components.look_at)
@@ -54,12 +58,17 @@ class LiveDesk:
         """FreeCAD's own dialog, for the active document."""
         host.run_command("Std_Save")
 
-    def ask(self, planned: Plan, note: str) -> tuple[tuple[Row, ...], str] | None:
+    def identity(self, doc: Any) -> str | None:
+        """By the assembly that is active, where the document holds several."""
+        cached = live.cached_document(doc)
+        return snapshot.identity(cached, self._hint(doc, cached))
+
+    def ask(self, planned: Plan, note: str, comment: str) -> Answer | None:
         """The commit dialog."""
         from silo.workbench.commit.dialog import CommitDialog
 
-        dialog = CommitDialog(planned, host.main_window(), note=note)
-        return (dialog.chosen(), dialog.text()) if qt.run_dialog(dialog) else None
+        dialog = CommitDialog(planned, host.main_window(), note=note, comment=comment)
+        return dialog.answer() if qt.run_dialog(dialog) else None
 
     def preview_window(self, title: str, wishes: preview.Wishes) -> preview.Window:
         """The preview window."""

@@ -10,9 +10,11 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
+from functools import cache
 from typing import Any
 
 from silo.workbench.freecad import host
+from silo.workbench.freecad.edits import EditWatch
 
 
 def is_modified(doc: Any) -> bool:
@@ -21,6 +23,24 @@ def is_modified(doc: Any) -> bool:
         return bool(doc.isTouched()) if hasattr(doc, "isTouched") else False
     view = host.view_of(doc)
     return bool(view is not None and view.Modified)
+
+
+@cache
+def watch_edits() -> EditWatch:
+    """What is edited from now on is known by :func:`is_edited`."""
+    watch = EditWatch()
+    watch.begin([doc for doc in host.documents() if not is_modified(doc)])
+    host.add_document_observer(watch)
+    return watch
+
+
+def is_edited(doc: Any, until: float) -> bool:
+    """True where a modified document differs from its file; False where it was only recomputed.
+
+    until
+        (``time.thread_time``) what is not compared by then counts as edited.
+    """
+    return watch_edits().is_edited(doc, until)
 
 
 def open_fully(path: str) -> Any:

@@ -21,7 +21,11 @@ try:
 except ImportError:
     QtWidgets = QtGui
 
+# PySide6 has it among the others of QtGui, PySide2 among the widgets.
+QShortcut = getattr(QtGui, "QShortcut", None) or QtWidgets.QShortcut
+
 __all__ = [
+    "QShortcut",
     "QtCore",
     "QtGui",
     "QtWidgets",

@@ -165,17 +165,21 @@ class RegisterFlow:
         """Upload the files that have an item now, and sync the assembly's BOM with the new lines."""
         if not registered:
             return
-        comment = translate("Silo", "Registered")
+        registered_now = translate("Silo", "Registered")
+
+        def comment(file: str) -> str:
+            return self._commits.comment_of(file) or registered_now
+
         # A file that gives several parts is no single item's.
         for part in dict.fromkeys(c.entry.doc_path for c in registered if not c.shares_file):
             doc = self._desk.find(part)
             if doc is not None and part != path:
-                self._commits.send(doc, comment)
+                self._commits.send(doc, comment(part))
         top = self._desk.find(path)
         if top is None:
             return
         if any(candidate.entry.doc_path == path for candidate in registered):
-            self._commits.send(top, comment)
+            self._commits.send(top, comment(path))
         else:
             self._commits.sync_only(top)
         self._changed(path)

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""A commit knows what was edited from what was only recomputed, by content; and it registers what is new."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from freecad_cases.machines import WANTED
+from gui_cases.window import Window, window
+
+pytestmark = [pytest.mark.freecad, pytest.mark.slow]
+
+# Milliseconds of the GUI thread, for 42 files.
+MOST = 150
+
+
+@pytest.fixture(name="freecad", scope="module", params=WANTED)
+def _freecad(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Window]:
+    with window(request.param, tmp_path_factory.mktemp("edited").resolve()) as freecad:
+        freecad.prepare()
+        yield freecad
+
+
+@pytest.fixture(name="said", scope="module")
+def _said(freecad: Window) -> dict[str, Any]:
+    return freecad.run("edited.py")
+
+
+def test_a_recompute_is_no_edit(said: dict[str, Any]) -> None:
+    """FreeCAD marks all 42 documents; one of them has an edit."""
+    assert said["marked"] == 42
+    states = dict(said["states"])
+    assert states.pop("Part7") == "changed"
+    assert set(states.values()) == {"recomputed"}
+    assert len(states) == 41
+
+
+def test_the_check_does_not_hold_up_the_window(said: dict[str, Any]) -> None:
+    """Processor time, which other work on the machine does not change much; the benchmark has the figures."""
+    assert said["took"] < MOST
+
+
+def test_only_what_was_edited_is_checked(said: dict[str, Any]) -> None:
+    """And all, none or only this file by a click; without any there is nothing to commit."""
+    told = said["dialog"]
+    assert told["checked"] == ["Part7", "Top"]
+    assert told["all"] == [42, True]
+    assert told["none"] == [0, False]
+    assert told["this"] == [1, True]
+    assert told["edited"] == [2, True]
+    assert "40 more were only recomputed" in "\n".join(told["texts"])
+
+
+def test_what_was_committed_has_no_edits_any_more(said: dict[str, Any]) -> None:
+    """Ctrl+Return did it; the others stay as FreeCAD has them."""
+    assert not said["edited_left"]
+    assert said["left"] <= 41
+
+
+@pytest.mark.parametrize("kind", ["length", "constraint", "placement", "label", "sheet", "new", "hidden"])
+def test_an_edit_is_an_edit_until_it_is_undone(said: dict[str, Any], kind: str) -> None:
+    """Whatever kind of property it is in."""
+    done, undone = said["kinds"][kind]
+    assert done
+    assert undone == []
+
+
+def test_what_cannot_be_told_is_an_edit(said: dict[str, Any]) -> None:
+    """A property that was added; and "save a copy" writes another file."""
+    kinds = said["kinds"]
+    assert kinds["recomputed"] == [True, []]
+    assert kinds["gone"][0] == ["Ball"]
+    assert kinds["property"][0] == ["Ball.Finish"]
+    assert kinds["saved"] == []
+    assert kinds["saved a copy"] == ["Pad.Length"]
+
+
+def test_an_unregistered_assembly_is_registered_within_its_commit(
+    freecad: Window, said: dict[str, Any]
+) -> None:
+    """The comment that was asked for becomes that of its first file in Silo."""
+    assert said["offers"]
+    with freecad.server.client() as client:
+        found = [r.comment for r in client.revisions(said["numbers"]["New.FCStd"]) if r.file_name]
+    assert found == ["my first words"]
