@@ -9,13 +9,14 @@ BIN := $(VENV)/bin
 DEV := $(VENV)/.installed-dev
 SERVER := $(VENV)/.installed-server
 
-.PHONY: help demo test test-machine test-windows-files check translations setup docs clean
+.PHONY: help demo test test-machine test-windows-files test-other-disk check translations setup docs clean
 
 help:
 	@echo "make demo   set up and sync a real assembly with the embedded server (DEMO=--keep leaves it running)"
 	@echo "make test   set up and run the tests"
 	@echo "make test-machine  the tests that need FreeCAD or Chromium on the machine"
 	@echo "make test-windows-files  the tests with the file semantics of Windows, simulated"
+	@echo "make test-other-disk  the tests on a disk that does not distinguish upper and lower case (Linux, FUSE)"
 	@echo "make check  ruff, mypy, import directions"
 	@echo "make translations  bring the files for translators up to date"
 
@@ -46,6 +47,11 @@ test-windows-files: setup
 	PYTHONPATH=tests/support $(BIN)/python -m pytest -p windows_files $(SPREAD) --dist worksteal -k "not postgres" \
 		-m "not freecad and not browser" tests/api tests/cli tests/contract tests/fcstd tests/outbox tests/server \
 		tests/vault tests/workbench tests/test_*.py
+
+# The suites that name files, on a mounted disk that finds a name in any case and normal form.
+test-other-disk: setup
+	PYTHONPATH=tests/support $(BIN)/python -m pytest -p other_disk_tests $(SPREAD) --dist worksteal -k "not postgres" \
+		-m "not freecad and not browser" tests/cli tests/fcstd tests/outbox tests/vault tests/workbench tests/test_*.py
 
 test-machine: setup
 	$(BIN)/python -m pytest $(SPREAD) --dist loadscope -m "freecad or browser"

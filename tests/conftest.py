@@ -82,9 +82,20 @@ def needs_pty() -> None:
 
 
 @pytest.fixture(scope="session")
-def needs_pipes() -> None:
+def needs_pipes(tmp_path_factory: pytest.TempPathFactory) -> None:
     """Named pipes in a folder."""
-    _needs("named pipes", hasattr(os, "mkfifo"))
+    try:
+        os.mkfifo(tmp_path_factory.mktemp("pipes") / "pipe")
+    except (OSError, AttributeError):
+        _needs("named pipes", False)
+
+
+@pytest.fixture(scope="session")
+def needs_case(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """A disk on which two names may differ in case only."""
+    folder = tmp_path_factory.mktemp("case")
+    (folder / "a").touch()
+    _needs("a disk that distinguishes upper and lower case", not (folder / "A").exists())
 
 
 @pytest.fixture(scope="session")

@@ -129,5 +129,5 @@ def test_cache_folders_of_each_platform(tmp_path: Path) -> None:
     own = [folder(moved / "temp"), folder(tmp_path / "xdg" / end)]
     env |= {"FREECAD_USER_HOME": str(moved), "XDG_CACHE_HOME": str(tmp_path / "xdg")}
     assert list(cache_folders(env, "linux")) == [*own, *linux]
-    env |= {"FREECAD_USER_TEMP": str(folder(tmp_path / "temp"))}
-    assert list(cache_folders(env, "linux")) == [tmp_path / "temp", *own, *linux]
+    env |= {"FREECAD_USER_TEMP": str(folder(tmp_path / "own"))}
+    assert list(cache_folders(env, "linux")) == [tmp_path / "own", *own, *linux]

@@ -14,6 +14,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from silo.platform import NAME
+from silo.spelling import Spelling
 
 _COMMANDS = ("freecadcmd", "FreeCADCmd", "freecadcmd-daily", "freecad.cmd")
 _FLATPAK = "org.freecad.FreeCAD"
@@ -26,12 +27,14 @@ _BUNDLES = ("/Applications", "~/Applications")
 
 def commands(env: Mapping[str, str] = os.environ, platform: str = NAME, root: Path = _ROOT) -> Iterator[str]:
     """Every ``freecadcmd`` that can be started here, those on the PATH first. ``root``: of the disk."""
-    for name in _COMMANDS:
-        if (found := shutil.which(name, path=env.get("PATH"))) is not None:
+    on_path = (shutil.which(name, path=env.get("PATH")) for name in _COMMANDS)
+    elsewhere = (str(path) for path in _matching(env, root, *_command_places(env, platform)))
+    # Windows and macOS find one program under two of these names.
+    real, seen = Spelling().real, set()
+    for found in (*filter(None, on_path), *elsewhere):
+        if os.access(found, os.X_OK) and real(found) not in seen:
+            seen.add(real(found))
             yield found
-    for path in _matching(env, root, *_command_places(env, platform)):
-        if os.access(path, os.X_OK):
-            yield str(path)
 
 
 def _command_places(env: Mapping[str, str], platform: str) -> tuple[str, ...]:

@@ -236,15 +236,9 @@ def test_a_root_is_no_prefix_of_a_name(tmp_path: Path) -> None:
     assert found.code is FindingCode.OUTSIDE_ROOT
 
 
-def _case_sensitive(folder: Path) -> bool:
-    (folder / "probe").touch()
-    return not (folder / "PROBE").exists()
-
-
+@pytest.mark.usefixtures("needs_case")
 def test_a_name_in_other_case(tmp_path: Path) -> None:
     """Written on Windows, read on Linux: taken and told, where only one file fits."""
-    if not _case_sensitive(tmp_path):
-        pytest.skip("this file system does not tell upper from lower case")
     part().save(tmp_path / "Parts" / "bolt.FCStd")
     path = Doc().link("L", "parts/Bolt.fcstd", "Box").save(tmp_path / "top.FCStd")
     with Library() as library:
@@ -254,10 +248,9 @@ def test_a_name_in_other_case(tmp_path: Path) -> None:
         assert "parts/Bolt.fcstd" in library.notes[0]
 
 
+@pytest.mark.usefixtures("needs_case")
 def test_a_name_in_other_case_that_fits_two_files(tmp_path: Path) -> None:
     """Two files differ in case only: neither is guessed."""
-    if not _case_sensitive(tmp_path):
-        pytest.skip("this file system does not tell upper from lower case")
     part().save(tmp_path / "bolt.FCStd")
     part().save(tmp_path / "BOLT.FCStd")
     found = problem(tmp_path, "Bolt.FCStd")

@@ -158,6 +158,12 @@ class OtherDisk(fuse.Operations if fuse else object):  # type: ignore[misc]
         os.symlink(source, self._real(target))
         return 0
 
+    def link(self, target: str, source: str) -> int:
+        if os.path.lexists(self._real(target)):
+            raise OSError(errno.EEXIST, target)
+        os.link(self._real(source), self._real(target))
+        return 0
+
     def readlink(self, path: str) -> str:
         return os.readlink(self._real(path))
 
