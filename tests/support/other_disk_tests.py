@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""All temporary folders of the tests on a disk as Windows and macOS have it: ``pytest -p other_disk_tests``."""
+"""The temporary folders of all tests on a disk that ignores case: ``pytest -p other_disk_tests``."""
 
 from __future__ import annotations
 
