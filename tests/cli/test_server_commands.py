@@ -23,7 +23,7 @@ def test_register_tells_machines_what_became_of_each(run: Any, silo: Any, gearbo
     ran = run("register", gearbox, "--yes", "--json")
     assert ran.code == 0
     told = ran.json()
-    assert set(told) == {"registered", "failed", "unregistered"}
+    assert set(told) == {"registered", "failed", "unregistered", "modelled"}
     assert (told["failed"], told["unregistered"]) == ([], [])
     assert [row["object"] for row in told["registered"][-2:]] == ["Gearbox", "TopAssembly"]
     for row in told["registered"]:

@@ -168,6 +168,12 @@ class Doc:
             own["ElementCount"] = Raw("App::PropertyIntegerConstraint", count)
         return self.add("App::Link", name, **own)
 
+    def shape(self, name: str, body: str, place: str = "") -> Raw:
+        """A shape's entry as FreeCAD writes it: the places, the ``body``, and the place of the whole."""
+        head = f"\nCASCADE Topology V1, (c) Matra-Datavision\nLocations {int(bool(place))}\n{place}"
+        self.entries[f"{name}.brp"] = f"{head}Curve2ds 0\n{body}\n\n+1 {int(bool(place))} ".encode()
+        return Raw("Part::PropertyPartShape", f'<Part file="{name}.brp"/>')
+
     def vectors(self, entry: str, vectors: list[tuple[float, float, float]]) -> Raw:
         """A vector list, which FreeCAD keeps in an entry of its own."""
         numbers = b"".join(struct.pack("<3d", *vector) for vector in vectors)

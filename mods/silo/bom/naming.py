@@ -41,6 +41,11 @@ class Proposal:
     shares_file: bool = False
 
 
+def is_generic(label: str) -> bool:
+    """True for a label that FreeCAD gave by itself, and for none."""
+    return not label or _GENERIC.match(label) is not None
+
+
 def clean_name(text: str) -> str:
     """A label as a name for people: no file suffix, no control characters, single spaces."""
     # A label may be megabytes long, and no more than the beginning of it is used.

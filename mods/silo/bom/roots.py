@@ -8,7 +8,7 @@ no container. An Assembly4 ``Parts`` folder beside the model holds spares and is
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence, Set
 from typing import Any
 
 from silo.bom.document import derived, label_of, object_name, own, same_document
@@ -148,13 +148,19 @@ def _candidates(document: Any) -> list[tuple[tuple[int, bool], Any]]:
     return sorted(found, key=lambda candidate: candidate[0])
 
 
-def silent_reader(*, hardware: bool = True) -> Reader:
-    """For a look at documents whose findings nobody needs twice."""
+def silent_reader(*, hardware: bool = True, declare: Set[str] = frozenset()) -> Reader:
+    """For a look at documents whose findings nobody needs twice.
+
+    declare
+        names of objects that are taken as declared.
+    """
 
     def path_of(obj: Any) -> str:
         return getattr(getattr(obj, "Document", None), "FileName", "") or ""
 
-    return Reader(Notes(path_of), lambda obj: (path_of(obj), object_name(obj)), None, hardware=hardware)
+    return Reader(
+        Notes(path_of), lambda obj: (path_of(obj), object_name(obj)), None, hardware=hardware, declare=declare
+    )
 
 
 def choose_assembly(document: Any, name: str | None = None) -> Any:

@@ -4,18 +4,21 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from silo.bom.declare import Modelled
 from silo.bom.errors import ConflictError, DocumentError, InputError, SiloError
 from silo.bom.model import BomEntry, Extraction
-from silo.bom.naming import Proposal, propose_all
+from silo.bom.naming import Proposal, propose, propose_all
 from silo.bom.report import base_of, relative
 from silo.bom_sync import resolve
 from silo.cli import common
 from silo.cli.common import Commands
+from silo.declaring import chosen, declare, modelled
 from silo.open_in_freecad import open_in_any
 from silo.registration import Ask, Journal, Registration, unclear
 from silo.registration import register as register_component
@@ -24,6 +27,7 @@ from silo.standard_items import register_standard
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
 
+_MOST_MODELLED = 40
 _OPEN = (
     "it is open in FreeCAD, and saving it there would undo the registration. Close it there, or register it "
     "from there (Silo, Register Parts), then run this again; --even-if-open registers it all the same"
@@ -57,6 +61,21 @@ def register(commands: Commands) -> None:
         action="store_true",
         help="also files that a running FreeCAD has open; whoever saves them there undoes the registration",
     )
+    parser.add_argument(
+        "--declare",
+        metavar="OBJECT",
+        action="append",
+        default=[],
+        help="count what is modelled in the assembly's own file (name or label); equal copies are one item",
+    )
+    parser.add_argument("--apart", action="store_true", help="with --declare: an item for each copy")
+    parser.add_argument(
+        "--undeclare",
+        metavar="OBJECT",
+        action="append",
+        default=[],
+        help="take the identity from an object in the assembly's own file; its item stays",
+    )
     parser.add_argument("--category", help="this category for every part (assemblies keep theirs)")
     common.add_json_option(parser)
     common.add_server_options(parser)
@@ -67,7 +86,12 @@ def run(args: argparse.Namespace) -> int:
     """Register what is unregistered; 1 where something was skipped or failed."""
     if not args.yes and not sys.stdin.isatty():
         raise InputError("register asks before it creates items, and there is nobody to ask here; say --yes")
+    if args.undeclare:
+        return _undeclare(args)
+    if args.declare:
+        return _declare(args)
     extraction = common.read_assembly(args.top, args.assembly, hardware=not args.no_hardware)
+    articles = [one for one in modelled(args.top, args.assembly) if not one.declared]
     with common.client_of(args) as client:
         schema = client.find_schema(args.schema)
         proposals = proposals_for(extraction, client, schema)
@@ -77,8 +101,53 @@ def run(args: argparse.Namespace) -> int:
         chosen = proposals if args.yes else _ask(proposals, base_of(extraction))
         done = register_all(chosen, client, schema=schema, ask=_asker(args.unclear), is_open=is_open)
     skipped = [p for p in proposals if p not in chosen]
-    _tell(args, extraction, done, skipped)
+    _tell(args, extraction, done, skipped, articles)
     return 1 if skipped or any(r.error for r in done) else 0
+
+
+def _declare(args: argparse.Namespace) -> int:
+    """Give what is modelled in the file an identity; 1 where that failed."""
+    articles = modelled(args.top, args.assembly)
+    wanted = chosen(articles, args.declare, apart=args.apart)
+    extraction = common.read_assembly(args.top, args.assembly, hardware=not args.no_hardware)
+    done = []
+    with common.client_of(args) as client:
+        schema = client.find_schema(args.schema)
+        categories = client.categories(schema)
+        is_open = _never if args.even_if_open else _now
+
+        def check(path: str) -> None:
+            if is_open(path):
+                raise DocumentError(path, _OPEN)
+
+        for one in wanted:
+            if one.declared:
+                raise InputError(f"{one.entry.label} is a component already; --undeclare takes that back")
+            proposal = propose(one.entry, categories, shares_file=True)
+            if args.category:
+                proposal = replace(proposal, category=args.category)
+            asker = _asker(args.unclear)
+            done.append(declare(one, proposal, client, Journal(), schema=schema, ask=asker, check=check))
+    _tell(args, extraction, done, [], [one for one in articles if one not in wanted and not one.declared])
+    return 1 if any(result.error for result in done) else 0
+
+
+def _undeclare(args: argparse.Namespace) -> int:
+    """Take identities out of the file."""
+    from silo.fcstd import unstamp
+
+    articles = [one for one in modelled(args.top, args.assembly) if one.declared]
+    path = articles[0].entry.doc_path if articles else os.path.realpath(args.top)
+    wanted = chosen(articles, args.undeclare)
+    if not args.even_if_open and _now(path):
+        raise DocumentError(path, _OPEN)
+    names = [name for one in wanted for name in one.objects]
+    taken = [name for name in names if unstamp(path, name)]
+    if args.json:
+        common.print_json({"undeclared": taken})
+    else:
+        print(f"No component any more: {', '.join(taken)}. The next sync flags the line as unreferenced.")
+    return 0
 
 
 def proposals_for(extraction: Extraction, client: SiloClient, schema: str) -> list[Proposal]:
@@ -193,6 +262,7 @@ def _tell(
     extraction: Extraction,
     done: Sequence[Registration],
     skipped: Sequence[Proposal],
+    articles: Sequence[Modelled] = (),
 ) -> None:
     base = base_of(extraction)
     if args.json:
@@ -201,6 +271,7 @@ def _tell(
                 "registered": [_row(r.proposal, base, r) for r in done if r.error is None],
                 "failed": [_row(r.proposal, base, r) for r in done if r.error is not None],
                 "unregistered": [_row(p, base) for p in skipped],
+                "modelled": [_modelled_row(one, base) for one in articles],
             }
         )
         return
@@ -218,6 +289,36 @@ def _tell(
     for proposal in skipped:
         where = relative(proposal.entry.doc_path, base)
         out.print(f"⚠ {show.plain(where)}: unregistered, left out of the BOM", style="yellow", markup=False)
+    for line in _modelled_text(articles, base) if articles else ():
+        out.print(line, markup=False, highlight=False)
+
+
+def _modelled_row(article: Modelled, base: str) -> Mapping[str, Any]:
+    """What is modelled in the file and not counted."""
+    return {
+        "doc_path": relative(article.entry.doc_path, base),
+        "objects": list(article.objects),
+        "label": article.entry.label,
+        "quantity": article.entry.quantity,
+        "alike": article.alike,
+        "source": relative(article.source, base),
+    }
+
+
+def _modelled_text(articles: Sequence[Modelled], base: str) -> list[str]:
+    """The section of what is modelled in the file, line by line."""
+    from silo.cli import show
+
+    lines = ["Modelled in this file, not counted:"]
+    for one in articles[:_MOST_MODELLED]:
+        copies = f", {len(one.objects)} copies of one {one.alike}" if len(one.objects) > 1 else ""
+        source = f", imported from {show.plain(relative(one.source, base))}" if one.source else ""
+        label = show.plain(one.entry.label)
+        lines.append(f"  {one.entry.quantity} × {label} ({one.entry.object_name}{copies}{source})")
+    if len(articles) > _MOST_MODELLED:
+        lines.append(f"  and {len(articles) - _MOST_MODELLED} more; --json has them all")
+    lines.append("Declare what is a part: silo-mod register TOP.FCStd --yes --declare OBJECT")
+    return lines
 
 
 def _row(proposal: Proposal, base: str, result: Registration | None = None) -> Mapping[str, Any]:

@@ -10,6 +10,15 @@ from silo.fcstd.document import FcstdDocument
 from silo.fcstd.library import Library, open_document
 from silo.fcstd.limits import Limits
 from silo.fcstd.objects import FcstdObject
-from silo.fcstd.stamp import check_stampable, stamp
+from silo.fcstd.stamp import check_stampable, stamp, unstamp
 
-__all__ = ["FcstdDocument", "FcstdObject", "Library", "Limits", "check_stampable", "open_document", "stamp"]
+__all__ = [
+    "FcstdDocument",
+    "FcstdObject",
+    "Library",
+    "Limits",
+    "check_stampable",
+    "open_document",
+    "stamp",
+    "unstamp",
+]

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 from collections.abc import Iterable, Mapping
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 _CONTAINERS = frozenset({"App::Part", "App::LinkGroup", "App::DocumentObjectGroup"})
 # What a target is and which item it is: without these a link to it would only be guessed at.
 _SAID_OF_ITSELF = ("SiloItemId", "SiloUUID", "Type")
+_BREP_TEXT = (b"CASCADE Topology", b"DBRep_DrawableShape")
 _SIZE = Struct("<I")
 _DOUBLES, _FLOATS = Struct("<3d"), Struct("<3f")
 
@@ -190,6 +192,20 @@ class FcstdDocument:
         if len(data) != _SIZE.size + count * form.size:
             raise FcstdError(self.FileName, f"its {entry_name} is damaged (its length is wrong)")
         return tuple(Vector(*numbers) for numbers in form.iter_unpack(data[_SIZE.size :]))
+
+    def shape_key(self, entry_name: str) -> str:
+        """A hash of a shape from its side entry, the same wherever the shape is placed; "" without one.
+
+        The text form has all placements in a list of their own (``BRepTools_ShapeSet``).
+        """
+        entry = self._entries.get(entry_name.encode()) if entry_name else None
+        if entry is None or entry.size > self._xml.limits.side_entry:
+            return ""
+        data = self._side_entry(entry)
+        begin = data.find(b"Curve2ds") if data.lstrip().startswith(_BREP_TEXT) else 0
+        # The last line says where the shape is placed.
+        body = data[begin:].rstrip().rpartition(b"\n")[0] if begin > 0 else data
+        return hashlib.sha256(body).hexdigest()
 
     @cached_property
     def _entries(self) -> dict[bytes, Entry]:

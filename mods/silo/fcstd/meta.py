@@ -7,6 +7,7 @@ Where things are is asked of expat, so comments, other quotes and another order 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from xml.sax.saxutils import escape
 
 from silo.fcstd import careful
@@ -64,6 +65,38 @@ def with_item_id(text: bytes, object_name: str, value: str, depth_limit: int) ->
         head = _COUNT.sub(lambda m: m[1] + b"%d" % (int(m[2]) + 1) + m[3], element[start:close], count=1)
         element = element[:start] + head + b"\n                " + prop + element[close:]
     return text[:begin] + element + text[end:]
+
+
+def without_identity(text: bytes, object_name: str, keys: Iterable[str], depth_limit: int) -> bytes:
+    """The text without these keys in ``Meta``, and without an identity on the object."""
+    head, data = careful.index_document(text, depth_limit)
+    if head.properties is None or object_name not in data:
+        raise Malformed(f"has no data of the object {object_name!r}")
+    begin, end = data[object_name]
+    text = text[:begin] + _without_properties(text[begin:end], depth_limit) + text[end:]
+    begin, end = head.properties  # stands before all objects
+    element = text[begin:end]
+    spans = careful.index_properties(element, depth_limit)
+    if "Meta" in spans:
+        first, last = spans["Meta"]
+        items = _items(careful.parse_value(element[first:last], depth_limit))
+        kept = {key: value for key, value in items.items() if key not in set(keys)}
+        if kept != items:
+            element = element[:first] + _property(element[first:last], kept) + element[last:]
+    return text[:begin] + element + text[end:]
+
+
+def _without_properties(element: bytes, depth_limit: int) -> bytes:
+    spans = careful.index_properties(element, depth_limit)
+    for name in ("SiloItemId", "SiloUUID"):
+        if name not in spans:
+            continue
+        start = element.rindex(b"<Properties", 0, min(span[0] for span in spans.values()))
+        first, last = spans[name]
+        head = _COUNT.sub(lambda m: m[1] + b"%d" % (int(m[2]) - 1) + m[3], element[start:first], count=1)
+        element = element[:start] + head.rstrip() + element[last:]
+        spans = careful.index_properties(element, depth_limit)
+    return element
 
 
 def _items(prop: Node) -> dict[str, str]:

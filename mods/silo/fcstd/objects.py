@@ -16,7 +16,7 @@ from silo.bom.document import LinkProblem as Problem
 from silo.bom.errors import DocumentError
 from silo.fcstd.properties import Properties
 from silo.fcstd.typetree import ancestors, is_listed
-from silo.fcstd.values import ABSENT, LocalList, Ref, RefList, SideEntry, Style, Vector
+from silo.fcstd.values import ABSENT, LocalList, Ref, RefList, ShapeFile, SideEntry, Style, Vector
 
 if TYPE_CHECKING:
     from silo.fcstd.document import FcstdDocument
@@ -123,6 +123,11 @@ class FcstdObject:
         # The file does not change while it is open, so the next access need not come here.
         value = mine[name] = self._value(name, properties.piece(name))
         return value
+
+    def shape_key(self) -> str:
+        """Something equal for equal shapes, wherever they are placed; "" where the object has no shape."""
+        value = self.properties.value("Shape") if "Shape" in self.properties.numbers else None
+        return self.Document.shape_key(value.name) if isinstance(value, ShapeFile) else ""
 
     def _load(self) -> None:
         mine = self.__dict__

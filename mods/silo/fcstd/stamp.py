@@ -13,12 +13,12 @@ import unicodedata
 from pathlib import Path
 
 from silo.bom.errors import DocumentError
-from silo.bom.identity import META_KEY, meta_key
+from silo.bom.identity import META_KEY, meta_key, own_identity
 from silo.fcstd.container import ContainerFile, Entry, FileState
 from silo.fcstd.edit import changed, check_writable, edited_xml, replace_file
 from silo.fcstd.library import Library
 from silo.fcstd.limits import Limits
-from silo.fcstd.meta import with_item_id, with_meta
+from silo.fcstd.meta import with_item_id, with_meta, without_identity
 from silo.fcstd.rewrite import replaced_entry
 
 _LONGEST = 200
@@ -78,6 +78,38 @@ def check_stampable(
         _present(real, container.state, "", object_name, False, limits, item_object)
         check_writable(real)
         _stamped_xml(container, meta_key(object_name or ""), "0" * 36, limits, item_object)
+
+
+def unstamp(path: Path | str, object_name: str, *, limits: Limits | None = None) -> bool:
+    """Take the identity of one object out of the file; False where it had none.
+
+    The document's own identity stays. Raises DocumentError as :func:`stamp` does.
+    """
+    real = os.path.realpath(path)
+    limits = limits or Limits()
+    with ContainerFile(real, limits) as container:
+        state = container.state
+        with Library(limits=limits) as library:
+            obj = library.open(real).getObject(object_name)
+            if obj is None:
+                raise DocumentError(real, f"it holds no object named {object_name!r}")
+            if own_identity(obj) is None:
+                return False
+        check_writable(real)
+
+        def edit(text: bytes) -> bytes:
+            return without_identity(text, object_name, [meta_key(object_name)], limits.depth)
+
+        content = replaced_entry(container, *edited_xml(container, edit, limits))
+
+    def check(copy: str) -> None:
+        with Library() as library:
+            read = library.open(copy).getObject(object_name)
+            if read is None or own_identity(read) is not None:
+                raise DocumentError(real, "the copy still holds the identity; the file is unchanged")
+
+    replace_file(real, state, content, check)
+    return True
 
 
 def _check_identity(path: str, identity: str) -> None:

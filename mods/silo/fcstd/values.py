@@ -75,6 +75,12 @@ class RefList(NamedTuple):
     refs: tuple[Ref, ...]
 
 
+class ShapeFile(NamedTuple):
+    """A shape, in an entry of its own."""
+
+    name: str
+
+
 class SideEntry(NamedTuple):
     """A list of vectors, kept in another entry of the container ("" for none)."""
 
@@ -185,6 +191,7 @@ _READERS: dict[str, Callable[[Node, str], Any]] = {
     "LinkSubList": _link_subs,
     "XLinkSubList": _xlinks,
     "Python": lambda node, _: _class(node),
+    "Part": lambda node, _: ShapeFile(node.attributes.get("file", "")),
     "VectorList": lambda node, _: SideEntry(node.attributes.get("file", "")),
 }
 

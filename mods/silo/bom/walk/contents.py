@@ -6,7 +6,7 @@ How one assembly is counted stands in :mod:`silo.bom.walk.reading`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Set
 from typing import Any
 
 from silo.bom.errors import DocumentError
@@ -33,6 +33,8 @@ class Reader:
         finds what counts with an assembly though it lies beside it.
     hardware
         False leaves standard parts out.
+    declare
+        names of objects that count as if a person had declared them.
     """
 
     def __init__(
@@ -43,11 +45,13 @@ class Reader:
         *,
         beside: Beside = _nothing_beside,
         hardware: bool = True,
+        declare: Set[str] = frozenset(),
     ) -> None:
         self.notes = notes
         self.key = key
         self.beside = beside
         self.hardware = hardware
+        self.declare = declare
         self._inspect = inspect
         self._known: dict[Key, Contents] = {}
         self._not_components: dict[Key, str] = {}

@@ -7,8 +7,10 @@ shows is counted through that; what lies in something suppressed or excluded is 
 
 from __future__ import annotations
 
+from collections.abc import Set
 from typing import Any
 
+from silo.bom.document import object_name
 from silo.bom.identity import identity_of, own_identity
 from silo.bom.walk.arrays import elements, left_out_by
 from silo.bom.walk.counts import Key, KeyOf, Leaves, Member
@@ -34,7 +36,10 @@ class Members:
         True where a Draft array is suppressed or excluded.
     """
 
-    def __init__(self, container: Any, key: KeyOf, notes: Notes, way: Way) -> None:
+    def __init__(
+        self, container: Any, key: KeyOf, notes: Notes, way: Way, declare: Set[str] = frozenset()
+    ) -> None:
+        self._declare = declare
         self._key = key
         self._notes = notes
         self._way = way
@@ -78,7 +83,7 @@ class Members:
         """True for an object with an identity of its own."""
         # The assembly's own identity on something in it means the assembly itself.
         identity = own_identity(obj)
-        if not identity or identity.lower() == self._identity:
+        if object_name(obj) not in self._declare and (not identity or identity.lower() == self._identity):
             return False
         self.declared.add(self._key(obj))
         return True

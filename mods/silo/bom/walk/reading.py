@@ -51,7 +51,7 @@ class Reading:
         self._is_root = getattr(container, "is_document_root", False)
         self._worths: dict[Key, Worth] = {}
         self._way = Way(reader.notes)
-        self._members = Members(container, reader.key, reader.notes, self._way)
+        self._members = Members(container, reader.key, reader.notes, self._way, reader.declare)
         self._links: set[Key] = set()
         self._local: dict[Key, Any] = {}
         self._eaten: dict[Key, Any] = {}

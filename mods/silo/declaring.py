@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Declare what is modelled in an assembly's own file a component, and take that back.
+
+:mod:`silo.bom.declare` finds what could be declared; this module reads and writes the files.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+
+from silo.bom.declare import Modelled, modelled_in
+from silo.bom.errors import DocumentError, InputError, SiloError
+from silo.bom.identity import document_identity
+from silo.bom.naming import Proposal
+from silo.bom.roots import choose_assembly
+from silo.fcstd import Library, check_stampable, stamp
+from silo.fcstd.objects import FcstdObject
+from silo.registration import Ask, Journal, Registration, RegistrationApi, register, unclear
+
+Write = Callable[[str, str], None]
+
+
+def modelled(path: str, assembly: str | None = None) -> list[Modelled]:
+    """What is modelled in the file of an assembly, read without FreeCAD. DocumentError, InputError."""
+    with Library() as library:
+        return modelled_in(choose_assembly(library.open(path), assembly), _shape_of)
+
+
+def _shape_of(obj: object) -> str:
+    try:
+        return obj.shape_key() if isinstance(obj, FcstdObject) else ""
+    except DocumentError:  # damaged: nothing is known of it
+        return ""
+
+
+def chosen(articles: Sequence[Modelled], names: Iterable[str], *, apart: bool = False) -> list[Modelled]:
+    """The articles that these names (or labels) mean, each once. InputError for a name that means none."""
+    found: dict[tuple[str, ...], Modelled] = {}
+    for name in names:
+        fitting = [one for one in articles if name in one.objects] or [
+            one for one in articles if name == one.entry.label
+        ]
+        if len(fitting) != 1:
+            known = ", ".join(one.entry.object_name for one in articles) or "nothing"
+            what = "nothing" if not fitting else f"{len(fitting)} things"
+            raise InputError(f"{name!r} means {what} that is modelled in this file; there is: {known}")
+        for one in fitting[0].apart() if apart else fitting:
+            found[one.objects] = one
+    return list(found.values())
+
+
+def source_identity(article: Modelled) -> str | None:
+    """The identity of the file that A2plus imported an article from; None where there is none to be read."""
+    if not article.source or not os.path.isfile(article.source):
+        return None
+    try:
+        with Library() as library:
+            return document_identity(library.open(article.source))
+    except SiloError:
+        return None
+
+
+def declare(
+    article: Modelled,
+    proposal: Proposal,
+    api: RegistrationApi,
+    journal: Journal,
+    *,
+    schema: str,
+    ask: Ask = unclear,
+    check: Callable[[str], None] = lambda _path: None,
+    write: Write | None = None,
+) -> Registration:
+    """Give all objects of an article one identity: of the file it was imported from, else of a new item.
+
+    check
+        raises DocumentError where the file must not be written now.
+    write
+        writes an identity on one object; in the file where none is given.
+    """
+    path = article.entry.doc_path
+
+    def on_disk(name: str, identity: str) -> None:
+        stamp(path, identity, object_name=name, item_object=name)
+
+    def stamp_all(_entry: object, identity: str) -> None:
+        for name in article.objects:
+            (write or on_disk)(name, identity)
+
+    def check_all(_entry: object) -> None:
+        check(path)
+        for name in article.objects if write is None else ():
+            check_stampable(path, object_name=name, item_object=name)
+
+    try:
+        known = source_identity(article)
+        item = api.get_item_by_uuid(known) if known else None
+        if item is not None:
+            check_all(article.entry)
+            stamp_all(article.entry, str(item["id"]))
+            number = str(item["part_number"])
+            return Registration(proposal, part_number=number, item_id=str(item["id"]), found=True)
+    except SiloError as error:
+        return Registration(proposal, error=error)
+    proposal = replace(proposal, entry=replace(proposal.entry, silo_uuid=None), shares_file=True)
+    return register(proposal, api, journal, stamp_all, schema=schema, check=check_all, ask=ask)

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""``silo-mod register --declare``: parts modelled in the assembly's own file become components, and back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fcstd_writer import Doc, locals_, part
+
+from silo.fcstd import open_document
+
+
+@pytest.fixture
+def machine(tmp_path: Path) -> Path:
+    """One file: two equal motors placed apart, a jig, no link at all."""
+    doc = Doc(label="machine")
+    doc.add("Part::Feature", "Motor", Shape=doc.shape("Motor", "a motor"))
+    doc.add("Part::Feature", "Motor001", Shape=doc.shape("Motor001", "a motor", "1\n1 0 0 7\n"))
+    doc.add("Part::Feature", "Jig", Shape=doc.shape("Jig", "a jig", "1\n1 0 0 7\n"))
+    doc.add("App::Part", "Top", Group=locals_("Motor", "Motor001", "Jig"), Type="Assembly")
+    return doc.save(tmp_path / "machine.FCStd")
+
+
+def test_register_lists_what_is_modelled_in_the_file(run: Any, silo: Any, machine: Path) -> None:
+    """With no check mark: --yes takes none of it, and says how to."""
+    done = run("register", machine, "--yes")
+    assert "Modelled in this file, not counted:" in done.out
+    assert "2 × Motor (Motor, 2 copies of one shape)" in done.out
+    assert "--declare" in done.out
+    rows = run("register", machine, "--yes", "--json").json()["modelled"]
+    assert [(row["objects"], row["quantity"]) for row in rows] == [(["Motor", "Motor001"], 2), (["Jig"], 1)]
+    assert run("bom", machine, "--flat", "--json").json() == []
+
+
+def test_declared_copies_are_one_item_and_can_be_taken_back(run: Any, silo: Any, machine: Path) -> None:
+    """One press for all equal ones; each copy counts; the file is as before once it is undone."""
+    assert run("register", machine, "--yes", "--declare", "Motor").code == 0
+    (row,) = run("bom", machine, "--flat", "--resolve", "--json").json()
+    assert (row["name"], row["quantity"], bool(row["part_number"])) == ("Motor", 2, True)
+    again = run("register", machine, "--yes", "--declare", "Motor")
+    assert again.code != 0
+    assert "component already" in again.err
+    assert run("register", machine, "--undeclare", "Motor", "--undeclare", "Motor001", "--yes").code == 0
+    assert run("bom", machine, "--flat", "--json").json() == []
+    document = open_document(machine)
+    assert not any("SiloItemId" in obj.PropertiesList for obj in document.Objects)
+    assert not [key for key in document.Meta if "Motor" in key]
+
+
+def test_copies_that_are_different_parts_are_taken_apart(run: Any, silo: Any, machine: Path) -> None:
+    """The person decides, not the shape."""
+    done = run("register", machine, "--yes", "--declare", "Motor", "--apart", "--json").json()
+    assert len({row["part_number"] for row in done["registered"]}) == 2
+    assert [row["quantity"] for row in run("bom", machine, "--flat", "--resolve", "--json").json()] == [1, 1]
+
+
+def test_what_a2plus_imported_joins_the_item_of_its_file(run: Any, silo: Any, tmp_path: Path) -> None:
+    """It is that part, and no other."""
+    source = part("bearing", "Bearing").save(tmp_path / "bearing.FCStd")
+    top = Doc(label="top").add(
+        "Part::FeaturePython", "B1", sourceFile="./bearing.FCStd", a2p_Version="V0.4", Label="b_bearing"
+    )
+    top.link("Link", "bearing.FCStd", "Bearing").add("App::Part", "Top", Group=locals_("B1", "Link"))
+    path = top.save(tmp_path / "top.FCStd")
+    assert run("register", path, "--yes").code == 0
+    done = run("register", path, "--yes", "--declare", "B1", "--json").json()
+    (row,) = run("bom", path, "--flat", "--resolve", "--json").json()
+    assert (row["quantity"], row["part_number"]) == (2, done["registered"][0]["part_number"])
+    assert open_document(source).Meta["SiloUUID"] == done["registered"][0]["silo_uuid"]
+
+
+def test_a_name_that_means_nothing_says_what_there_is(run: Any, silo: Any, machine: Path) -> None:
+    done = run("register", machine, "--yes", "--declare", "Moter")
+    assert done.code == 2
+    assert "there is: Motor, Jig" in done.err
