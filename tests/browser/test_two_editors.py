@@ -244,18 +244,18 @@ def test_a_conflict_is_decided_with_the_number_that_was_seen(case: Case, api: Ap
 
 @pytest.mark.parametrize("script", [True, False])
 def test_the_last_line_of_a_long_bom_can_be_edited(api: Api, visit: Visit, script: bool) -> None:
-    """Beyond the first 500, from the short page and from the whole one; one comes back to where one was."""
+    """Far down, from a filtered table and by its address; the page comes back to where it was."""
     parent, *children = api.items(503)
     api.merge(parent, dict.fromkeys(children, 1))
     last = children[-1]
     page = visit("editor", java_script_enabled=script)
-    page.goto(f"/items/{parent}/bom?all=1")
+    page.goto(f"/items/{parent}/bom?show=cad")
     page.get_by_role("link", name=f"Edit {last}").click()
     form = page.locator("#edit")
     form.get_by_label("Quantity").fill("2")
     save(form)
     expect(page.locator(".notice")).to_contain_text(f"{last} changed")
-    assert "all=1" in page.url
+    assert "show=cad" in page.url
     line_id = api.lines(parent)[last]["id"]
     page.goto(f"/items/{parent}/bom?edit={line_id}")
     form.get_by_label("Quantity").fill("0")

@@ -231,14 +231,27 @@ def test_a_form_that_makes_no_sense(
     assert api.lines(parent) == before
 
 
-def test_a_long_bom_is_shown_in_part_first(visitors: dict[str, Visitor], api: Api) -> None:
-    """500 lines at once, all of them one click away."""
-    parent, *children = api.items(503)
+def test_a_long_bom_has_pages(visitors: dict[str, Visitor], api: Api) -> None:
+    """A thousand lines at once; the view survives in every link, and a line of another page can be edited."""
+    parent, *children = (api.item(f"LONG-{n:04}") for n in range(1004))
     api.merge(parent, dict.fromkeys(children, 1))
-    page = visitors[VIEWER].get(f"/items/{parent}/bom").body.decode()
-    assert page.count("<tr id=") == 500
-    assert "Show all 502 lines" in page
-    assert visitors[VIEWER].get(f"/items/{parent}/bom?all=1").body.decode().count("<tr id=") == 502
+    path = f"/items/{parent}/bom"
+    page = visitors[EDITOR].get(path).body.decode()
+    assert page.count("<tr id=") == 1000
+    assert "1 to 1000 of 1003 lines" in page
+    last = visitors[EDITOR].get(f"{path}?sort=-number&amp;page=2&sort=-number&page=2").body.decode()
+    assert last.count("<tr id=") == 3
+    assert "sort=-number&amp;page=2&amp;edit=" in last
+    line = api.lines(parent)[children[-1]]["id"]
+    assert 'aria-label="Change LONG-1003"' in visitors[EDITOR].get(f"{path}?edit={line}").body.decode()
+    found = visitors[EDITOR].get(f"{path}?q=long+0999").body.decode()
+    assert found.count("<tr id=") == 1
+    assert "1 of 1003 lines" in found
+    assert visitors[EDITOR].get(f"{path}?show=hand").body.decode().count("<tr id=") == 0
+    assert (
+        visitors[EDITOR].get(f"{path}?show=%3Cb%3E&sort=nope&page=9%3C").body.decode().count("<tr id=")
+        == 1000
+    )
 
 
 def test_a_carried_file_that_was_tampered_with(visitors: dict[str, Visitor], api: Api) -> None:

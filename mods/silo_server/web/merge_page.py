@@ -30,12 +30,11 @@ from silo_server.web.forms import AmbiguousError, Form, back, text, texts, whole
 from silo_server.web.guard import Reader, Writer
 from silo_server.web.line_form import MINE, THEIRS, LineForm
 from silo_server.web.render import isolate, page, plural, segment
+from silo_server.web.tables import Address, Page, arranged, fits, page_of
 from silo_server.web.words import FIELDS, sentences
 
 router = APIRouter(include_in_schema=False)
 
-# A person looks at that many lines; all of them are one click away.
-FIRST_LINES = 500
 LATER_CHANGES = 5
 KEPT = "kept on purpose, not in the CAD model"
 
@@ -89,9 +88,11 @@ def merge_page(
     caller: Reader,
     part_number: str,
     edit: Annotated[str, Query(max_length=64)] = "",
-    all: bool = False,
 ) -> Response:
-    """Unreferenced lines, conflicts, the last sync in plain words, and all lines; ``edit`` opens one."""
+    """Unreferenced lines, conflicts, the last sync in plain words, and the lines; ``edit`` opens one.
+
+    ``q``, ``show``, ``sort`` and ``page`` say which lines the table has (:func:`table_of`).
+    """
     return _show(request, server, caller, part_number, Asked(edit=edit, view=view_of(request.url.query)))
 
 
@@ -299,7 +300,7 @@ def _show(
     problem = asked.problem
     if asked.edit and editing is None and not problem:
         problem = "The line that you wanted to edit is not in this BOM any more."
-    shown = lines if "all=" in f"&{asked.view}" else lines[:FIRST_LINES]
+    table, table_at = table_of(lines, bom_path(item.part_number), asked.view)
     return page(
         request,
         "merge.html",
@@ -307,9 +308,11 @@ def _show(
         status=status,
         item=item,
         total=len(lines),
-        lines=shown,
+        table=table,
+        table_at=table_at,
+        shows=SHOWS,
         editing=editing,
-        editing_apart=editing is not None and editing.id not in {line.id for line in shown},
+        editing_apart=editing is not None and editing.id not in {line.id for line in table.rows},
         now=line_form.shown(editing.state) if editing else {},
         mark=mark_of(editing.state) if editing else "",
         marks=service.marks_of([*found.unreferenced, *(c.line for c in found.conflicts)], conflicts),
@@ -327,6 +330,44 @@ def _show(
         newest=recent[0] if recent else None,
         seen=seen,
     )
+
+
+SHOWS: Mapping[str, tuple[str, Callable[[Line], bool]]] = {
+    "cad": ("from CAD", lambda line: line.state.source == "assembly"),
+    "hand": ("by hand", lambda line: line.state.source == "manual"),
+    "override": ("quantity set by hand", lambda line: line.state.override),
+    "unreferenced": ("unreferenced", lambda line: line.state.unreferenced_since is not None),
+    "archived": ("archived items", lambda line: line.child_archived),
+}
+_SORTS: Mapping[str, Callable[[Line], Any]] = {
+    "number": lambda line: line.child_part_number.casefold(),
+    "name": lambda line: line.child_name.casefold(),
+    "quantity": lambda line: line.state.quantity,
+    "source": lambda line: line.state.source,
+}
+
+
+def table_of(lines: Sequence[Line], path: str, view: str) -> tuple[Page[Line], Address]:
+    """The lines that the query ``view`` asks for, and the address with it."""
+    asked = {name: value[:200] for name, value in parse_qsl(view) if name in ("q", "show", "sort", "page")}
+    test, shown = fits(asked.get("q", "")), SHOWS.get(asked.get("show", ""))
+    found = [
+        line
+        for line in lines
+        if (shown is None or shown[1](line))
+        and test(
+            line.child_part_number,
+            line.child_name,
+            line.state.notes,
+            line.state.reason,
+            line.state.find_number,
+            *line.state.reference_designators,
+        )
+    ]
+    number = asked.pop("page", "1")
+    wanted = int(number) if number.isascii() and number.isdigit() and len(number) < 8 else 1
+    table = page_of(arranged(found, asked.get("sort", ""), _SORTS), len(lines), wanted)
+    return table, Address(path, asked | ({"page": str(table.number)} if table.number > 1 else {}))
 
 
 def _editing(lines: list[Line], asked: Asked, item: Any) -> Line | None:

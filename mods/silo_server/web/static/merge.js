@@ -25,7 +25,7 @@ function show(sentence) {
   const words = document.createElement("span");
   words.textContent = sentence;
   const link = document.createElement("a");
-  link.href = location.pathname;
+  link.href = location.pathname + location.search.replace(/([?&])edit=[^&]*&?/, "$1");
   link.className = "button small";
   link.textContent = "Show it";
   place.replaceChildren(words, " ", link);

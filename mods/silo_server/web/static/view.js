@@ -7,6 +7,9 @@ import { afterTyping } from "./typing.js";
 const form = document.getElementById("view");
 let request = null;
 
+// A form that somebody may have typed into is not replaced; the link or the button then loads the page.
+const typing = () => document.querySelector("#shown form[method=post]") !== null;
+
 async function show(url, push) {
   if (request) request.abort();
   request = new AbortController();
@@ -42,7 +45,7 @@ function asked() {
 
 document.addEventListener("click", (event) => {
   const link = event.target.closest("a[data-view]");
-  if (!link || event.button || event.ctrlKey || event.metaKey || event.shiftKey || event.altKey) return;
+  if (!link || typing() || event.button || event.ctrlKey || event.metaKey || event.shiftKey || event.altKey) return;
   event.preventDefault();
   const paging = link.rel === "prev" || link.rel === "next";
   show(link.href, "pushState").then(() => paging && document.getElementById("shown").scrollIntoView());
@@ -50,12 +53,13 @@ document.addEventListener("click", (event) => {
 
 if (form) {
   for (const input of form.querySelectorAll('input[type="search"], input[inputmode]')) {
-    afterTyping(input, () => input.checkValidity() && show(asked(), "replaceState"));
+    afterTyping(input, () => !typing() && input.checkValidity() && show(asked(), "replaceState"));
   }
   for (const choice of form.querySelectorAll("select, input[type=checkbox]")) {
-    choice.addEventListener("change", () => show(asked(), "replaceState"));
+    choice.addEventListener("change", () => !typing() && show(asked(), "replaceState"));
   }
   form.addEventListener("submit", (event) => {
+    if (typing()) return;
     event.preventDefault();
     show(asked(), "replaceState");
   });
