@@ -19,7 +19,7 @@ from silo.bom.diff import diff_findings
 from silo.bom.errors import RemoteError, SiloError
 from silo.bom.findings import Finding
 from silo.bom.model import BomEntry, Extraction
-from silo.bom.report import base_of, diff_json, entry_json, finding_json, relative
+from silo.bom.report import base_of, diff_json, entry_json, finding_json, project_folder, relative
 from silo.bom_sync import Outcome, Resolved, Status, SyncApi, blocking, resolve, sync_tree
 from silo.files import sha256_of
 
@@ -119,7 +119,7 @@ def _outcomes(whole: Resolved, api: SyncApi, options: Options) -> Iterable[Outco
         whole,
         api,
         sync_id=_new_id,
-        describe=source_document,
+        describe=lambda entry: source_document(entry, whole.assembly.doc_path),
         allow_missing=options.allow_missing,
         dry_run=options.dry_run,
         recursive=options.recursive,
@@ -130,9 +130,13 @@ def _new_id() -> str:
     return str(uuid.uuid4())
 
 
-def source_document(entry: BomEntry) -> SourceDocument:
-    """Which file, with which content, an assembly's BOM was taken from."""
-    return SourceDocument(file=os.path.basename(entry.doc_path), sha256=sha256_of(entry.doc_path))
+def source_document(entry: BomEntry, top: str = "") -> SourceDocument:
+    """Which file, with which content, an assembly's BOM was taken from; ``top``: the assembly of the run."""
+    return SourceDocument(
+        file=os.path.basename(entry.doc_path),
+        folder=project_folder(entry.doc_path, top),
+        sha256=sha256_of(entry.doc_path),
+    )
 
 
 # --- for machines ---------------------------------------------------------------------------------------

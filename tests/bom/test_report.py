@@ -4,13 +4,23 @@
 from __future__ import annotations
 
 import json
+import ntpath
 from typing import Any
 
 import pytest
 
 from silo.bom import BomEntry, Extraction, Finding, FindingCode, Place, Severity, diff_bom
 from silo.bom.errors import InputError
-from silo.bom.report import bom_json, diff_json, flat_counts, flat_json, relative, shorten, tree_size
+from silo.bom.report import (
+    bom_json,
+    diff_json,
+    flat_counts,
+    flat_json,
+    project_folder,
+    relative,
+    shorten,
+    tree_size,
+)
 
 
 def entry(name: str, quantity: int = 1, *children: BomEntry, level: int = 1) -> BomEntry:
@@ -120,3 +130,23 @@ def test_the_root_of_the_disk_is_no_folder_to_leave_out() -> None:
     """Its separators would all go."""
     assert shorten("/a/b.FCStd: broken", "/") == "/a/b.FCStd: broken"
     assert shorten("/a/b.FCStd: broken", "/a") == "b.FCStd: broken"
+
+
+@pytest.mark.parametrize(
+    ("path", "top", "folder"),
+    [
+        ("/home/a/robot/Robot.FCStd", "", "robot"),
+        ("/home/a/robot/Robot.FCStd", "/home/a/robot/Robot.FCStd", "robot"),
+        ("/home/a/robot/arm/wrist/W.FCStd", "/home/a/robot/Robot.FCStd", "robot/arm/wrist"),
+        ("/home/a/library/Bolt.FCStd", "/home/a/robot/Robot.FCStd", "library"),
+        ("Robot.FCStd", "", ""),
+        ("/Robot.FCStd", "", ""),
+    ],
+)
+def test_a_project_folder_is_the_same_on_every_machine(path: str, top: str, folder: str) -> None:
+    """From the folder of the run's assembly on; elsewhere the file's own folder."""
+    assert project_folder(path, top) == folder
+    windows = project_folder(
+        "C:" + path.replace("/", "\\"), "C:" + top.replace("/", "\\") if top else "", ntpath
+    )
+    assert windows == folder or "/" not in path

@@ -28,6 +28,8 @@ PAGES = (
     "/items",
     "/items?q=nothing-like-this",
     "/items?sort=-name&archived=1",
+    "/waiting",
+    "/waiting?q=nothing-like-this",
     "/items/new",
     "/items/{child}/edit",
     "/items/{parent}",

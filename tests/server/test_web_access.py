@@ -32,6 +32,8 @@ TABLE = {
     ("GET", "/"): VIEWER,
     ("GET", "/items"): VIEWER,
     ("GET", "/items/{part_number}"): VIEWER,
+    ("GET", "/waiting"): VIEWER,
+    ("POST", "/waiting/decide"): EDITOR,
     ("GET", "/items/new"): EDITOR,
     ("POST", "/items/new"): EDITOR,
     ("GET", "/items/{part_number}/edit"): EDITOR,

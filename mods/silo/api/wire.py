@@ -210,9 +210,10 @@ class LastSync(Answer):
 
 
 class SourceDocument(Wire):
-    """Which file a BOM was taken from, for the history."""
+    """Which file a BOM was taken from, for the history; ``folder`` is its project's, as ``robot/arm``."""
 
     file: str
+    folder: str | None = None
     sha256: str | None = None
     revision: int | None = None
 

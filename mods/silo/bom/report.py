@@ -34,6 +34,21 @@ def relative(path: str, base: str, rules: ModuleType = os.path) -> str:
     return path.replace(rules.sep, "/")
 
 
+def project_folder(path: str, top: str = "", rules: ModuleType = os.path) -> str:
+    """The folder of a file as people call it, the same on every machine: ``robot``, ``robot/arm``.
+
+    It begins with the folder of ``top``, the assembly of the whole run; elsewhere it is the file's own.
+    """
+    base = rules.dirname(top or path)
+    inner = relative(rules.dirname(path), base, rules)
+    name = rules.basename(base)
+    if inner in ("", ".") or not base:
+        return str(name)
+    if inner.startswith("..") or rules.isabs(inner):
+        return str(rules.basename(rules.dirname(path)))
+    return f"{name}/{inner}" if name else inner
+
+
 def base_of(extraction: Extraction) -> str:
     """The folder that paths are told relative to: that of the top file."""
     return os.path.dirname(extraction.assembly.doc_path)

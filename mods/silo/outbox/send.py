@@ -43,6 +43,7 @@ from silo.bom.errors import (
     SiloError,
 )
 from silo.bom.merge import MergePlan
+from silo.bom.report import project_folder
 from silo.bom.snapshot import from_plain
 from silo.bom_sync import Resolved, Status, decide, merge_request, resolve, server_lines
 from silo.outbox.database import OutboxError
@@ -425,7 +426,9 @@ class _Run:
             raise InputError(f"{entry.label}: its BOM cannot be read any more; commit it again") from error
         document = wanted.document
         if document is None and entry.path:
-            document = SourceDocument(file=Path(entry.path).name, sha256=entry.sha256 or None)
+            document = SourceDocument(
+                file=Path(entry.path).name, folder=project_folder(entry.path), sha256=entry.sha256 or None
+            )
         if document is not None and document.revision is None:
             document = document.model_copy(update={"revision": revision})
         return wanted.model_copy(update={"sync_id": wanted.sync_id or entry.key, "document": document})

@@ -13,6 +13,8 @@ Rules of this module:
 
 from __future__ import annotations
 
+from typing import Any
+
 from sqlalchemy import (
     BigInteger,
     Boolean,
@@ -27,6 +29,7 @@ from sqlalchemy import (
     Text,
     UniqueConstraint,
     false,
+    text,
 )
 
 metadata = MetaData(
@@ -44,6 +47,15 @@ Stamp = String(32)
 # By code point on both databases, whatever language a PostgreSQL sorts in by itself.
 Key = String(64).with_variant(String(64, collation="C"), "postgresql")
 Uuid = String(36)
+
+# What waits for a person, for indexes that hold little else; a query must say it in these words.
+UNREFERENCED = "unreferenced_since IS NOT NULL"
+INCOMPLETE = "left_out <> '[]' OR refused_at IS NOT NULL"
+
+
+def _only(condition: str) -> dict[str, Any]:
+    return {"sqlite_where": text(condition), "postgresql_where": text(condition)}
+
 
 server_state = Table(
     "server_state",
@@ -78,6 +90,8 @@ items = Table(
     Column("updated_by", String(64), nullable=False),
     Column("archived_at", Stamp),
     Index(None, "archived_at", "part_number_key"),
+    Index(None, "archived_at", "name", "part_number_key"),
+    Index(None, "archived_at", "updated_at", "part_number_key"),
     Index(None, "item_type", "archived_at", "part_number_key"),
     Index(None, "category", "archived_at", "part_number_key"),
     sqlite_autoincrement=True,
@@ -138,6 +152,7 @@ bom_lines = Table(
     Column("metadata", Text, nullable=False),
     UniqueConstraint("parent_id", "child_id", "rel_type"),
     Index(None, "child_id"),
+    Index("ix_bom_lines_unreferenced", "parent_id", **_only(UNREFERENCED)),
 )
 
 bom_changes = Table(
@@ -207,6 +222,8 @@ bom_last_syncs = Table(
     Column("components", Text, nullable=False),
     Column("refused_at", Stamp),
     Column("refusal", Text),
+    Column("folder", Text),
+    Index("ix_bom_last_syncs_open", "parent_id", **_only(INCOMPLETE)),
 )
 
 events = Table(

@@ -335,7 +335,7 @@ def _show(
 SHOWS: Mapping[str, tuple[str, Callable[[Line], bool]]] = {
     "cad": ("from CAD", lambda line: line.state.source == "assembly"),
     "hand": ("by hand", lambda line: line.state.source == "manual"),
-    "override": ("quantity set by hand", lambda line: line.state.override),
+    "override": ("overridden here", lambda line: line.state.override),
     "unreferenced": ("unreferenced", lambda line: line.state.unreferenced_since is not None),
     "archived": ("archived items", lambda line: line.child_archived),
 }

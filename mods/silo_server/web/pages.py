@@ -21,6 +21,7 @@ from silo_server.web import (
     login_page,
     merge_page,
     users_page,
+    waiting_page,
 )
 
 ROUTERS = (
@@ -33,6 +34,7 @@ ROUTERS = (
     import_page.router,
     activity_page.router,
     account_page.router,
+    waiting_page.router,
     users_page.router,
 )
 

@@ -19,6 +19,7 @@ from silo.bom.numbers import as_decimal
 from silo_server.clock import wire
 from silo_server.db.engine import mode_of
 from silo_server.routes.context import masked, server_of
+from silo_server.services.bom.waiting import waiting_count
 from silo_server.values import Actor, Role
 
 NOTICE_COOKIE = "silo_notice"
@@ -153,13 +154,16 @@ _TEMPLATES = _environment()
 _LINK = re.compile(r'(\s(?:href|src|action|formaction|data-events)=")/(?!/)')
 
 
-def _closed(request: Request) -> bool:
-    """True while the server takes no changes. Without its database nobody knows; the page says that then."""
+def _state(request: Request) -> tuple[bool, int]:
+    """Whether the server takes no changes, and how many BOMs wait for a person.
+
+    Without its database nobody knows; the page says that then.
+    """
     try:
         with server_of(request).db.read() as tx:
-            return mode_of(tx) != "normal"
+            return mode_of(tx) != "normal", waiting_count(tx)
     except SQLAlchemyError:
-        return False
+        return False, 0
 
 
 def page(
@@ -169,13 +173,14 @@ def page(
 
     Looks into the database for the server's mode, so not to be called on the event loop.
     """
-    closed = _closed(request)
+    closed, waiting = _state(request)
     undo, _, notice = unquote(request.cookies.get(NOTICE_COOKIE, ""))[:800].partition(" ")
     html = _TEMPLATES.get_template(template).render(
         actor=actor,
         may_edit=actor is not None and actor.role.covers(Role.EDITOR),
         is_admin=actor is not None and actor.role.covers(Role.ADMIN),
         closed=closed,
+        waiting=waiting,
         off=SWITCHED_OFF if closed else "",
         csrf=masked(actor.csrf_token) if actor is not None and actor.csrf_token else "",
         here=request.url.path,

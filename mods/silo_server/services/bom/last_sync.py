@@ -42,6 +42,7 @@ class LastSync:
     refused_at: str | None = None
     refusal: str = ""
     components: Mapping[int, Sequence[Mapping[str, str]]] = field(default_factory=dict)
+    folder: str = ""
 
     @property
     def gaps(self) -> list[dict[str, Any]]:
@@ -84,6 +85,7 @@ def _read(row: Any) -> LastSync:
         row.refused_at,
         row.refusal or "",
         {int(child): known for child, known in json.loads(row.components).items()},
+        row.folder or "",
     )
 
 
@@ -108,6 +110,7 @@ def remember(
         "at": tx.stamp,
         "username": tx.actor.username,
         "document_file": order.document_file,
+        "folder": order.document_folder or before.folder or None,
         "left_out": dumps([dict(one) for one in order.left_out]),
         "components": dumps(components),
         "refused_at": None,
@@ -128,6 +131,7 @@ def remember_refusal(tx: Tx, parent: Item, message: str) -> None:
             "at": None,
             "username": tx.actor.username,
             "document_file": None,
+            "folder": None,
             "left_out": "[]",
             "components": "{}",
             **written,

@@ -53,6 +53,7 @@ class MergeOrder:
     sync_id: str | None = None
     dry_run: bool = False
     document_file: str | None = None
+    document_folder: str | None = None
     document_sha256: str | None = None
     document_revision: int | None = None
     left_out: Sequence[Mapping[str, Any]] = ()
@@ -182,21 +183,24 @@ def _left_out_part(index: int, raw: Any) -> dict[str, Any]:
     return part
 
 
-def _document(raw: Any) -> tuple[str | None, str | None, int | None]:
+def _document(raw: Any) -> tuple[str | None, str | None, str | None, int | None]:
     if raw is None:
-        return None, None, None
+        return None, None, None, None
     if not isinstance(raw, Mapping):
         raise RejectedError('document: wanted {"file": …, "sha256": …, "revision": …}')
     file, sha256, revision = raw.get("file"), raw.get("sha256"), raw.get("revision")
+    folder = raw.get("folder")
     if not is_text(file, 4096):
         raise RejectedError("document.file: wanted a file name of at most 4096 characters")
+    if folder is not None and not is_text(folder, 1024):
+        raise RejectedError("document.folder: wanted a folder of at most 1024 characters")
     if sha256 is not None and not (isinstance(sha256, str) and re.fullmatch("[0-9A-Fa-f]{64}", sha256)):
         raise RejectedError("document.sha256: wanted 64 hexadecimal digits")
     if isinstance(revision, float) and revision.is_integer():
         revision = int(revision)  # 2.0 is a whole number in JSON
     if revision is not None and not (type(revision) is int and 0 <= revision < 2**31):
         raise RejectedError("document.revision: wanted a whole number")
-    return file, sha256, revision
+    return file, folder, sha256, revision
 
 
 def _shown(value: Any) -> str:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// The merge page: says when the BOM changed meanwhile, chooses all lines, completes part numbers.
+// The merge page: says when the BOM changed meanwhile, completes part numbers.
 
 import { complete } from "./complete.js";
 import { listen } from "./live.js";
@@ -33,24 +33,5 @@ function show(sentence) {
 }
 
 listen(place.dataset.events, place.dataset.last, ["bom_merge", "bom.updated", "server.state"], announce);
-
-const all = document.getElementById("all");
-if (all) {
-  const boxes = [...document.querySelectorAll('input[name="chosen"][form="bulk"]')];
-  const told = document.getElementById("count");
-  const recount = () => {
-    const chosen = boxes.filter((box) => box.checked).length;
-    all.checked = chosen === boxes.length;
-    all.indeterminate = chosen > 0 && chosen < boxes.length;
-    told.textContent = chosen ? `${chosen} of ${boxes.length} chosen` : "";
-  };
-  all.closest("label").hidden = false;
-  all.addEventListener("change", () => {
-    for (const box of boxes) box.checked = all.checked;
-    recount();
-  });
-  for (const box of boxes) box.addEventListener("change", recount);
-  recount();
-}
 
 for (const input of document.querySelectorAll("[data-complete]")) complete(input);
