@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from silo.inertia.materials.cards import card_folders, read_cards
+from silo.inertia.materials.cards import card_folders, cards_in, materials_of
 
 INI = """; (c) somebody
 [General]
@@ -39,7 +39,7 @@ Inherits:
 def cards(tmp_path: Path, **texts: str) -> dict[str, float]:
     for name, text in texts.items():
         (tmp_path / f"{name}.FCMat").write_text(text, "utf-8")
-    return {card.name: card.density for card in read_cards([tmp_path])}
+    return {card.name: card.density for card in materials_of(cards_in([tmp_path]))}
 
 
 def test_both_formats_and_inheritance(tmp_path: Path) -> None:
@@ -52,6 +52,13 @@ def test_both_formats_and_inheritance(tmp_path: Path) -> None:
 def test_cards_that_are_no_material(tmp_path: Path, density: str) -> None:
     """FreeCAD 1.0's "Default" (1 kg/m^3) and "None" (0), air, and 0.20's unreadable graphite."""
     assert cards(tmp_path, a=YAML.replace("2700 kg/m^3", density)) == {}
+
+
+def test_an_id_belongs_to_the_first_card_that_has_it(tmp_path: Path) -> None:
+    """The table and the ids in FCStd files are read from the same cards, by the same rules."""
+    heir, again = HEIR, YAML.replace("2700", "7000").replace("6061-T6", "copied")
+    assert cards(tmp_path, a=YAML, b=again, c=heir)["Aluminum heir"] == 2700
+    assert [card.uuid[:8] for card in cards_in([tmp_path])] == ["68b152b2", "68b152b2", "11111111"]
 
 
 def test_a_ring_of_inheritance_ends(tmp_path: Path) -> None:
@@ -79,7 +86,7 @@ def test_a_real_freecad() -> None:
         missing = "no FreeCAD with material cards on this machine"
         pytest.fail(missing) if os.environ.get("SILO_REQUIRE_FREECAD") == "1" else pytest.skip(missing)
     for root in roots:
-        found = {card.name: card.density for card in read_cards([root])}
+        found = {card.name: card.density for card in materials_of(cards_in([root]))}
         assert len(found) > 100
         assert found["Steel-Generic"] == pytest.approx(7900)
         assert "Default" not in found

@@ -11,7 +11,8 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
@@ -27,10 +28,32 @@ _UUID = re.compile(r"UUID\s*[:=]\s*[\"']?([0-9a-fA-F-]{36})")
 _INHERITS = re.compile(r"^Inherits:\s*\n(?:\s+.*\n)*?\s+UUID:\s*[\"']?([0-9a-fA-F-]{36})", re.MULTILINE)
 
 
+@dataclass(frozen=True)
+class Card:
+    """One card: its name (where it has one), density [kg/m^3] (its own or inherited), id and file."""
+
+    name: str | None
+    density: float | None
+    uuid: str
+    path: Path
+
+
+@cache
+def all_cards() -> tuple[Card, ...]:
+    """Cards of every FreeCAD found on this machine, in the order of :func:`card_folders`."""
+    return tuple(cards_in(card_folders()))
+
+
 @cache
 def installed_cards() -> tuple[Material, ...]:
-    """Cards of every FreeCAD found on this machine; the first of a name wins."""
-    return tuple(read_cards(card_folders()))
+    """Those with a density; the first of a name wins."""
+    return tuple(materials_of(all_cards()))
+
+
+@cache
+def card_of(uuid: str) -> Card | None:
+    """The card with this id, None where there is none; the first one wins."""
+    return next((card for card in all_cards() if card.uuid == uuid.casefold()), None)
 
 
 def card_folders() -> tuple[Path, ...]:
@@ -52,20 +75,29 @@ def cards_fingerprint() -> str:
     return seen.hexdigest()
 
 
-def read_cards(folders: Iterable[Path]) -> list[Material]:
-    """All cards with a density below ``folders`` (``.FCMat``, both formats), in path order."""
-    texts = [text for folder in folders for text in _texts(folder)]
-    by_uuid = {own[1].casefold(): (path, text) for path, text in texts if (own := _own_uuid(text))}
+def materials_of(cards: Iterable[Card]) -> list[Material]:
+    """All cards with a density, by name and by file name, in order; the first of a name wins."""
     found: dict[str, Material] = {}
-    for path, text in texts:
-        density = _density(text, by_uuid, depth=0)
-        if density is None:
-            continue
-        name = _NAME.search(text)
-        title = name[1] if name else path.stem
-        aliases = {path.stem, path.stem.removesuffix("-Generic"), title.removesuffix(" Generic")} - {title}
-        found.setdefault(title, Material(title, density, tuple(sorted(aliases)), f"FreeCAD card {path.name}"))
+    for card in cards:
+        if card.density is not None:
+            stem = card.path.stem
+            title = card.name or stem
+            aliases = {stem, stem.removesuffix("-Generic"), title.removesuffix(" Generic")} - {title}
+            source = f"FreeCAD card {card.path.name}"
+            found.setdefault(title, Material(title, card.density, tuple(sorted(aliases)), source))
     return list(found.values())
+
+
+def cards_in(folders: Iterable[Path]) -> list[Card]:
+    """All cards below ``folders`` (``.FCMat``, both formats), in path order."""
+    texts = [(path, text, _own_uuid(text)) for folder in folders for path, text in _texts(folder)]
+    by_uuid: dict[str, str] = {}
+    for _, text, uuid in texts:
+        by_uuid.setdefault(uuid, text)
+    return [
+        Card(name[1] if (name := _NAME.search(text)) else None, _density(text, by_uuid, 0), uuid, path)
+        for path, text, uuid in texts
+    ]
 
 
 def _texts(folder: Path) -> Iterator[tuple[Path, str]]:
@@ -77,17 +109,15 @@ def _texts(folder: Path) -> Iterator[tuple[Path, str]]:
             continue  # a card that cannot be read is as if it were not installed
 
 
-def _own_uuid(text: str) -> re.Match[str] | None:
-    general = text.partition("Inherits:")[0]
-    return _UUID.search(general)
+def _own_uuid(text: str) -> str:
+    found = _UUID.search(text.partition("Inherits:")[0])
+    return found[1].casefold() if found else ""
 
 
-def _density(text: str, by_uuid: dict[str, tuple[Path, str]], depth: int) -> float | None:
+def _density(text: str, by_uuid: Mapping[str, str], depth: int) -> float | None:
     own = _DENSITY.search(text)
     if own is not None:
         return parse_density(own[1])
     parent = _INHERITS.search(text)
-    if parent is None or depth > 8:
-        return None
-    above = by_uuid.get(parent[1].casefold())
-    return _density(above[1], by_uuid, depth + 1) if above else None
+    above = by_uuid.get(parent[1].casefold()) if parent is not None and depth < 8 else None
+    return _density(above, by_uuid, depth + 1) if above is not None else None

@@ -8,15 +8,12 @@ the density is in the cards of an installed FreeCAD; and any version may link a 
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 from silo.bom.document import own
 from silo.inertia.geometry.freecad.places import material_uuid
-from silo.inertia.materials.cards import MAX_CARD_BYTES, card_folders
+from silo.inertia.materials.cards import card_of
 from silo.inertia.materials.density import DENSEST, LIGHTEST, parse_density
 
 NO_MATERIAL = "7f9fd73b-50c9-41d8-b7b2-575a030c1eeb"
@@ -72,58 +69,16 @@ def _from_map(told: dict[str, str]) -> Material:
     return Material(name, density, problem)
 
 
-@cache
 def _from_card(uuid: str) -> Material:
-    text = _card(uuid)
-    if text is None:
+    card = card_of(uuid)
+    if card is None:
         return Material(
             problem=f"its material (id {uuid}) is in no material library found on this machine; install "
             "FreeCAD, or name the folder of its cards in FREECAD_MATERIALS"
         )
-    name = _NAME.search(text)
-    density = _inherited_density(text, depth=0)
-    title = name[1] if name else None
-    if density is None:
-        return Material(title, problem=f"the card of its material '{title}' has no density that can be used")
-    return Material(title, density)
-
-
-_NAME = re.compile(r"^\s*Name\s*:\s*[\"']?(.+?)[\"']?\s*$", re.MULTILINE)
-_DENSITY = re.compile(r"^\s*Density\s*:\s*[\"']?([^\"'\n]+?)[\"']?\s*$", re.MULTILINE)
-_OWN_UUID = re.compile(r"UUID\s*:\s*[\"']?([0-9a-fA-F-]{36})")
-_PARENT = re.compile(r"^Inherits:\s*\n(?:\s+.*\n)*?\s+UUID:\s*[\"']?([0-9a-fA-F-]{36})", re.MULTILINE)
-
-
-def _inherited_density(text: str, depth: int) -> float | None:
-    found = _DENSITY.search(text)
-    if found is not None:
-        return _sane(parse_density(found[1]))
-    parent = _PARENT.search(text)
-    above = _card(parent[1].lower()) if parent is not None and depth < 8 else None
-    return _inherited_density(above, depth + 1) if above is not None else None
-
-
-def _card(uuid: str) -> str | None:
-    return _cards().get(uuid)
-
-
-@cache
-def _cards() -> dict[str, str]:
-    """The YAML cards of all installed FreeCADs, by id; the first of an id wins."""
-    found: dict[str, str] = {}
-    for path in (path for folder in card_folders() for path in sorted(folder.rglob("*.FCMat"))):
-        text = _text(path)
-        own_id = _OWN_UUID.search(text.partition("Inherits:")[0])
-        if own_id is not None:
-            found.setdefault(own_id[1].lower(), text)
-    return found
-
-
-def _text(path: Path) -> str:
-    try:
-        return path.read_text("utf-8", errors="replace") if path.stat().st_size <= MAX_CARD_BYTES else ""
-    except OSError:
-        return ""
+    if card.density is None:
+        return Material(card.name, problem=f"the card of its material '{card.name}' has no usable density")
+    return Material(card.name, card.density)
 
 
 def _sane(density: float | None) -> float | None:
