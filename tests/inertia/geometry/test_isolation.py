@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import sys
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -149,6 +150,32 @@ def test_cancelling_ends_the_child_at_once(box: Any, step_part: Any, tmp_path: P
         )
     assert asked
     assert not alive(int(pid.read_text()))
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="helpers end there when their input does")
+def test_what_the_child_started_ends_with_it(box: Any, step_part: Any, tmp_path: Path) -> None:
+    """Helpers of a child that is ended are no orphans."""
+    pid = tmp_path / "pid"
+    sleeper = f"import os, time; open({str(pid)!r}, 'w').write(str(os.getpid())); time.sleep(600)"
+    code = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {sleeper!r}])"
+    with pytest.raises(CancelledError):
+        isolate.run(
+            step_part(box(1, 2, 3)),
+            options(cancelled=lambda: pid.is_file() and pid.read_text() != ""),
+            tmp_path / "r",
+            child(code),
+        )
+    assert gone(int(pid.read_text()))
+
+
+def gone(pid: int) -> bool:
+    """True when there is no such process any more; it is waited for, since nobody here is its parent."""
+    for _ in range(500):
+        status = Path(f"/proc/{pid}/stat")
+        if not alive(pid) or (status.is_file() and status.read_text().rpartition(")")[2].split()[0] == "Z"):
+            return True
+        threading.Event().wait(0.02)
+    return False
 
 
 def alive(pid: int) -> bool:

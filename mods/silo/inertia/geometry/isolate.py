@@ -42,6 +42,7 @@ def run(path: Path, options: ReadOptions, result: Path, command: Sequence[str] =
         "result": str(result),
         "options": options.content_options(),
         "memory_mb": options.memory_mb,
+        "processes": options.processes,
         "cpu_s": options.timeout_s,
     }
     with tempfile.TemporaryFile() as errors, _child(command or [python(), "-c", _WORKER], errors) as process:
@@ -103,13 +104,12 @@ def _child(command: Sequence[str], errors: IO[bytes]) -> Iterator[subprocess.Pop
         stdout=subprocess.PIPE,
         stderr=errors,
         env=_environment(),
-        **platform.child_options(),
+        **platform.child_options(group=True),
     )
     try:
         yield process
     finally:
-        if process.poll() is None:
-            process.kill()
+        platform.end(process)
         process.wait()
         if process.stdout is not None:
             process.stdout.close()

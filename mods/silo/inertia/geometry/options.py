@@ -91,6 +91,9 @@ class ReadOptions:
         read in a child process, so that a crash of the geometry kernel is an error message.
     timeout_s, memory_mb
         limits of that process; 0 means none.
+    processes
+        how many may work on one file or split assembly; 0: as many as there are processors. Those beside the
+        first are started for large files only, and have ``memory_mb`` together once more.
     cache, cache_dir
         keep what was read, by content, for the next time; None: the user's cache folder.
     progress, cancelled
@@ -110,6 +113,7 @@ class ReadOptions:
     isolate: bool = field(default=True, metadata={"local": True})
     timeout_s: float = field(default=600.0, metadata={"local": True})
     memory_mb: int = field(default=8192, metadata={"local": True})
+    processes: int = field(default=0, metadata={"local": True})
     cache: bool = field(default=True, metadata={"local": True})
     cache_dir: Path | None = field(default=None, metadata={"local": True})
     progress: Callable[[Progress], None] | None = field(default=None, metadata={"local": True})

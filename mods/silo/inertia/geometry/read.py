@@ -12,7 +12,9 @@ from silo.bom.errors import CancelledError, DocumentError
 from silo.inertia.geometry import isolate, store
 from silo.inertia.geometry.cache import Cache, changed_since, default_folder, key_of
 from silo.inertia.geometry.detect import Kind, detect
+from silo.inertia.geometry.helpers import WORTH_HELP, Helpers
 from silo.inertia.geometry.options import Progress, Reading, ReadOptions, Report
+from silo.inertia.geometry.step.prepare import prepare
 from silo.inertia.materials.cards import cards_fingerprint
 from silo.inertia.model import Assembly
 
@@ -68,13 +70,18 @@ def _content(kind: Kind, options: ReadOptions) -> dict[str, Any]:
     return {**content, "cards": cards_fingerprint()} if kind is Kind.FREECAD else content
 
 
-def read_here(path: Path, options: ReadOptions, report: Report) -> Reading:
-    """Read in this process: what the child does; also for hosts that bring their own process."""
+def read_here(path: Path, options: ReadOptions, report: Report, helpers: Helpers | None = None) -> Reading:
+    """Read in this process, and in the helpers: what the child does."""
     kind = detect(path)
+    helpers = helpers or Helpers()
     if kind is Kind.STEP:
+        text = None
+        if path.stat().st_size >= WORTH_HELP and helpers.start():
+            # A helper looks through the text while the kernel loads here.
+            text = helpers.begin(prepare, path.resolve(), helpers.folder(), options.max_instances)
         from silo.inertia.geometry.step.read import read_step
 
-        return read_step(path, options, report)
+        return read_step(path, options, report, helpers, text)
     if kind.is_mesh:
         from silo.inertia.geometry.meshes.meshfile import read_mesh
 
@@ -85,7 +92,7 @@ def read_here(path: Path, options: ReadOptions, report: Report) -> Reading:
         return read_brep(path, options, report)
     from silo.inertia.geometry.freecad.files import read_freecad
 
-    return read_freecad(path, options, report)
+    return read_freecad(path, options, report, helpers)
 
 
 def _reporter(path: Path, options: ReadOptions) -> Report:

@@ -63,6 +63,7 @@ def limit(memory_mb: int, cpu_s: float) -> None:
 
 def _read(task: dict[str, Any], parent: IO[str], noise: IO[bytes]) -> None:
     from silo.inertia.geometry.cache import provenance
+    from silo.inertia.geometry.helpers import helpers_for
     from silo.inertia.geometry.read import read_here
 
     options = ReadOptions.from_content(task["options"])
@@ -70,7 +71,8 @@ def _read(task: dict[str, Any], parent: IO[str], noise: IO[bytes]) -> None:
     def report(stage: str, done: int, total: int) -> None:
         _say(parent, event="progress", stage=stage, done=done, total=total)
 
-    reading = read_here(Path(task["path"]), options, report)
+    with helpers_for(int(task["processes"]), int(task["memory_mb"])) as helpers:
+        reading = read_here(Path(task["path"]), options, report, helpers)
     reading = with_complaints(reading, _complaints(noise))
     store.save(reading.assembly, Path(task["result"]), provenance(reading, options))
 

@@ -19,7 +19,7 @@ from silo.bom.document import LinkProblem, own
 from silo.bom.errors import DocumentError
 from silo.inertia.core import place
 from silo.inertia.geometry.exact.quadrature import Moments, integrate
-from silo.inertia.geometry.freecad.assembly import assembled
+from silo.inertia.geometry.freecad.assembly import assembled, one_by_one
 from silo.inertia.geometry.freecad.members import top_object
 from silo.inertia.geometry.freecad.stated_materials import (
     NO_MATERIAL,
@@ -75,7 +75,7 @@ def read_live(document: Any, options: ReadOptions, report: Report) -> Assembly:
     def measured(leaf: Leaf) -> Measured:
         return _Product(options.eps, options.mesh_check, report).measured(leaf)
 
-    return assembled(walk, top, source, options, measured, report)
+    return assembled(walk, top, source, options, one_by_one(measured), report)
 
 
 class LiveFacts:

@@ -48,9 +48,11 @@ def test_the_text_gets_groups_and_nothing_else_changes(flat: Path) -> None:
     """Uses keep their numbers, names and placements; the groups hold all of them."""
     data = flat.read_bytes()
     before = read_products(scan(data, WANTED))
-    changed = regrouped(data, before)
+    changed, added = regrouped(data, before)
     assert changed is not None
     after = read_products(scan(changed, WANTED))
+    assert after.count == before.count + added
+    assert {n: pd for n, pd in after.by_ordinal.items() if n <= before.count} == before.by_ordinal
     groups = {pd for pd, facts in after.facts.items() if facts.name.startswith(MARK)}
     assert len(groups) == -(-COUNT // GROUP_SIZE)
     top = next(pd for pd, facts in after.facts.items() if facts.name == "board")
@@ -64,7 +66,7 @@ def test_the_text_gets_groups_and_nothing_else_changes(flat: Path) -> None:
 def test_small_assemblies_and_odd_structures_are_left_alone(flat: Path, box: Any, step_part: Any) -> None:
     """No need, or a placement that cannot be found: the kernel gets the file as it is."""
     small = step_part(box(1, 1, 1)).read_bytes()
-    assert regrouped(small, read_products(scan(small, WANTED))) is None
+    assert regrouped(small, read_products(scan(small, WANTED))) == (None, 0)
     placement, other = b"CONTEXT_DEPENDENT_SHAPE_REPRESENTATION", b"SOME_OTHER_REPRESENTATION"
     odd = flat.read_bytes().replace(placement, other, 1)
-    assert regrouped(odd, read_products(scan(odd, WANTED))) is None
+    assert regrouped(odd, read_products(scan(odd, WANTED))) == (None, 0)

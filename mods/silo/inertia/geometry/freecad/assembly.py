@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import Any
 
 from silo.bom.errors import DocumentError, InputError
 from silo.inertia.geometry.checks import coincident_problems, name_problems, scaled_problems
@@ -13,8 +14,8 @@ from silo.inertia.geometry.measured import Measured, no_solid
 from silo.inertia.geometry.options import ReadOptions, Report
 from silo.inertia.model import Assembly, GeometryCode, GeometryProblem, Prototype
 
-Measure = Callable[[Leaf], Measured]
-"""Measures one product; DocumentError where its shapes cannot be had."""
+Measure = Callable[[Sequence[Leaf], Callable[[int, int], Any]], Sequence[Measured | str]]
+"""Measures products, or says why the shapes of one cannot be had; calls back with (number, of how many)."""
 
 
 def assembled(
@@ -27,10 +28,10 @@ def assembled(
     except InputError as error:
         raise DocumentError(source, str(error)) from error
     used = list(dict.fromkeys(instance.prototype for instance in unfolded.instances))
-    prototypes = {}
-    for number, key in enumerate(used, start=1):
-        report("measuring", number, len(used))
-        prototypes[key] = _prototype(walk, key, measure)
+    found = measure(
+        [walk.leaves[key] for key in used], lambda number, total: report("measuring", number, total)
+    )
+    prototypes = {key: _prototype(walk, key, one) for key, one in zip(used, found, strict=True)}
     problems = [GeometryProblem(code, message) for code, listed in walk.notes.items() for message in listed]
     problems += scaled_problems(unfolded.instances)
     problems += coincident_problems(unfolded.instances)
@@ -45,14 +46,28 @@ def assembled(
     )
 
 
-def _prototype(walk: Walk, key: str, measure: Measure) -> Prototype:
+def one_by_one(measure: Callable[[Leaf], Measured]) -> Measure:
+    """One product after the other; ``measure`` raises DocumentError where the shapes cannot be had."""
+
+    def measured(leaves: Sequence[Leaf], done: Callable[[int, int], Any]) -> list[Measured | str]:
+        found: list[Measured | str] = []
+        for number, leaf in enumerate(leaves, start=1):
+            done(number, len(leaves))
+            try:
+                found.append(measure(leaf))
+            except DocumentError as error:
+                found.append(error.reason)
+        return found
+
+    return measured
+
+
+def _prototype(walk: Walk, key: str, found: Measured | str) -> Prototype:
     node, leaf = walk.nodes[key], walk.leaves[key]
     problems = name_problems(node.name, unnamed=False)
-    measured = Measured((), (), None, False)
-    try:
-        measured = measure(leaf)
-    except DocumentError as error:
-        problems.append(GeometryProblem(GeometryCode.NO_GEOMETRY, error.reason))
+    measured = Measured((), (), None, False) if isinstance(found, str) else found
+    if isinstance(found, str):
+        problems.append(GeometryProblem(GeometryCode.NO_GEOMETRY, found))
     problems += measured.problems
     if leaf.broken:
         problems.append(GeometryProblem(GeometryCode.NO_GEOMETRY, leaf.broken))

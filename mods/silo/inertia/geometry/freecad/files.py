@@ -5,6 +5,9 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -18,15 +21,18 @@ from silo.inertia.geometry.freecad.facts import StoredFacts
 from silo.inertia.geometry.freecad.members import top_object
 from silo.inertia.geometry.freecad.places import Entries
 from silo.inertia.geometry.freecad.walk import Leaf, Walk
-from silo.inertia.geometry.kernel.brep import load_shape
+from silo.inertia.geometry.graph import Floats
+from silo.inertia.geometry.helpers import WORTH_HELP, Helpers, Task
+from silo.inertia.geometry.kernel.brep import load_kernel, load_shape
 from silo.inertia.geometry.kernel.solids import measure
 from silo.inertia.geometry.measured import Measured
 from silo.inertia.geometry.options import Reading, ReadOptions, Report
 
 
-def read_freecad(path: Path, options: ReadOptions, report: Report) -> Reading:
+def read_freecad(path: Path, options: ReadOptions, report: Report, helpers: Helpers | None = None) -> Reading:
     """The assembly, part or loose bodies of an FCStd file, with what it links to. Raises DocumentError."""
     report("reading", 0, 0)
+    helpers = helpers or Helpers()
     entries = Entries()
     try:
         with Library(options.root) as library, tempfile.TemporaryDirectory(prefix="silo-freecad-") as folder:
@@ -34,10 +40,23 @@ def read_freecad(path: Path, options: ReadOptions, report: Report) -> Reading:
             base = os.path.dirname(document.FileName).replace("\\", "/")
             walk = Walk(StoredFacts(entries), base)
             top = walk.product(top_object(document, options.object_name))
+            unpacked = _Unpacked(entries, Path(folder))
 
-            def measured(leaf: Leaf) -> Measured:
-                shapes = _shapes(entries, leaf, Path(folder))
-                return measure(shapes, eps=options.eps, mesh_check=options.mesh_check)
+            def measured(leaves: Sequence[Leaf], done: Callable[[int, int], Any]) -> list[Measured | str]:
+                if len(leaves) > 1 and unpacked.size(leaves) >= WORTH_HELP and helpers.start():
+                    helpers.prepare(load_kernel)
+
+                def task(leaf: Leaf) -> Task[Measured | str]:
+                    try:
+                        return measured_files, (unpacked.files(leaf), options.eps, options.mesh_check)
+                    except DocumentError as error:
+                        return str, (error.reason,)
+
+                def here(leaf: Leaf) -> Measured | str:
+                    function, arguments = task(leaf)
+                    return function(*arguments)
+
+                return helpers.all(leaves, here, task, done)
 
             assembly = assembled(walk, top, str(path), options, measured, report)
     finally:
@@ -46,21 +65,53 @@ def read_freecad(path: Path, options: ReadOptions, report: Report) -> Reading:
     return Reading(assembly, others=others, absent=tuple(Path(file) for file in sorted(walk.absent)))
 
 
-def _shapes(entries: Entries, leaf: Leaf, folder: Path) -> list[Any]:
-    """The shapes of one product in its axes.
+class _Unpacked:
+    """The shapes of products as files of their own, each product's as long as it takes to measure it."""
+
+    def __init__(self, entries: Entries, folder: Path) -> None:
+        self._entries = entries
+        self._folder = folder
+        self._numbers = count()
+
+    def size(self, leaves: Sequence[Leaf]) -> int:
+        """Of all their shapes, in bytes."""
+        return sum(self._entries.size(ref.handle.path, ref.handle.entry) for e in leaves for ref in e.shapes)
+
+    def files(self, leaf: Leaf) -> list[_File]:
+        """One for each shape that is not empty. Raises DocumentError."""
+        found = []
+        for ref in leaf.shapes:
+            data = self._entries.read(ref.handle.path, ref.handle.entry)
+            if data:
+                path = self._folder / f"shape{next(self._numbers)}.brp"
+                path.write_bytes(data)
+                found.append(_File(path, f"{ref.handle.path}: {ref.handle.entry}", ref.transform))
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class _File:
+    """A shape of a product: where it lies, what messages call it, and (4, 4) [mm] to the product's axes."""
+
+    path: Path
+    named: str
+    transform: Floats
+
+
+def measured_files(files: Sequence[_File], eps: float, mesh_check: bool) -> Measured | str:
+    """One product, measured from its shapes in its axes, or what is wrong; the files are taken away.
 
     FreeCAD keeps an object's placement as the location of its stored shape; that one is taken off, and the
     walk's own put in its place, since a link may leave it out.
     """
-    found = []
-    for ref in leaf.shapes:
-        file = folder / "shape.brp"
-        file.write_bytes(entries.read(ref.handle.path, ref.handle.entry))
-        if file.stat().st_size == 0:
-            continue
-        shape = load_shape(file, f"{ref.handle.path}: {ref.handle.entry}")
-        found.append(_located(shape, ref.transform))
-    return found
+    try:
+        shapes = [_located(load_shape(file.path, file.named), file.transform) for file in files]
+        return measure(shapes, eps=eps, mesh_check=mesh_check)
+    except DocumentError as error:
+        return error.reason
+    finally:
+        for file in files:
+            file.path.unlink(missing_ok=True)
 
 
 def _located(shape: Any, matrix: np.ndarray) -> Any:

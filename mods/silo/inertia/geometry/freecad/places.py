@@ -129,6 +129,15 @@ class Entries:
         except (OSError, zipfile.BadZipFile, NotImplementedError, RuntimeError) as error:
             raise DocumentError(path, f"its {name} cannot be unpacked: {error}") from error
 
+    def size(self, path: str, name: str) -> int:
+        """How many bytes :meth:`read` would return; 0 where it would raise."""
+        try:
+            if path not in self._open:
+                self._open[path] = zipfile.ZipFile(path)
+            return self._open[path].getinfo(name).file_size
+        except (KeyError, OSError, zipfile.BadZipFile):
+            return 0
+
     def close(self) -> None:
         """Close all files."""
         for archive in self._open.values():

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Shapes in the geometry kernel's own form: .brep and .brp files, and the entries of FreeCAD documents."""
+"""Shapes in the geometry kernel's own form: .brep and .brp files, the entries of FreeCAD documents, and what
+helpers are sent to measure."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +13,13 @@ import numpy as np
 from OCP.BinTools import BinTools
 from OCP.BRep import BRep_Builder
 from OCP.BRepTools import BRepTools
-from OCP.TopoDS import TopoDS_Shape
+from OCP.TopoDS import TopoDS_Compound, TopoDS_Iterator, TopoDS_Shape
 
 from silo.bom.errors import DocumentError
+from silo.inertia.geometry.helpers import Helpers
+from silo.inertia.geometry.kernel import occt
 from silo.inertia.geometry.kernel.solids import measure
-from silo.inertia.geometry.measured import no_solid
+from silo.inertia.geometry.measured import Measured, no_solid
 from silo.inertia.geometry.options import Reading, ReadOptions, Report
 from silo.inertia.model import Assembly, Instance, Prototype
 
@@ -54,3 +59,49 @@ def read_brep(path: Path, options: ReadOptions, report: Report) -> Reading:
     )
     instance = Instance((path.stem,), (path.stem,), "shape", np.eye(4))
     return Reading(Assembly(path.stem, {"shape": part}, (instance,), source=str(path), unit="mm"))
+
+
+def load_kernel() -> None:
+    """What a helper does first: this module's imports have done it."""
+    occt.quiet()
+
+
+def measure_all(
+    products: Sequence[list[Any]],
+    *,
+    options: ReadOptions,
+    helpers: Helpers,
+    done: Callable[[int, int], Any],
+) -> list[Measured]:
+    """The shapes of each product measured, here and by the helpers that run."""
+    numbers = count()
+
+    def stored(shapes: list[Any]) -> tuple[Callable[..., Measured], tuple[Any, ...]]:
+        path = helpers.folder() / f"{next(numbers)}.bin"
+        _store(shapes, path)
+        return _measure_stored, (path, options.eps, options.mesh_check)
+
+    def here(shapes: list[Any]) -> Measured:
+        return measure(shapes, eps=options.eps, mesh_check=options.mesh_check)
+
+    return helpers.all(products, here, stored, done)
+
+
+def _measure_stored(path: Path, eps: float, mesh_check: bool) -> Measured:
+    shapes = []
+    stored = TopoDS_Iterator(load_shape(path, str(path)), True, True)
+    while stored.More():
+        shapes.append(stored.Value())
+        stored.Next()
+    path.unlink()
+    return measure(shapes, eps=eps, mesh_check=mesh_check)
+
+
+def _store(shapes: list[Any], path: Path) -> None:
+    """Bit by bit: what is read from there is measured to the same numbers."""
+    builder, whole = BRep_Builder(), TopoDS_Compound()
+    builder.MakeCompound(whole)
+    for shape in shapes:
+        builder.Add(whole, shape)
+    if not BinTools.Write_s(whole, str(path)):
+        raise DocumentError(str(path), "cannot be written")

@@ -41,7 +41,7 @@ MAX_DEPTH = 60
 MAX_ENTITY_BYTES = 4_000_000
 
 _ENTITY = re.compile(rb"#(\d+)\s*=\s*([A-Z_0-9]*)\s*\(")
-_BODY = re.compile(rb"(?:[^';]|'[^']*')*")
+_BODY = re.compile(rb"(?:[^';]+|'[^']*')*")
 _REFERENCE = re.compile(rb"'(?:[^']|'')*'|#(\d+)")
 _TOKEN = re.compile(
     rb"\s*(?:(?P<string>'(?:[^']|'')*')|#(?P<ref>\d+)|(?P<enum>\.[A-Za-z0-9_]+\.)"

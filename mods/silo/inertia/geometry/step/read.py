@@ -3,35 +3,62 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from silo.bom.errors import DocumentError, InputError
 from silo.inertia.geometry.checks import coincident_problems, implausible_size, name_problems, scaled_problems
 from silo.inertia.geometry.graph import unfold
-from silo.inertia.geometry.kernel.solids import measure
+from silo.inertia.geometry.helpers import Helpers
+from silo.inertia.geometry.kernel.brep import load_kernel, measure_all
 from silo.inertia.geometry.measured import no_solid
 from silo.inertia.geometry.options import Reading, ReadOptions, Report
 from silo.inertia.geometry.step.checks import against_stated, lost_stretches, split_problems, stated_totals
+from silo.inertia.geometry.step.prepare import Prepared
 from silo.inertia.geometry.step.siblings import Siblings
 from silo.inertia.geometry.step.xcaf import StepFile, load
 from silo.inertia.model import Assembly, GeometryCode, GeometryProblem, Prototype
 
+MANY_FACES = 3000
+"""From so many on, measuring takes so long that a second processor is worth its start."""
 
-def read_step(path: Path, options: ReadOptions, report: Report) -> Reading:
-    """The assembly of a STEP file, with what belongs to it from beside it. Raises DocumentError."""
+
+def read_step(
+    path: Path,
+    options: ReadOptions,
+    report: Report,
+    helpers: Helpers | None = None,
+    text: Callable[[], Prepared] | None = None,
+) -> Reading:
+    """The assembly of a STEP file, with what belongs to it from beside it. Raises DocumentError.
+
+    text
+        gives what :func:`prepare` found, where a helper was asked already.
+    """
+    helpers = helpers or Helpers()
     report("reading", 0, 0)
-    step = load(path, max_instances=options.max_instances)
-    siblings = Siblings(step, options, lambda name: report(f"reading {name}", 0, 0))
+    prepared = text() if text is not None else None
+    if prepared is not None and prepared.faces >= MANY_FACES:
+        helpers.prepare(load_kernel)
+    elif prepared is not None:
+        helpers.end()
+    step = load(path, max_instances=options.max_instances, text=prepared)
+    siblings = Siblings(step, options, helpers, lambda name: report(f"reading {name}", 0, 0))
     siblings.resolve()
     try:
         unfolded = unfold(step.nodes, step.roots, options.max_instances)
     except InputError as error:
         raise DocumentError(str(path), str(error)) from error
     placed = list(dict.fromkeys(instance.prototype for instance in unfolded.instances))
-    prototypes = {}
-    for number, key in enumerate(placed, start=1):
-        report("measuring", number, len(placed))
-        prototypes[key] = _prototype(step, key, options, siblings.problems.get(key))
+    unmeasured = [key for key in placed if key not in step.measured]
+    found = measure_all(
+        [step.shapes.get(key, []) for key in unmeasured],
+        options=options,
+        helpers=helpers,
+        done=lambda number, total: report("measuring", number, total),
+    )
+    step.measured.update(zip(unmeasured, found, strict=True))
+    prototypes = {key: _prototype(step, key, siblings.problems.get(key)) for key in placed}
     problems = [*split_problems(siblings), *stated_totals(step, prototypes)]
     problems += [*lost_stretches(step), *scaled_problems(unfolded.instances)]
     problems += coincident_problems(unfolded.instances)
@@ -52,9 +79,9 @@ def read_step(path: Path, options: ReadOptions, report: Report) -> Reading:
     return Reading(assembly, others=tuple(siblings.used), missing=tuple(siblings.missing))
 
 
-def _prototype(step: StepFile, key: str, options: ReadOptions, known: GeometryProblem | None) -> Prototype:
+def _prototype(step: StepFile, key: str, known: GeometryProblem | None) -> Prototype:
     node, facts, stated = step.nodes[key], step.facts[key], step.stated[key]
-    measured = measure(step.shapes[key], eps=options.eps, mesh_check=options.mesh_check)
+    measured = step.measured[key]
     volume, com, inertia = measured.total
     problems = list(measured.problems)
     if not measured.solids:

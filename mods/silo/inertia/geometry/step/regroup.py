@@ -67,26 +67,29 @@ class _Flat:
     uses: list[_Use] = field(default_factory=list)
 
 
-def regrouped(data: Buffer, products: Products) -> bytes | None:
-    """The text with groups in its flat assemblies; None where there is none, or nothing can be done."""
+def regrouped(data: Buffer, products: Products) -> tuple[bytes | None, int]:
+    """The text with groups in its flat assemblies, and how many entities were added at its end.
+
+    (None, 0) where no assembly is flat, or nothing can be done.
+    """
     counts: dict[int, int] = defaultdict(int)
     for assembly, _ in products.uses:
         counts[assembly] += 1
     flat = [assembly for assembly, count in counts.items() if count >= GROUP_FROM]
     if not flat:
-        return None
+        return None, 0
     source = scan(data, _KEYWORDS, b"REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION")
     found = [_flat(source, assembly) for assembly in flat]
     cuttable = [one for one in found if one is not None]
     end = _DATA_END.search(data)
     if not cuttable or end is None:
-        return None
+        return None, 0
     writer = _Writer(source.highest + 1)
     edits: list[tuple[int, int, bytes]] = []
     for one in cuttable:
         edits += _edits(source, one, writer)
     edits.append((end.start(), end.start(), "".join(writer.lines).encode("ascii")))
-    return _edited(data, edits)
+    return _edited(data, edits), len(writer.lines)
 
 
 def _flat(source: Part21, definition: int) -> _Flat | None:

@@ -16,7 +16,9 @@ from pathlib import Path
 
 from silo.bom.errors import DocumentError, InputError
 from silo.inertia.geometry.graph import Child, bottom_up
-from silo.inertia.geometry.kernel import occt
+from silo.inertia.geometry.helpers import WORTH_HELP, Helpers
+from silo.inertia.geometry.kernel.brep import load_kernel
+from silo.inertia.geometry.kernel.solids import measure
 from silo.inertia.geometry.labels import file_key
 from silo.inertia.geometry.options import ReadOptions
 from silo.inertia.geometry.step.folder import bare_stem, step_files
@@ -27,13 +29,16 @@ from silo.inertia.model import GeometryCode, GeometryProblem
 class Siblings:
     """The files that may hold missing products; ``problems`` by product key, ``used`` paths in order."""
 
-    def __init__(self, top: StepFile, options: ReadOptions, cancelled_check: Callable[[str], None]) -> None:
+    def __init__(
+        self, top: StepFile, options: ReadOptions, helpers: Helpers, reading: Callable[[str], None]
+    ) -> None:
         self._top = top
         self._options = options
-        self._tick = cancelled_check
+        self._helpers = helpers
+        self._reading = reading
         self._root = Path(os.path.realpath(top.path)).parent
         self._index: dict[str, list[Path]] | None = None
-        self._loaded: dict[Path, list[Child]] = {}
+        self._loaded: dict[Path, StepFile | str] = {}
         self._open = {Path(os.path.realpath(top.path))}
         self.problems: dict[str, GeometryProblem] = {}
         self.used: list[Path] = []
@@ -41,28 +46,43 @@ class Siblings:
 
     def resolve(self) -> None:
         """Fill every product without geometry that has a file; note on the others why not."""
-        waiting = self._empty(self._top)
+        waiting = self._top.empty
         while waiting:
-            key = waiting.pop(0)
-            node = self._top.nodes[key]
-            path, reason = self._find(key)
-            if path is None:
-                self.missing.append(node.name)
-                self.problems[key] = GeometryProblem(GeometryCode.NO_GEOMETRY, reason)
-                continue
-            try:
-                waiting += self._fill(key, path)
-            except DocumentError as error:
-                self.problems[key] = GeometryProblem(
-                    GeometryCode.EXTERNAL_FILE, f"its file {path.name} cannot be read: {error.reason}"
-                )
+            found = {key: self._find(key) for key in waiting}
+            self._load([path for path, _ in found.values() if path is not None])
+            waiting = []
+            for key, (path, reason) in found.items():
+                if path is None:
+                    self.missing.append(self._top.nodes[key].name)
+                    self.problems[key] = GeometryProblem(GeometryCode.NO_GEOMETRY, reason)
+                    continue
+                try:
+                    waiting += self._fill(key, path)
+                except DocumentError as error:
+                    self.problems[key] = GeometryProblem(
+                        GeometryCode.EXTERNAL_FILE, f"its file {path.name} cannot be read: {error.reason}"
+                    )
 
-    def _empty(self, step: StepFile) -> list[str]:
-        return [
-            key
-            for key, shapes in step.shapes.items()
-            if not step.nodes[key].children and not any(occt.has_edges(shape) for shape in shapes)
+    def _load(self, wanted: list[Path]) -> None:
+        """Read files that are not read yet, large ones first, by as many processes as help."""
+        paths = [path for path in dict.fromkeys(wanted) if path not in self._loaded]
+        paths = paths[: max(self._options.max_siblings - len(self._loaded), 0)]
+        sizes = {path: path.stat().st_size for path in paths if path.is_file()}
+        paths.sort(key=lambda path: -sizes.get(path, 0))
+        if len(paths) > 1 and sum(sizes.values()) >= WORTH_HELP and self._helpers.start():
+            self._helpers.prepare(load_kernel)
+        options = self._options
+        rows = [
+            (path, f"{path.relative_to(self._root).as_posix()}#", options.eps, options.mesh_check)
+            for path in paths
         ]
+        read = self._helpers.all(
+            rows,
+            lambda row: part_file(*row),
+            lambda row: (part_file, row),
+            lambda number, _: self._reading(paths[number - 1].name),
+        )
+        self._loaded.update(zip(paths, read, strict=True))
 
     def _find(self, key: str) -> tuple[Path | None, str]:
         node, facts = self._top.nodes[key], self._top.facts[key]
@@ -94,19 +114,19 @@ class Siblings:
 
     def _fill(self, key: str, path: Path) -> list[str]:
         """Put the file's content in the product's place; returns products that are empty in turn."""
-        self._tick(path.name)
+        part = self._loaded.get(path)
+        if part is None:
+            raise DocumentError(
+                str(path), f"more than {self._options.max_siblings} files belong to this assembly"
+            )
+        if isinstance(part, str):
+            raise DocumentError(str(path), part)
         empty: list[str] = []
-        if path not in self._loaded:
-            if len(self._loaded) >= self._options.max_siblings:
-                raise DocumentError(
-                    str(path), f"more than {self._options.max_siblings} files belong to this assembly"
-                )
-            part = load(path, prefix=f"{path.relative_to(self._root).as_posix()}#")
-            empty = self._empty(part)
+        if path not in self.used:
+            empty = part.empty
             self._top.take_in(part)
-            self._loaded[path] = part.roots
             self.used.append(path)
-        self._hang(key, self._loaded[path], path)
+        self._hang(key, part.roots, path)
         return empty
 
     def _hang(self, key: str, roots: list[Child], path: Path) -> None:
@@ -120,7 +140,7 @@ class Siblings:
         except InputError as error:
             self._top.nodes[key] = node
             raise DocumentError(str(path), "it contains the assembly that needs it") from error
-        self._top.shapes[key] = self._top.shapes.get(roots[0].product, []) if content is not None else []
+        self._top.take_shape(key, roots[0].product if content is not None else "")
         if content is not None:
             here, there = self._top.facts[key], self._top.facts[roots[0].product]
             self._top.facts[key] = replace(
@@ -131,3 +151,16 @@ class Siblings:
             )
             if self._top.stated[key] == Stated():
                 self._top.stated[key] = self._top.stated[roots[0].product]
+
+
+def part_file(path: Path, prefix: str, eps: float, mesh_check: bool) -> StepFile | str:
+    """A part's own file, read and measured, without the kernel's shapes; or what is wrong with it."""
+    try:
+        part = load(path, prefix)
+    except DocumentError as error:
+        return error.reason
+    part.measured = {
+        key: measure(shapes, eps=eps, mesh_check=mesh_check) for key, shapes in part.shapes.items()
+    }
+    part.shapes.clear()
+    return part

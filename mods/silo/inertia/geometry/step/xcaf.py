@@ -9,8 +9,6 @@ is read instead, and :mod:`siblings` looks for the files by our rules.
 
 from __future__ import annotations
 
-import mmap
-import re
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -23,20 +21,15 @@ from OCP.TCollection import TCollection_ExtendedString
 from OCP.TDocStd import TDocStd_Document
 from OCP.XCAFDoc import XCAFDoc_Centroid, XCAFDoc_DocumentTool, XCAFDoc_Volume
 
-from silo.bom.errors import DocumentError, InputError
+from silo.bom.errors import DocumentError
 from silo.inertia.geometry.graph import Child, Node
 from silo.inertia.geometry.kernel import occt
 from silo.inertia.geometry.kernel.tessellate import MM, in_metres, trsf_matrix
 from silo.inertia.geometry.labels import clean, is_generic
-from silo.inertia.geometry.step.part21 import scan
-from silo.inertia.geometry.step.product_text import (
-    WANTED,
-    ProductFacts,
-    Products,
-    count_placed,
-    read_products,
-)
-from silo.inertia.geometry.step.regroup import MARK, regrouped
+from silo.inertia.geometry.measured import Measured
+from silo.inertia.geometry.step.prepare import Prepared, prepare
+from silo.inertia.geometry.step.product_text import ProductFacts, Products
+from silo.inertia.geometry.step.regroup import MARK
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +44,12 @@ class Stated:
 class StepFile:
     """The content of one file; keys are unique over all files of a split assembly.
 
-    ``stretched``: how many transformations the text has that scale or mirror.
+    stretched
+        how many transformations the text has that scale or mirror.
+    shapes, measured
+        of each product with a shape of its own: the kernel's, or what was measured of them already.
+    empty
+        products without children and without any edge: their geometry is somewhere else.
     """
 
     path: Path
@@ -59,6 +57,8 @@ class StepFile:
     stretched: int = 0
     nodes: dict[str, Node] = field(default_factory=dict)
     shapes: dict[str, list[Any]] = field(default_factory=dict)
+    measured: dict[str, Measured] = field(default_factory=dict)
+    empty: list[str] = field(default_factory=list)
     facts: dict[str, ProductFacts] = field(default_factory=dict)
     stated: dict[str, Stated] = field(default_factory=dict)
     unnamed: set[str] = field(default_factory=set)
@@ -68,55 +68,32 @@ class StepFile:
         """Add another file's products; its keys must be its own."""
         self.nodes.update(other.nodes)
         self.shapes.update(other.shapes)
+        self.measured.update(other.measured)
         self.facts.update(other.facts)
         self.stated.update(other.stated)
         self.unnamed.update(other.unnamed)
         self.stretched += other.stretched
 
+    def take_shape(self, key: str, other: str) -> None:
+        """Give the product ``key`` the shape of ``other``, or none if that has none."""
+        for known in (self.shapes, self.measured):
+            known.pop(key, None)
+            if other in known:
+                known[key] = known[other]  # type: ignore[assignment]
 
-def load(path: Path, prefix: str = "", max_instances: int = 1_000_000) -> StepFile:
-    """Read one STEP file. ``prefix`` goes before every key. DocumentError where it cannot be read."""
-    with path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
-        products, documents = _text(path, data)
-        _refuse_bombs(path, products, max_instances)
-        changed = regrouped(data, products)
-        if changed is not None:
-            products = read_products(scan(changed, WANTED))
-        if documents:
-            # The kernel would open the files that are named, in any folder, without asking.
-            changed = _EXTERNAL.sub(rb"\1'silo-looks-for-it'", data[:] if changed is None else changed)
+
+def load(
+    path: Path, prefix: str = "", max_instances: int = 1_000_000, text: Prepared | None = None
+) -> StepFile:
+    """Read one STEP file. ``prefix`` goes before every key. DocumentError where it cannot be read.
+
+    text
+        what :func:`prepare` found, where somebody asked it already.
+    """
     with tempfile.TemporaryDirectory(prefix="silo-step-") as folder:
-        source = path
-        if changed is not None:
-            source = Path(folder) / "part.step"
-            source.write_bytes(changed)
-            del changed
-        document, reader = _transferred(source, path)
-    return _Walk(path, prefix, document, reader, products).run()
-
-
-def _text(path: Path, data: mmap.mmap) -> tuple[Products, bool]:
-    text = scan(data, WANTED)
-    if not text.complete:
-        raise DocumentError(
-            str(path), "the file ends in the middle (no END-ISO-10303-21); export or copy it again"
-        )
-    return read_products(text), "DOCUMENT_FILE" in text.keywords.values()
-
-
-def _refuse_bombs(path: Path, products: Products, most: int) -> None:
-    # Before the kernel sees it: a kilobyte of assemblies of assemblies keeps it busy for ever.
-    try:
-        count = count_placed(products)
-    except InputError as error:
-        raise DocumentError(str(path), str(error)) from error
-    if count > most:
-        raise DocumentError(str(path), f"it unfolds to {count} placed parts, more than the {most} allowed")
-
-
-_EXTERNAL = re.compile(
-    rb"((?:DOCUMENT_FILE|APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT|EXTERNALLY_DEFINED\w*)\s*\(\s*)'(?:[^']|'')*'"
-)
+        text = text or prepare(path, Path(folder), max_instances)
+        document, reader = _transferred(text.source, path)
+    return _Walk(path, prefix, document, reader, text.products).run()
 
 
 def _transferred(source: Path, named: Path) -> tuple[Any, Any]:
@@ -155,6 +132,11 @@ class _Walk:
             self._file.roots.append(Child(self._file.nodes[key].name, key))
         if not self._file.roots:
             raise DocumentError(str(self._file.path), "holds no product and no shape")
+        self._file.empty = [
+            key
+            for key, shapes in self._file.shapes.items()
+            if not self._file.nodes[key].children and not any(occt.has_edges(shape) for shape in shapes)
+        ]
         return self._file
 
     def _key(self, label: Any) -> str:
