@@ -10,13 +10,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from silo.bom.errors import ConfigError, InputError
-from silo.inertia.bodies import box
+from silo.inertia.bodies import box, placement
+from silo.inertia.calculator import Task, calculate
 from silo.inertia.frames import FrameChoice, origin_frame
 from silo.inertia.links import claim, link_map, matches, read_link_map
+from silo.inertia.materials import load_materials
 from silo.inertia.model import Instance
-from silo.inertia.output.urdf import root_link
+from silo.inertia.output.urdf import frame_doubts, root_link
 
 Fixture = Callable[..., Any]
 PART = box("p", 0.1, 0.1, 0.1)
@@ -244,3 +248,85 @@ def test_a_mirrored_frame_is_refused(assemble: Fixture, compute: Fixture) -> Non
     asm = assemble(("arm/b", PART), frames={("arm",): np.diag([-1.0, 1, 1, 1])})
     with pytest.raises(InputError, match="mirrored"):
         compute(asm, None, frame=FrameChoice.OWN)
+
+
+def test_names_that_yaml_takes_for_other_values_are_names(tmp_path: Path, assemble: Fixture) -> None:
+    """A link called "on", one called 1.10, a part called 12."""
+    path = tmp_path / "map.yaml"
+    path.write_text(
+        "links:\n  on: [12]\n  1.10: [null]\n  0x10: {parts: [yes], origin: {xyz: [0, 0, 1e-1]}}\n"
+    )
+    asm = assemble(("12", PART), ("null", PART), ("yes", PART))
+    assert claim(asm, read_link_map(path)).members == {"on": (0,), "1.10": (1,), "0x10": (2,)}
+    path.write_text("links:\n  arm:\n  hand: ['']\n")
+    with pytest.raises(ConfigError, match=r"arm: wanted a list of patterns.*hand: wanted a list of patterns"):
+        read_link_map(path)
+
+
+def test_many_stars_take_no_time() -> None:
+    """Each star is tried once: a pattern of fifteen was worth an hour."""
+    long = Instance(("a" * 200,), ("a" * 200,), "p", np.eye(4))
+    assert not matches("a*" * 15 + "b", long)
+    assert matches("a*" * 15, long)
+
+
+@given(st.text("ab*?/", min_size=1, max_size=7), st.text("ab/", min_size=1, max_size=7))
+def test_patterns_match_as_they_are_documented(pattern: str, name: str) -> None:
+    """Against a matcher that tries everything, level by level."""
+
+    def level(p: str, n: str) -> bool:
+        if not p:
+            return not n
+        if p[0] == "*":
+            return any(level(p[1:], n[k:]) for k in range(len(n) + 1))
+        return bool(n) and p[0] in (n[0], "?") and level(p[1:], n[1:])
+
+    def levels(p: list[str], n: list[str]) -> bool:
+        if not p:
+            return not n
+        if p[0] == "**":
+            return any(levels(p[1:], n[k:]) for k in range(len(n) + 1))
+        return bool(n) and level(p[0], n[0]) and levels(p[1:], n[1:])
+
+    path = tuple(part or "x" for part in name.split("/"))
+    asked = pattern.strip("/").split("/")
+    if "" in asked:
+        return  # an empty level is no pattern that anybody documents
+    wanted = any(levels(asked, list(path[:end])) for end in range(1, len(path) + 1))
+    assert matches(pattern, Instance(path, path, "p", np.eye(4))) == wanted
+
+
+def test_an_origin_in_degrees_is_refused() -> None:
+    """rpy is in rad: 90 is fourteen turns."""
+    with pytest.raises(ConfigError, match="more than a whole turn; is it in degrees"):
+        link_map({"links": {"a": {"parts": ["x"], "origin": {"rpy": [0, 0, 90]}}}})
+
+
+def far_frames(report: Any) -> list[str]:
+    """The warnings about frames in another unit."""
+    return [w.message for w in report.warnings if w.code == "frame_far"]
+
+
+def test_a_urdf_in_millimetres_is_doubted(assemble: Fixture) -> None:
+    """Joints at 120 m in an arm of half a metre; the same at 0.12 m are fine, and so is a far assembly frame."""
+    asm = assemble(("base/a", PART), ("arm/b", PART, placement((0, 0, 0.5))))
+    for factor, doubted in ((1.0, False), (1000.0, True)):
+        frames = {"base": np.eye(4), "arm": placement((0, 0, 0.12 * factor))}
+        task = Task(load_materials(freecad=False), frame=FrameChoice.URDF, urdf_frames=frames)
+        found = far_frames(calculate(asm, None, task))
+        assert bool(found) == doubted
+        assert not doubted or ("arm lies 119.5 m" in found[0] and "in mm?" in found[0])
+    far = assemble(("base/a", PART, placement((900, 0, 0))), ("arm/b", PART, placement((900, 0, 0.5))))
+    assert far_frames(calculate(far, None, Task(load_materials(freecad=False)))) == []
+    links = {"all": {"parts": ["**"], "origin": {"xyz": [0, 0, 300]}}}
+    assert far_frames(calculate(asm, None, Task(load_materials(freecad=False), links=links)))
+
+
+def test_a_urdf_in_degrees_is_doubted() -> None:
+    """A joint turned by 90 rad; one by half a turn is none."""
+    joint = '<joint name="j"><origin rpy="0 0 {}"/><parent link="a"/><child link="b"/></joint>'
+    robot = "<robot name='r'><link name='a'/><link name='b'/>" + joint + "</robot>"
+    (found,) = frame_doubts(robot.format(90).encode(), "r.urdf")
+    assert "a → b" in found
+    assert "rad" in found
+    assert frame_doubts(robot.format(3.1415927).encode()) == ()

@@ -14,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.inertia.bodies import box, placement
+from silo.inertia.geometry.graph import unique_names
 from silo.inertia.links import claim, link_map, read_link_map
 from silo.inertia.model import Assembly, Instance
 from silo.inertia.starting_map import as_map, as_yaml, starting_map
@@ -141,3 +142,27 @@ def test_real_files_are_given_to_links_whole(step_files: Path, tmp_path: Path) -
     for name in ("as1-oc-214.stp", "asm4_bearing.stp", "so101_wrist_roll_pitch.step"):
         assembly = read(step_files / name, options=ReadOptions(isolate=False, cache=False))
         read_back(assembly, tmp_path)
+
+
+ODD = st.text(
+    st.one_of(
+        st.sampled_from("ab*?|:#\"'\\ \n\x00\x07\x85\u2028\ud800\U0001f600\U00011af9ß[]{}&!>%@~"),
+        st.characters(),
+    ),
+    min_size=1,
+    max_size=6,
+)
+
+
+@given(st.lists(st.tuples(ODD, st.one_of(st.none(), ODD)), min_size=1, max_size=5))
+def test_whatever_parts_are_called_the_map_reads_back(
+    tmp_path_factory: pytest.TempPathFactory, names: list[tuple[str, str | None]]
+) -> None:
+    """Wildcards, quotes, control characters, halves of characters: each part is in its link, once."""
+    tops = unique_names([top for top, _ in names])
+    paths = [
+        (top,) if part is None else (top, *unique_names([part]))
+        for top, (_, part) in zip(tops, names, strict=True)
+    ]
+    instances = tuple(Instance(path, path, PART.key, placement()) for path in paths)
+    read_back(Assembly("odd", {PART.key: PART}, instances), tmp_path_factory.getbasetemp())

@@ -104,10 +104,10 @@ def _task(args: argparse.Namespace) -> Task:
     from silo.inertia.frames import FrameChoice
     from silo.inertia.links import ROOT_LINK, read_link_map
     from silo.inertia.massrule import Options
-    from silo.inertia.output.urdf import link_names, read_urdf, root_link, urdf_frames
+    from silo.inertia.output.urdf import frame_doubts, link_names, read_urdf, root_link, urdf_frames
 
     frame = FrameChoice(args.frame or ("urdf" if args.urdf else "assembly"))
-    frames, root = None, ROOT_LINK
+    frames, root, doubts = None, ROOT_LINK, ()
     if frame is FrameChoice.URDF and not args.urdf:
         raise InputError("--frame urdf needs --urdf FILE, whose joints say where the link frames are")
     if args.urdf:
@@ -115,6 +115,7 @@ def _task(args: argparse.Namespace) -> Task:
         link_names(data, args.urdf)  # a file that cannot be filled is told before anything else is read
         try:
             frames, root = urdf_frames(data, args.urdf), root_link(data, args.urdf)
+            doubts = frame_doubts(data, args.urdf)
         except InputError:
             # A xacro that is not expanded has no frames; who named another one does without the comparison.
             if frame is FrameChoice.URDF:
@@ -125,6 +126,7 @@ def _task(args: argparse.Namespace) -> Task:
         read_link_map(args.links) if args.links else None,
         frame,
         frames,
+        doubts,
         args.loose,
         root,
     )

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from silo.inertia.aggregate import chosen_frame, fill_links, tell_bom, tell_claims, tell_rows, tell_tensors
 from silo.inertia.bom import BOMEntry, BOMParser, BomTable, as_table
 from silo.inertia.codes import MassCode
@@ -38,6 +40,8 @@ class Task:
     urdf_frames
         link → (4, 4) placement in the assembly's frame, where a URDF is to be filled; used where ``frame``
         is URDF, else compared with.
+    urdf_doubts
+        what is odd about those, in sentences; each becomes a warning.
     loose_link
         a link that takes what no other claims; None: a map leaves such parts unclaimed.
     root_link
@@ -51,6 +55,7 @@ class Task:
     links: LinkMap | Mapping[str, Any] | None = None
     frame: FrameChoice = FrameChoice.ASSEMBLY
     urdf_frames: Mapping[str, Floats] | None = None
+    urdf_doubts: tuple[str, ...] = ()
     loose_link: str | None = None
     root_link: str = ROOT_LINK
     simulated: bool = True
@@ -63,7 +68,9 @@ def calculate(assembly: Assembly, table: BomTable | None, task: Task | None = No
     claims = _framed(_gathered(claims, task.loose_link), task)
     report = InertiaReport()
     _tell_frames(report, claims, task)
-    return _run(assembly, table, task, claims, report)
+    report = _run(assembly, table, task, claims, report)
+    _tell_far_frames(report, claims, task)
+    return report
 
 
 def _tell_frames(report: InertiaReport, claims: Claims, task: Task) -> None:
@@ -81,6 +88,30 @@ def _tell_frames(report: InertiaReport, claims: Claims, task: Task) -> None:
             )
             report.add_warning(name, "", words, MassCode.FRAME_DIFFERS)
 
+
+def _tell_far_frames(report: InertiaReport, claims: Claims, task: Task) -> None:
+    """Frames that a person wrote, far outside of the assembly: millimetres where metres are wanted."""
+    for words in task.urdf_doubts:
+        report.add_warning("", "", words, MassCode.FRAME_FAR)
+    if report.total is None or report.total.mass <= 0:
+        return
+    size = 2 * math.sqrt(float(np.abs(report.total.inertia).max()) / report.total.mass)
+    far = {}
+    for name, link in report.links.items():
+        written = link.frame.chosen or (task.frame is FrameChoice.URDF and name in (task.urdf_frames or {}))
+        distance = float(np.linalg.norm(link.props.com))
+        if written and link.props.mass > 0 and distance > FAR * size:
+            far[name] = distance
+    if far:
+        words = (
+            f"the frame of {', '.join(far)} lies {max(far.values()):.4g} m from the centre of mass, in an "
+            f"assembly of about {size:.3g} m: are its origins in mm? URDFs and link maps are in m"
+        )
+        report.add_warning("", "", words, MassCode.FRAME_FAR)
+
+
+FAR = 5.0
+"""Sizes of the assembly between a link's frame and its centre of mass, from where a unit is doubted."""
 
 FRAME_DISTANCE, FRAME_ANGLE = 1e-5, 1e-3
 """[m], [rad] up to which two frames are one; URDFs print few digits."""

@@ -32,6 +32,9 @@ from silo.inertia.core import Floats
 from silo.inertia.frames import ASSEMBLY_FRAME, LinkFrame, origin_frame
 from silo.inertia.model import Assembly, Instance
 
+MOST_RAD = 6.3
+"""Anybody's angle: a turn is 6.2832."""
+
 PRODUCT, PATH = "product:", "path:"
 ROOT_LINK = "base_link"
 """The usual name of a robot's first link (ROS REP 105)."""
@@ -95,13 +98,16 @@ def read_link_map(path: Path | str) -> LinkMap:
 
 
 def _yaml(text: str, source: str) -> Any:
-    """Plain values. YAML lets the last of two equal keys win, which would lose a link's parts in silence."""
+    """Plain values: texts, lists and dicts, for a link may be called ``on`` or ``1.10``.
+
+    YAML lets the last of two equal keys win, which would lose a link's parts in silence.
+    """
     import yaml
 
     try:
         tree = yaml.compose(text, Loader=yaml.SafeLoader)
         twice = _keys_given_twice(tree)
-        data = yaml.safe_load(text)
+        data = yaml.load(text, Loader=yaml.BaseLoader)
     except (yaml.YAMLError, RecursionError) as error:
         raise ConfigError(f"{source}: this is no YAML ({' '.join(str(error).split())})") from error
     if twice:
@@ -165,7 +171,7 @@ def _link(name: str, value: Any, problems: list[str]) -> Link:
     given: dict[str, Any] = value if isinstance(value, dict) else {"parts": value}
     parts = given.get("parts", [])
     patterns = [parts] if isinstance(parts, str) else parts
-    if not isinstance(patterns, list) or not patterns or not all(isinstance(p, str) for p in patterns):
+    if not isinstance(patterns, list) or not patterns or not all(p and isinstance(p, str) for p in patterns):
         problems.append(f"{name}: wanted a list of patterns, got {parts!r}")
         patterns = []
     for key in sorted(set(given) - {"parts", "frame", "origin"}):
@@ -189,6 +195,8 @@ def _origin(value: Mapping[str, Any]) -> Floats:
     rpy = [float(v) for v in value.get("rpy", (0, 0, 0))]
     if len(xyz) != 3 or len(rpy) != 3 or not np.isfinite([*xyz, *rpy]).all():
         raise ValueError("three numbers each")
+    if max(map(abs, rpy)) > MOST_RAD:
+        raise ValueError("rpy turns by more than a whole turn; is it in degrees?")
     return origin_frame(xyz, rpy)
 
 
@@ -303,4 +311,9 @@ def _level(level: str) -> str:
     """One level as a regular expression: ``*`` and ``?`` never cross a slash."""
     if level == "**":
         return _ANY
-    return re.escape(level).replace(r"\*", "[^/]*").replace(r"\?", "[^/]")
+    first, *others = (
+        re.escape(piece).replace(r"\?", "[^/]").replace(_ANY, r"\x00") for piece in re.split(r"\*+", level)
+    )
+    # The first place that fits a piece is as good as any later one, so no ``*`` is tried twice.
+    between = "".join(f"(?>[^/]*?{piece})" for piece in others[:-1])
+    return first + between + "".join(f"[^/]*{piece}" for piece in others[-1:])

@@ -7,7 +7,6 @@ sub-assemblies, else, for exports without any, by where the parts are.
 
 from __future__ import annotations
 
-import json
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -257,7 +256,8 @@ def _comment(text: str) -> str:
 
 
 def _quoted(text: str) -> str:
-    return json.dumps(text, ensure_ascii=not text.isprintable())
+    # JSON writes characters above U+FFFF as two halves, which are two characters to YAML.
+    return '"' + "".join(c if c.isprintable() and c not in '"\\' else f"\\U{ord(c):08X}" for c in text) + '"'
 
 
 def as_map(start: StartingMap, assembly: Assembly) -> LinkMap:

@@ -380,3 +380,15 @@ def test_point_masses_of_one_link_make_a_body(assemble: Fixture, compute: Fixtur
         report.links["l"].props.inertia
     )
     assert real_links(report)["l"].mass == 2.0
+
+
+@pytest.mark.parametrize("kind", ["urdf", "sdf", "mjcf"])
+def test_names_that_xml_cannot_hold_are_refused(kind: str) -> None:
+    """A control character or half a character makes a file that no reader opens; other alphabets are fine."""
+    props = MassProps(1.0, np.zeros(3), np.eye(3) * 0.01)
+    for bad in ("arm\x01", "\ud800", "a\ufffe"):
+        with pytest.raises(InputError, match="XML cannot hold"):
+            document({bad: props}, kind, "robot")
+    for good in ("Füße", "手首", "рука", 'a & <b> "c"', "😀"):
+        tree = ET.fromstring(document({good: props}, kind, "ro\x07bot").encode("utf-8"))  # noqa: S314
+        assert good in {element.get("name") for element in tree.iter()}

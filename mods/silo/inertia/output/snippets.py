@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from xml.sax.saxutils import quoteattr
 
@@ -66,6 +67,7 @@ _AROUND = {
     "sdf": ('<sdf version="1.9">\n<model name={}>', "</model>\n</sdf>"),
     "mjcf": ("<mujoco model={}>\n<worldbody>", "</worldbody>\n</mujoco>"),
 }
+_XML = re.compile("[\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]+")
 # Names that a format keeps for itself.
 _RESERVED = {"mjcf": {"world"}, "sdf": {"world"}}
 SNIPPETS = tuple(_FORMATS)
@@ -87,12 +89,18 @@ def document(links: Mapping[str, MassProps], kind: str, name: str) -> str:
     InputError where a link has a name that the format does not allow.
     """
     taken = _RESERVED.get(kind, set())
+    unwritable = [ascii(link) for link in links if not _XML.fullmatch(link)]
+    if unwritable:
+        raise InputError(
+            f"XML cannot hold the characters of the link {', '.join(unwritable)}; a link map can rename it"
+        )
     bad = [link for link in links if link in taken or (kind == "sdf" and ("::" in link or _is_dunder(link)))]
     if bad:
         raise InputError(
             f"{kind.upper()} does not allow a link with the name {', '.join(bad)}; a link map can rename it"
         )
-    title = name.replace("::", " ") if kind == "sdf" else name
+    title = "".join(c if _XML.fullmatch(c) else " " for c in name)
+    title = title.replace("::", " ") if kind == "sdf" else title
     start, end = _AROUND[kind]
     head = "" if kind == "mjcf" else '<?xml version="1.0"?>\n'
     return f"{head}{start.format(quoteattr(title or 'assembly'))}\n{snippets(links, kind)}{end}\n"

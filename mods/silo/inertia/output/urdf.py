@@ -20,7 +20,7 @@ import numpy as np
 from silo.bom.errors import InputError
 from silo.inertia.core import Floats, MassProps
 from silo.inertia.frames import origin_frame
-from silo.inertia.links import ROOT_LINK
+from silo.inertia.links import MOST_RAD, ROOT_LINK
 from silo.inertia.output.files import write_whole
 from silo.inertia.output.snippets import urdf_inertial
 
@@ -242,6 +242,25 @@ def urdf_frames(data: bytes, source: str = "URDF") -> dict[str, Floats]:
     reader = _Reader(data, source)
     above = _parents(reader)
     return {span.name: _placement(span.name, above, source) for span in reader.links}
+
+
+def frame_doubts(data: bytes, source: str = "URDF") -> tuple[str, ...]:
+    """What is odd about the joints' origins though it can be read: more than a turn is degrees."""
+    turned = [
+        f"{joint.parent} → {joint.child} (rpy=“{joint.rpy}”)"
+        for joint in _Reader(data, source).joints
+        if _turns(joint.rpy) > MOST_RAD
+    ]
+    if not turned:
+        return ()
+    return (f"{source}: joints that turn by more than a whole turn: {', '.join(turned)}; rpy is in rad",)
+
+
+def _turns(rpy: str) -> float:
+    try:
+        return max((abs(float(value)) for value in rpy.split()), default=0.0)
+    except ValueError:
+        return 0.0
 
 
 def root_link(data: bytes, source: str = "URDF") -> str:
