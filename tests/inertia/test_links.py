@@ -308,7 +308,7 @@ def far_frames(report: Any) -> list[str]:
 
 
 def test_a_urdf_in_millimetres_is_doubted(assemble: Fixture) -> None:
-    """Joints at 120 m in an arm of half a metre; the same at 0.12 m are fine, and so is a far assembly frame."""
+    """Joints at 120 m in an arm of half a metre; 0.12 m are fine, and so is a far assembly frame."""
     asm = assemble(("base/a", PART), ("arm/b", PART, placement((0, 0, 0.5))))
     for factor, doubted in ((1.0, False), (1000.0, True)):
         frames = {"base": np.eye(4), "arm": placement((0, 0, 0.12 * factor))}
