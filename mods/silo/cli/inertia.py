@@ -107,7 +107,8 @@ def _task(args: argparse.Namespace) -> Task:
     from silo.inertia.output.urdf import frame_doubts, link_names, read_urdf, root_link, urdf_frames
 
     frame = FrameChoice(args.frame or ("urdf" if args.urdf else "assembly"))
-    frames, root, doubts = None, ROOT_LINK, ()
+    frames, root = None, ROOT_LINK
+    doubts: tuple[str, ...] = ()
     if frame is FrameChoice.URDF and not args.urdf:
         raise InputError("--frame urdf needs --urdf FILE, whose joints say where the link frames are")
     if args.urdf:
