@@ -80,6 +80,7 @@ def test_the_type_is_the_documents() -> None:
         ("MainBolts", False, "F01"),
         ("Housing", False, "M01"),
         ("Gearbox", True, "A01"),
+        ("Top product", False, "M01"),
     ],
 )
 def test_the_category_fits_the_name_and_the_type(document: str, is_assembly: bool, category: str) -> None:

@@ -193,6 +193,53 @@ def test_freecadcmd_alone_syncs_and_reports(vault: Vault, version: str, tmp_path
     assert again.returncode == 0, again.stdout
 
 
+# FreeCAD runs this within a function, so that what it imports is not known in methods.
+DEADLY = """
+import FreeCAD
+
+
+class Deadly:
+    def slotCreatedObject(self, obj):
+        import os
+        import signal
+
+        name = obj.Document.FileName
+        if "deadly" in name:
+            os.kill(os.getpid(), signal.SIGSEGV)
+        if "patient" in name:
+            report = os.environ["SILO_WATCHED"]
+            with open(report) as file, open(report + ".seen", "w") as seen:
+                seen.write(file.read())
+
+
+FreeCAD.addDocumentObserver(Deadly())
+"""
+
+
+@pytest.mark.parametrize("version", WANTED)
+def test_freecad_that_dies_of_a_file_loses_that_one_only(vault: Vault, version: str, tmp_path: Path) -> None:
+    """The run goes on in a new process, and what is done is in the reports while it runs."""
+    freecad = machines.need(version)
+    profile = freecad.profile(tmp_path / "profile", dependencies=True)
+    deadly = tmp_path / "profile" / "Mod" / "Deadly"
+    deadly.mkdir(parents=True)
+    (deadly / "Init.py").write_text(DEADLY)
+    for name in ("aaa deadly", "zz patient"):
+        shutil.copy(vault.folder / "top.FCStd", vault.folder / f"{name}.FCStd")
+    report = tmp_path / "out.json"
+    args = {"tops": ["vault"], "json": "out.json", "report": "out.md"}
+    env = {**profile, **vault.env, "SILO_ARGS": json.dumps(args), "SILO_WATCHED": str(report)}
+    done = freecad.run(HEADLESS, env, cwd=tmp_path)
+    assert done.returncode == 1, done.stdout
+    results = {Path(one["top"]).stem: one for one in json.loads(report.read_text())["results"]}
+    assert len(results) == 6
+    assert "FreeCAD died" in results["aaa deadly"]["error"]["message"]
+    assert results["top"]["assemblies"][0]["status"] == "merged"
+    early = json.loads((tmp_path / "out.json.seen").read_text())["results"]
+    assert Path(early[0]["top"]).stem == "aaa deadly"
+    assert len(early) < len(results)
+
+
 @pytest.mark.parametrize(
     ("moods", "code", "words"),
     [

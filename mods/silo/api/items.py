@@ -11,9 +11,10 @@ from silo.api.bodies import ItemBody, ItemChanges, NumberAnswer, NumberBody, Uui
 from silo.api.caller import LISTS, Caller, Params
 from silo.api.failures import translated
 from silo.api.replies import Reply, WebPageError
-from silo.api.schemas import categories_of, schema_names
+from silo.api.schemas import categories_of, rules_of, schema_names
 from silo.api.transport import Cancel
 from silo.api.wire import Item
+from silo.bom.categories import Categories
 from silo.bom.errors import (
     InputError,
     NotFoundError,
@@ -209,9 +210,10 @@ class ItemCalls(Caller):
             "--schema, or in the Silo preferences"
         ) from missing
 
-    def categories(self, name: str = "kindred-rd") -> dict[str, str]:
-        """The categories of a schema: code → description, in the schema's order."""
-        return categories_of(self.get_schema(name))
+    def categories(self, name: str = "kindred-rd") -> Categories:
+        """The categories of a schema: code → description, in the schema's order, with the site's rules."""
+        schema = self.get_schema(name)
+        return Categories(categories_of(schema), rules_of(schema))
 
     def get_schema_form(self, name: str = "kindred-rd", category: str | None = None) -> dict[str, Any]:
         """The form descriptor of a schema; from a server before February 2026 its properties instead."""

@@ -4,7 +4,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from typing import Any
+
+from silo.bom.categories import Rule
+from silo.bom.errors import InputError
 
 
 def categories_of(schema: Mapping[str, Any]) -> dict[str, str]:
@@ -52,3 +56,16 @@ def _read(values: Any) -> Iterator[tuple[str, str]]:
             body = body.get("description") or body.get("name") or body.get("label") or ""
         if code:
             yield str(code), str(body) if body != code else ""
+
+
+def rules_of(schema: Mapping[str, Any]) -> tuple[Rule, ...]:
+    """The site's rules for categories (``category_rules``); a rule that cannot be read is left out.
+
+    They only propose, so that a server with other rules, or none, costs a question and no more.
+    """
+    found = []
+    raw = schema.get("category_rules")
+    for one in raw if isinstance(raw, list) else ():
+        with suppress(InputError):
+            found.append(Rule.read(one))
+    return tuple(found)

@@ -13,32 +13,34 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from silo.bom.categories import proposed_category
 from silo.bom.identity import walk_entries
 from silo.bom.model import BomEntry
 
 _MOST_READ = 2000
 _SUFFIX = re.compile(r"\.fcstd$", re.IGNORECASE)
-_WORD = re.compile(r"[^\W\d_]{3,}")
-# BasePlate is two words.
-_HUMP = re.compile(r"(?<=[a-z])(?=[A-Z])")
 # Labels that FreeCAD gives by itself say nothing of the part.
 _GENERIC = re.compile(
     r"(?:body|part|assembly|model|unnamed|link|compound|solid|fusion|cut)[ _]?\d*$", re.IGNORECASE
 )
-_STANDARD_WORDS = ("fastener", "screw", "hardware", "standard part", "purchased", "bought")
-# In the order of preference, for components whose name fits no category.
-_PART_WORDS = ("part", "machin", "custom", "manufactur", "component", "mechanic")
 
 
 @dataclass(frozen=True)
 class Proposal:
-    """How a component would be registered. ``shares_file``: its file gives other components too."""
+    """How a component would be registered.
+
+    shares_file
+        its file gives other components too.
+    is_guess
+        the category was found by little: a person has to look at it first.
+    """
 
     entry: BomEntry
     name: str
     item_type: str
     category: str
     shares_file: bool = False
+    is_guess: bool = False
 
 
 def is_generic(label: str) -> bool:
@@ -87,46 +89,17 @@ def display_name(entry: BomEntry) -> str:
     return label if label and not _GENERIC.match(label) else clean_name(entry.document_label) or label
 
 
-def _stems(text: str) -> set[str]:
-    words = {word.casefold() for word in _WORD.findall(_HUMP.sub(" ", text))}
-    return {word[:-1] if word.endswith("s") and len(word) > 3 else word for word in words}
-
-
-def proposed_category(entry: BomEntry, name: str, categories: Mapping[str, str]) -> str:
-    """The category code that fits best; "" where there is none to choose from.
-
-    categories
-        code → description, in the schema's order.
-    """
-    of_assemblies = {code for code, text in categories.items() if "assembl" in text.casefold()}
-    fitting = [code for code in categories if (code in of_assemblies) == entry.is_assembly]
-    if not fitting:
-        return next(iter(categories), "")
-    for wanted in _STANDARD_WORDS if entry.standard else ():
-        for code in fitting:
-            if wanted in categories[code].casefold():
-                return code
-    words = _stems(name)
-    scored = [(len(words & _stems(categories[code])), code) for code in fitting]
-    best = max(score for score, _ in scored)
-    if best and not entry.is_assembly:
-        return next(code for score, code in scored if score == best)
-    for wanted in () if entry.is_assembly else _PART_WORDS:
-        for code in fitting:
-            if wanted in categories[code].casefold():
-                return code
-    return fitting[0]
-
-
 def propose(entry: BomEntry, categories: Mapping[str, str], *, shares_file: bool = False) -> Proposal:
     """Type from the document, name from the label, category from the schema."""
     name = proposed_name(entry, shares_file=shares_file)
+    guess = proposed_category(entry, name, categories)
     return Proposal(
         entry=entry,
         name=name,
         item_type="assembly" if entry.is_assembly else "part",
-        category=proposed_category(entry, name, categories),
+        category=guess.code,
         shares_file=shares_file,
+        is_guess=not guess.is_sure,
     )
 
 

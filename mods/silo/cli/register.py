@@ -236,6 +236,10 @@ def _asker(how: str) -> Ask:
     return ask
 
 
+def _guess(proposal: Proposal) -> str:
+    return " (a guess)" if proposal.is_guess else ""
+
+
 def _ask(proposals: Sequence[Proposal], base: str) -> list[Proposal]:
     chosen: list[Proposal] = []
     for number, proposal in enumerate(proposals, start=1):
@@ -243,7 +247,8 @@ def _ask(proposals: Sequence[Proposal], base: str) -> list[Proposal]:
         what = proposal.entry.standard or f"{where}#{proposal.entry.object_name}"
         question = (
             f"[{number}/{len(proposals)}] {what}: register as "
-            f"{proposal.item_type} {proposal.name!r} in category {proposal.category}? [Y/n/q/new name] "
+            f"{proposal.item_type} {proposal.name!r} in category {proposal.category}{_guess(proposal)}? "
+            "[Y/n/q/new name] "
         )
         try:
             answer = input(question).strip()
@@ -283,7 +288,7 @@ def _tell(
     for result in done:
         name = show.plain(result.proposal.name)
         if result.error is None:
-            out.print(f"✓ {result.part_number}  {name}", markup=False)
+            out.print(f"✓ {result.part_number}  {name}{_guess(result.proposal)}", markup=False)
         else:
             out.print(f"✗ {name}: {show.plain(str(result.error))}", style="red", markup=False)
     for proposal in skipped:
@@ -329,6 +334,7 @@ def _row(proposal: Proposal, base: str, result: Registration | None = None) -> M
         "name": proposal.name,
         "item_type": proposal.item_type,
         "category": proposal.category,
+        "guess": proposal.is_guess,
     }
     if result is not None and result.error is None:
         row |= {"part_number": result.part_number, "silo_uuid": result.item_id}

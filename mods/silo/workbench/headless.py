@@ -19,8 +19,9 @@ from __future__ import annotations
 import json
 import os
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -74,11 +75,11 @@ class Job:
         tops = data.get("tops")
         if not isinstance(tops, list) or not tops or not all(isinstance(top, str) and top for top in tops):
             raise InputError('SILO_ARGS: "tops" must be a list of files and folders, and not an empty one')
-        for field in fields(cls)[1:]:
-            wanted = bool if field.default is False else str
-            if field.name in data and not isinstance(data[field.name], wanted):
+        for known in fields(cls)[1:]:
+            wanted = bool if known.default is False else str
+            if known.name in data and not isinstance(data[known.name], wanted):
                 kind = "true or false" if wanted is bool else "a text"
-                raise InputError(f'SILO_ARGS: "{field.name}" must be {kind}, got {data[field.name]!r}')
+                raise InputError(f'SILO_ARGS: "{known.name}" must be {kind}, got {data[known.name]!r}')
         return cls(**{**data, "tops": tuple(tops)})
 
 
@@ -180,18 +181,67 @@ def _sync(job: Job) -> int:
         dry_run=job.dry_run,
         skip_parts=any(os.path.isdir(top) for top in job.tops),
     )
-    results: list[TopResult] = []
+    reports = Reports(job)
     with client:
-        for number, (top, found) in enumerate(_extractions(tops, job), start=1):
-            results.append(sync_top(top, found, client, options))
-            host.message(f"Silo: [{number}/{len(tops)}] {_in_words(results[-1])}")
-            if (stopped := stopped_by(results[-1], client)) is not None:
-                results += [TopResult(left, error=stopped) for left in tops[number:]]
+        for number, (top, found) in enumerate(_each(tops, job), start=1):
+            reports.add(sync_top(top, found, client, options))
+            host.message(f"Silo: [{number}/{len(tops)}] {_in_words(reports.results[-1])}")
+            if (stopped := stopped_by(reports.results[-1], client)) is not None:
+                for left in tops[number:]:
+                    reports.results.append(TopResult(left, error=stopped))
                 if tops[number:]:
                     host.message(f"Silo: {len(tops) - number} more not tried: {stopped}")
                 break
-    _write_reports(job, results)
-    return exit_code(results)
+    reports.write()
+    return exit_code(reports.results)
+
+
+def _each(tops: list[str], job: Job) -> Iterator[tuple[str, Extraction | SiloError]]:
+    """The BOM of each file, read by a FreeCAD of its own: where that dies of a file, another reads the rest.
+
+    Where this program cannot start itself anew, the files are read in here.
+    """
+    from silo.freecadcmd.run import run_freecad
+    from silo.workbench.freecad import host
+
+    done = 0
+    try:
+        for top, result in run_freecad(
+            tops, job.assembly, command=host.program(), hardware=not job.no_hardware
+        ):
+            done += 1
+            yield top, result
+    except ConfigError:
+        yield from _extractions(tops[done:], job)
+
+
+@dataclass
+class Reports:
+    """The reports of a run, written while it goes: what is done is in them, whatever comes after."""
+
+    job: Job
+    results: list[TopResult] = field(default_factory=list)
+    _next: float = 0.0
+
+    def add(self, result: TopResult) -> None:
+        """One more file is done."""
+        self.results.append(result)
+        begin = time.monotonic()
+        if begin >= self._next:
+            self.write()
+            # A long run has long reports: they take a tenth of its time at most.
+            took = time.monotonic() - begin
+            self._next = begin + 10 * took
+
+    def write(self) -> None:
+        """All that is done so far."""
+        from silo.batch import result_json
+        from silo.batch_report import markdown
+
+        if self.job.json is not None:
+            _write_json(self.job.json, {"results": [result_json(result) for result in self.results]})
+        if self.job.report is not None:
+            _write_text(self.job.report, markdown(self.results))
 
 
 def _client() -> Any:
@@ -215,7 +265,7 @@ def _without_server(job: Job, error: ImportError) -> int:
             {"top": top, "error": error_json(found)}
             if isinstance(found, SiloError)
             else {"top": top, "bom": bom_json(found)}
-            for top, found in _extractions(documents_in(job.tops), job)
+            for top, found in _each(documents_in(job.tops), job)
         ]
         _write_json(job.json, {"results": results})
         told = ConfigError(f"{told}. The BOMs themselves were written to {job.json}")
@@ -223,7 +273,19 @@ def _without_server(job: Job, error: ImportError) -> int:
 
 
 def _write_json(path: str, data: Any) -> None:
-    Path(path).write_text(json.dumps(data, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    _write_text(path, json.dumps(data, indent=2, ensure_ascii=False) + "\n")
+
+
+def _write_text(path: str, text: str) -> None:
+    """Whole or not at all: a run that dies while it writes leaves the report before."""
+    from silo.durable import replacing
+
+    target = Path(path)
+    if target.exists() and not target.is_file():  # a terminal, a pipe
+        target.write_text(text, encoding="utf-8")
+        return
+    with replacing(target, mode=0o644) as file:
+        file.write(text.encode())
 
 
 def _in_words(result: TopResult) -> str:
@@ -243,16 +305,6 @@ def _outcome_words(outcome: Outcome) -> str:
         reasons += [finding.message for finding in blocking(outcome.resolved)]
     reasons += unusual(outcome.result)
     return f"{text} ({'; '.join(reasons)})" if reasons else text
-
-
-def _write_reports(job: Job, results: list[TopResult]) -> None:
-    from silo.batch import result_json
-    from silo.batch_report import markdown
-
-    if job.json is not None:
-        _write_json(job.json, {"results": [result_json(result) for result in results]})
-    if job.report is not None:
-        Path(job.report).write_text(markdown(results), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -3,18 +3,23 @@
 
 from __future__ import annotations
 
+import logging
+import os
 import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cache
 from importlib import resources
+from pathlib import Path
 from typing import Any
 
-from silo.bom.errors import NotFoundError, RejectedError
+from silo.bom.categories import Rule
+from silo.bom.errors import ConfigError, InputError, NotFoundError, RejectedError
 from silo.bom.numbers import plain, read_number
 
 DEFAULT_SCHEMA = "kindred-rd"
+_log = logging.getLogger(__name__)
 ITEM_TYPES = ("part", "assembly", "consumable", "tool")
 SOURCING_TYPES = ("manufactured", "purchased")
 
@@ -166,7 +171,44 @@ def describe(schema: Schema) -> dict[str, Any]:
             {"name": "sequence", "type": "serial", "length": schema.serial_digits, "scope": "category"},
         ],
         "domains": dict(schema.domains),
+        "category_rules": _rules_or_none(schema),
     }
+
+
+def _rules_or_none(schema: Schema) -> list[Mapping[str, Any]]:
+    """A wrong file costs the proposals, not the schema."""
+    try:
+        return category_rules(schema)
+    except ConfigError as error:
+        _log.warning("category rules are not used: %s", error)
+        return []
+
+
+RULES = "SILO_CATEGORY_RULES"
+"""Names a TOML file with the site's own rules, in place of those beside the schema."""
+
+
+def category_rules(schema: Schema, env: Mapping[str, str] = os.environ) -> list[Mapping[str, Any]]:
+    """Which category a name of a part stands for: of the site's file, else of the one beside the schema.
+
+    Read anew each time, so that an edit counts at once. ConfigError where the site's file is wrong.
+    """
+    path = env.get(RULES)
+    if path:
+        try:
+            text = Path(path).read_text("utf-8")
+        except OSError as error:
+            raise ConfigError(f"{RULES}: {path} cannot be read: {error.strerror}") from error
+    else:
+        path = "category_rules.toml"
+        text = resources.files("silo_server.schema").joinpath(path).read_text("utf-8")
+    try:
+        rules = tomllib.loads(text).get("rules", [])
+        for rule in rules:
+            schema.category(Rule.read(rule).category)
+    except (tomllib.TOMLDecodeError, InputError, RejectedError, TypeError) as error:
+        raise ConfigError(f"{path}: {error}") from error
+    return list(rules)
 
 
 def describe_form(schema: Schema) -> dict[str, Any]:

@@ -107,7 +107,7 @@ def checked(window: Any) -> list[str]:
 def unregistered(one: Any) -> None:
     """A commit of an assembly without a number: its comment goes along with its registration."""
     close_all()
-    doc = assembly("New", ("P", part("Fresh"), 0)).Document
+    doc = assembly("New", ("P", part("FreshPlate"), 0)).Document
     doc.getObject("P").Label = "The part"
     App.setActiveDocument(doc.Name)
 

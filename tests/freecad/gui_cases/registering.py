@@ -64,6 +64,10 @@ def story() -> None:
             for row in dialog.rows
         }
     )
+    for row in range(len(dialog.rows)):
+        if dialog.rows[row].guesses:
+            # A guess is registered where a person says so.
+            dialog.table.item(row, COMPONENT).setCheckState(QtCore.Qt.CheckState.Checked)
     uncheck(dialog, "Construction.FCStd")
     rename(dialog, "MotorMount.FCStd", "Motor mount")
     dialog.register_button.click()

@@ -13,6 +13,7 @@ from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.model import BomEntry, Extraction
 from silo.testing import FakeSilo
 from silo.workbench.register.registering import Candidate, Offer, Seen, State, offer
+from silo.workbench.register.rows import EditedRow
 from silo.workbench.session.jobs import Control
 
 CONTROL = Control(lambda _detail, _fraction: None)
@@ -60,36 +61,48 @@ def test_an_item_registered_from_this_very_file_is_found(tmp_path: Path) -> None
 def test_an_item_with_the_same_name_is_told_and_stays_a_suggestion(tmp_path: Path) -> None:
     """One that only begins so is another part."""
     silo = FakeSilo()
-    same = silo.create_item("kindred-rd", "M01", "base plate")
-    silo.create_item("kindred-rd", "M01", "Base Plate Long")
-    candidate = offered(silo, tmp_path, part(tmp_path, "Base Plate"))["Base Plate"]
+    same = silo.create_item("kindred-rd", "M01", "base part")
+    silo.create_item("kindred-rd", "M01", "Base Part Long")
+    candidate = offered(silo, tmp_path, part(tmp_path, "Base Part"))["Base Part"]
     assert [(s.part_number, s.same_file) for s in candidate.similar] == [(same.part_number, False)]
     assert candidate.wanted
 
 
 def test_states_that_need_a_person_are_not_checked(tmp_path: Path) -> None:
     """Each row has its state, and the others are not touched by it."""
-    entries = [part(tmp_path, name) for name in ("Ready", "Fixed", "Half", "Open")]
+    entries = [part(tmp_path, f"{name} part") for name in ("Ready", "Fixed", "Half", "Open")]
     found = offered(
         FakeSilo(),
         tmp_path,
         *entries,
-        Fixed=State.READ_ONLY,
-        Half=State.PARTIAL,
-        Open=State.ELSEWHERE,
+        **{
+            "Fixed part": State.READ_ONLY,
+            "Half part": State.PARTIAL,
+            "Open part": State.ELSEWHERE,
+        },
     )
     assert {name: c.wanted for name, c in found.items()} == {
-        "Ready": True,
-        "Fixed": False,
-        "Half": False,
-        "Open": False,
+        "Ready part": True,
+        "Fixed part": False,
+        "Half part": False,
+        "Open part": False,
     }
     assert {name: c.state.usable for name, c in found.items()} == {
-        "Ready": True,
-        "Fixed": False,
-        "Half": False,
-        "Open": True,
+        "Ready part": True,
+        "Fixed part": False,
+        "Half part": False,
+        "Open part": True,
     }
+
+
+def test_a_guessed_category_is_not_checked(tmp_path: Path) -> None:
+    """A person looks at it first; the others of the assembly are offered as they were."""
+    found = offered(FakeSilo(), tmp_path, part(tmp_path, "Thing"), part(tmp_path, "Milled part"))
+    assert {name: c.wanted for name, c in found.items()} == {"Thing": False, "Milled part": True}
+    row = EditedRow.of(found["Thing"])
+    assert row.guesses
+    row.checked = True
+    assert not row.guesses
 
 
 def test_two_files_of_one_content_are_told_of_each_other(tmp_path: Path) -> None:

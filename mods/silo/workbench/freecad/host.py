@@ -39,6 +39,17 @@ def version() -> tuple[int, int]:
     return int(told[0]), int(told[1])
 
 
+def program() -> str:
+    """The command line program that runs this FreeCAD. ConfigError where it cannot be told."""
+    from silo.bom.errors import ConfigError
+
+    homes = (sys.executable, os.path.join(FreeCAD.getHomePath(), "bin", "freecadcmd"))
+    for path in (*homes, f"{homes[1]}.exe"):
+        if "freecadcmd" in os.path.basename(path or "").lower() and os.path.isfile(path):
+            return path
+    raise ConfigError("FreeCAD does not say which program runs it")
+
+
 def user_data_folder() -> str:
     """FreeCAD's folder for the user's data, add-ons and Python packages."""
     return str(FreeCAD.getUserAppDataDir())

@@ -214,6 +214,8 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
     def _look(self, row: EditedRow, number_text: str) -> _Look:
         note, tone = row.note()
         category = self._categories.get(row.category, row.category)
+        if row.guesses:
+            category = translate("Silo", "guess: {category}").replace("{category}", category)
         kind = self._types.get(row.item_type, row.item_type)
         return _Look(
             texts=(row.component(), row.name, kind, category, number_text, note),
@@ -302,7 +304,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         elif column == NUMBER and chosen:
             choose(self._rows, row, chosen)
         elif column == CATEGORY and chosen:
-            row.category = chosen
+            row.category, row.checked = chosen, row.can_register
             self._need_number(chosen)
         self._refresh()
 

@@ -113,6 +113,8 @@ class Candidate:
     def wanted(self) -> bool:
         """Checked to begin with? Not where a person has to look first."""
         fine = self.state.usable and self.state is not State.ELSEWHERE
+        if self.proposal.is_guess:
+            return False
         return fine and not self.same_as and not any(s.same_file for s in self.similar)
 
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from silo.bom.naming import proposed_category
+from silo.bom.categories import proposed_category
 from silo.registration import Registration
 from silo.workbench.pane.activity import Tone
 from silo.workbench.register.registering import Candidate, Order, Similar, State, state_words
@@ -98,6 +98,14 @@ class EditedRow:
         """The row as an order for the worker."""
         existing = next((s for s in self.candidate.similar if s.part_number == self.number), None)
         return Order(self.candidate, self.name.strip(), self.item_type, self.category, existing)
+
+    @property
+    def guesses(self) -> bool:
+        """True while its category is one that nobody has looked at."""
+        same = self.category == self.candidate.proposal.category
+        return (
+            self.candidate.proposal.is_guess and same and not (self.checked or self.finished or self.running)
+        )
 
     def component(self) -> str:
         """Which component this is."""
@@ -208,7 +216,7 @@ def retype(row: EditedRow, item_type: str, categories: Mapping[str, str]) -> Non
 
     def proposed(kind: str) -> str:
         entry = replace(row.candidate.entry, is_assembly=kind == "assembly")
-        return proposed_category(entry, row.name, categories)
+        return proposed_category(entry, row.name, categories).code
 
     was = row.item_type
     row.item_type = item_type
