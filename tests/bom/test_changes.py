@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from hypothesis import given
 from hypothesis import strategies as st
 
-from silo.bom.changes import Assembly, changes_json, compare_assemblies
+from silo.bom.changes import Assembly, changes_json, compare_assemblies, compare_three
 from silo.bom.model import BomEntry
 
 
@@ -114,3 +114,56 @@ def test_the_changes_turn_the_old_state_into_the_new_one(old: list[Assembly], ne
         else:
             assert lines == {}
     assert state == {a.head.key: {line.key: line.quantity for line in a.lines} for a in new}
+
+
+# --- three states ----------------------------------------------------------------------------------------
+
+
+def three(base: Assembly | None, theirs: Assembly, mine: Assembly) -> dict[str, tuple[float, float, float]]:
+    return {row.entry.doc_path: row.quantities for row in compare_three(base, theirs, mine)}
+
+
+def test_what_two_people_did_to_one_assembly() -> None:
+    """What mine would undo comes first; what nobody changed is not in it."""
+    base = assembly("top", entry("a", 4), entry("b"), entry("c"), entry("same"))
+    theirs = assembly("top", entry("b"), entry("c", 2), entry("same"), entry("new"))
+    mine = assembly("top", entry("a", 4), entry("c", 3), entry("same"))
+    rows = compare_three(base, theirs, mine)
+    assert three(base, theirs, mine) == {"a": (4, 0, 4), "c": (1, 2, 3), "new": (0, 1, 0), "b": (1, 1, 0)}
+    assert [(row.entry.doc_path, row.undoes) for row in rows][-1] == ("b", False)
+    assert all(row.undoes for row in rows[:-1])
+
+
+def test_a_part_that_both_added_or_moved_is_one_line() -> None:
+    """By its identity, wherever its file is."""
+    base = assembly("top", entry("a", uuid="A"))
+    theirs = assembly("top", entry("x/a", uuid="A"), entry("n", 2, uuid="N"))
+    mine = assembly("top", entry("a", uuid="A"), entry("m", 3, uuid="N"))
+    assert three(base, theirs, mine) == {"m": (0, 2, 3)}
+
+
+def test_without_a_base_it_is_what_the_two_differ_in() -> None:
+    """Who changed it is not known."""
+    theirs, mine = assembly("top", entry("a"), entry("b")), assembly("top", entry("a"), entry("c", 2))
+    assert three(None, theirs, mine) == {"b": (0, 1, 0), "c": (0, 0, 2)}
+
+
+QUANTITIES = st.dictionaries(st.sampled_from("abcd"), st.integers(1, 3))
+
+
+@given(QUANTITIES, QUANTITIES, QUANTITIES)
+def test_every_change_of_theirs_that_mine_does_not_have_is_named(
+    base: dict[str, int], theirs: dict[str, int], mine: dict[str, int]
+) -> None:
+    """A law: the lines that would be undone are exactly those that they changed and mine has otherwise."""
+
+    def state(lines: dict[str, int]) -> Assembly:
+        return assembly("top", *(entry(name, quantity) for name, quantity in lines.items()))
+
+    rows = compare_three(state(base), state(theirs), state(mine))
+    undone = {row.entry.doc_path for row in rows if row.undoes}
+    names = {*base, *theirs, *mine}
+    assert undone == {n for n in names if theirs.get(n) != base.get(n) and theirs.get(n) != mine.get(n)}
+    assert {row.entry.doc_path for row in rows} == {
+        n for n in names if not base.get(n) == theirs.get(n) == mine.get(n)
+    }

@@ -18,7 +18,8 @@ from silo.bom.model import BomEntry, Extraction
 from silo.outbox.send import Sent
 from silo.registration import Registration
 from silo.testing import FakeSilo
-from silo.workbench.commit.desk import Answer
+from silo.workbench.commit.desk import Answer, Look
+from silo.workbench.commit.opened import Base, stamp_of
 from silo.workbench.commit.plan import Plan
 from silo.workbench.commit.snapshot import Snapshot
 from silo.workbench.preview.rows import Preview
@@ -93,12 +94,20 @@ class Document:
     def Label(self) -> str:
         return self.Name
 
+    @property
+    def Meta(self) -> dict[str, str]:
+        return {"SiloUUID": self.identity}
+
 
 @dataclass
 class Documents:
     """Saving writes a new file and renames it, as FreeCAD does."""
 
     saved: list[str] = field(default_factory=list)
+    bases: dict[str, Base] = field(default_factory=dict)
+
+    def base(self, doc: Any, /) -> Base:
+        return self.bases.setdefault(doc.Name, Base(doc.FileName, stamp_of(doc.FileName)))
 
     def linked(self, doc: Any, /) -> list[Any]:
         return [doc, *(found for below in doc.OutList for found in self.linked(below))]
@@ -123,7 +132,9 @@ class Documents:
             raise ReferenceError("Cannot access attribute of deleted object")
         new = Path(doc.FileName + ".new")
         new.write_bytes(doc.content)
+        self.base(doc)
         new.replace(doc.FileName)
+        self.base(doc).stamp = stamp_of(doc.FileName)
         doc.changed = False
         self.saved.append(doc.Name)
 
@@ -201,6 +212,7 @@ class Desk:
     asked: list[str] = field(default_factory=list)
     comments: list[str] = field(default_factory=list)
     willing: bool = True
+    decide: Callable[[Plan, Look], Answer | None] | None = None
     open: list[Document] = field(default_factory=list)
     previews: list[PreviewWindow] = field(default_factory=list)
     registers: list[RegisterWindow] = field(default_factory=list)
@@ -253,9 +265,11 @@ class Desk:
     def identity(self, doc: Any) -> str | None:
         return str(doc.identity) or None
 
-    def ask(self, planned: Plan, note: str, comment: str) -> Answer | None:
+    def ask(self, planned: Plan, note: str, comment: str, look: Look) -> Answer | None:
         self.asked.append(note)
         self.comments.append(comment)
+        if self.decide is not None:
+            return self.decide(planned, look)
         answer = Answer(planned.wanted, comment or "a comment", planned.unregistered)
         return answer if self.willing else None
 

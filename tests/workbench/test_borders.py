@@ -122,6 +122,8 @@ def test_the_start_loads_next_to_nothing() -> None:
     assert ours == {
         "addon",
         "commands",
+        "commit",
+        "commit.opened",
         "dependencies",
         "freecad",
         "freecad.host",

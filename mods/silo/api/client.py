@@ -29,7 +29,7 @@ from silo.api.sse import ServerEvent
 from silo.api.stream import SILENCE, HttpEventStream, open_stream
 from silo.api.transport import Call, Cancel, Timeouts, Transport, stop_if
 from silo.api.wire import Origin, Revision, ServerState, User
-from silo.bom.errors import RouteMissingError, ServerFaultError, SiloError
+from silo.bom.errors import NotFoundError, RejectedError, RouteMissingError, ServerFaultError, SiloError
 
 _PAGE = 1000  # revisions in one answer
 
@@ -253,6 +253,13 @@ class SiloClient(ItemCalls, BomCalls):
         return files.download(
             self._transport, part_number, Path(path), revision, on_progress, cancelled=cancelled
         )
+
+    def thumbnail(self, part_number: str, /) -> bytes | None:
+        """The picture of an item as PNG; None where there is none, or the server keeps none."""
+        try:
+            return self._get(f"the picture of {part_number}", "items", part_number, "thumbnail").content
+        except (NotFoundError, RejectedError, ServerFaultError):
+            return None
 
     def open_events(self, last_event_id: str | None = None) -> HttpEventStream:
         """Open the event stream; :class:`silo.api.events.EventListener` keeps one open for good."""

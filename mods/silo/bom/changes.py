@@ -90,6 +90,71 @@ def compare_assemblies(old: Sequence[Assembly], new: Sequence[Assembly]) -> tupl
     return (*found, *gone)
 
 
+@dataclass(frozen=True, slots=True)
+class ThreeLines:
+    """A line in three states of an assembly: as two people opened it, as one left it, as the other did.
+
+    None where the state has no such line.
+    """
+
+    base: BomEntry | None
+    theirs: BomEntry | None
+    mine: BomEntry | None
+
+    @property
+    def entry(self) -> BomEntry:
+        """The component, by the newest state that has it."""
+        found = self.mine or self.theirs or self.base
+        assert found is not None  # one of them is always there
+        return found
+
+    @property
+    def quantities(self) -> tuple[float, float, float]:
+        """Of base, theirs and mine; 0 where there is no line."""
+        base, theirs, mine = (
+            entry.quantity if entry is not None else 0 for entry in (self.base, self.theirs, self.mine)
+        )
+        return base, theirs, mine
+
+    @property
+    def by_them(self) -> bool:
+        """They changed it."""
+        return self.quantities[1] != self.quantities[0]
+
+    @property
+    def by_me(self) -> bool:
+        """I changed it."""
+        return self.quantities[2] != self.quantities[0]
+
+    @property
+    def undoes(self) -> bool:
+        """True where mine in the place of theirs would undo what they did."""
+        return self.by_them and self.quantities[1] != self.quantities[2]
+
+
+def compare_three(base: Assembly | None, theirs: Assembly, mine: Assembly) -> tuple[ThreeLines, ...]:
+    """Every line of an assembly that one of two people changed; what would be undone comes first.
+
+    Without ``base``, every line in which the two differ; who changed it is then not known.
+    """
+    common = base or Assembly(mine.head)
+    to_theirs, to_mine = _Match([common], [theirs]), _Match([common], [mine])
+    across = _Match([theirs], [mine])
+    left_theirs = {entry.key: entry for entry in theirs.lines}
+    left_mine = {entry.key: entry for entry in mine.lines}
+    rows = []
+    for entry in common.lines:
+        other = left_theirs.pop(to_theirs.of_old(entry), None)
+        rows.append(ThreeLines(entry, other, left_mine.pop(to_mine.of_old(entry), None)))
+    for entry in left_theirs.values():
+        rows.append(ThreeLines(None, entry, left_mine.pop(across.of_old(entry), None)))
+    rows += [ThreeLines(None, None, entry) for entry in left_mine.values()]
+    if base is None:
+        return tuple(row for row in rows if row.quantities[1] != row.quantities[2])
+    changed = [row for row in rows if row.by_them or row.by_me]
+    return tuple(sorted(changed, key=lambda row: not row.undoes))
+
+
 class _Match:
     """Which component of the old state is which of the new one."""
 

@@ -25,6 +25,7 @@ _COMMANDS = (
     "bom_diff",
     "sync",
     "register",
+    "pull",
     "relink",
     "serve",
     "backup",

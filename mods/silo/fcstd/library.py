@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import time
 from collections import OrderedDict
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -51,10 +52,14 @@ class Content:
 class Contents:
     """The contents of files for several sessions, one after the other: a file that many assemblies use is
     read once. Those that were not asked for longest are forgotten first.
+
+    instead
+        real path → a file that is read in its place, such as another revision of it.
     """
 
-    def __init__(self, limits: Limits | None = None) -> None:
+    def __init__(self, limits: Limits | None = None, *, instead: Mapping[str, str] | None = None) -> None:
         self.limits = limits or Limits()
+        self._instead = dict(instead or {})
         self.shared = Shared(self.limits.resident)
         self.reads = 0
         self._known: OrderedDict[str, Content] = OrderedDict()
@@ -76,7 +81,7 @@ class Contents:
 
     def _read(self, path: str) -> Content:
         read_ns = time.time_ns()
-        with ContainerFile(path, self.limits) as container:
+        with ContainerFile(self._instead.get(path, path), self.limits) as container:
             entry = container.entry(DOCUMENT_XML)
             if entry is None:
                 reason = "it is no FreeCAD document (there is no Document.xml in it)"

@@ -304,6 +304,23 @@ class Store(Database):
             row = (canonical(server), sha256, item, revision)
             db.execute("INSERT OR REPLACE INTO known VALUES (?, ?, ?, ?)", row)
 
+    def keep_aside(self, path: str) -> Path | None:
+        """Keep a copy of a file that is about to be replaced; where it is, None where there is no file.
+
+        Raises DocumentError where the disk does not take it.
+        """
+        folder = self.path.parent / "kept-aside" / time.strftime("%Y-%m-%d")
+        target = folder / f"{time.strftime('%H%M%S')}-{time.monotonic_ns() % 10**6}-{os.path.basename(path)}"
+        try:
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            shutil.copy2(path, target)
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            told = f"no copy of it could be kept ({error.strerror or error}); it was not replaced"
+            raise DocumentError(path, told) from error
+        return target
+
     # -- copies -----------------------------------------------------------------------------------------
 
     def verified(self, entry: Entry) -> Path:

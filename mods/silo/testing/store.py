@@ -159,6 +159,7 @@ class FakeStore:
             "id": stored.item.id,
             "revision_number": revision.revision_number,
             "comment": comment,
+            "file_name": file_name,
             "user": self.user,
         }
         self._announce("revision.created", data)

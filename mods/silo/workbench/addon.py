@@ -7,6 +7,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from silo.workbench.commit.opened import Opened
 from silo.workbench.freecad import host
 from silo.workbench.gui import qt
 from silo.workbench.pane.dock import ActivityDock
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from silo.workbench.pane.activity import Action
     from silo.workbench.preview.flow import PreviewFlow
     from silo.workbench.register.flow import RegisterFlow
+    from silo.workbench.revisions.flow import RevisionFlow
     from silo.workbench.session.session import Session, Shown
 
 # FreeCAD's window comes first; a server is not talked to before it stands.
@@ -40,9 +42,13 @@ class AddOn:
         self.preferences = Preferences(host.parameters(GROUP))
         self.dock = ActivityDock(host.main_window(), self.act)
         self.relay = qt.Relay(self._bug)
+        # From the start: what a document was made from is known only when it is opened.
+        self.opened = Opened(lambda: self.session.outbox)
+        host.add_document_observer(self.opened)
         self._session: Session | None = None
         self._desk: LiveDesk | None = None
         self._commits: CommitFlow | None = None
+        self._revisions: RevisionFlow | None = None
         self._previews: PreviewFlow | None = None
         self._registrations: RegisterFlow | None = None
         self._hook: CommitHook | None = None
@@ -61,6 +67,7 @@ class AddOn:
 
     def _begin(self) -> None:
         self.session.begin(live=self.preferences.flag("LiveActivity"))
+        self.opened.begin(self.session.look)
         # The first commit is to be as quick as the others: what it needs is imported while nobody waits. Only
         # what has no widgets comes from the worker, for the classes of those are made in the GUI thread.
         self.session.aside(
@@ -111,7 +118,7 @@ class AddOn:
         if self._desk is None:
             from silo.workbench.freecad.live_desk import LiveDesk
 
-            self._desk = LiveDesk(lambda: self.preferences.flag("CountHardware"))
+            self._desk = LiveDesk(self.opened, lambda: self.preferences.flag("CountHardware"))
         return self._desk
 
     @property
@@ -120,8 +127,23 @@ class AddOn:
         if self._commits is None:
             from silo.workbench.commit.flow import CommitFlow
 
-            self._commits = CommitFlow(self.session, self.preferences, self.desk, register=self.register_path)
+            self._commits = CommitFlow(
+                self.session,
+                self.preferences,
+                self.desk,
+                register=self.register_path,
+                choose=lambda *wanted: self.revisions.choose(*wanted),
+            )
         return self._commits
+
+    @property
+    def revisions(self) -> RevisionFlow:
+        """Getting files from Silo; made when first needed."""
+        if self._revisions is None:
+            from silo.workbench.revisions.flow import RevisionFlow
+
+            self._revisions = RevisionFlow(self.session, self.desk)
+        return self._revisions
 
     @property
     def previews(self) -> PreviewFlow:

@@ -84,6 +84,7 @@ def revision_created(tx: Tx, item: Item, revision: Revision) -> None:
         "id": item.uuid,
         "revision_number": revision.revision_number,
         "comment": revision.comment,
+        "file_name": revision.file_name,
         "user": revision.created_by,
     }
     _about(tx, "revision.created", item, data)

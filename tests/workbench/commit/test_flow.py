@@ -63,7 +63,7 @@ def test_a_fault_of_ours_stops_no_other_either(office: Office, flow: CommitFlow)
     bad, good = office.document("Bad"), office.document("Good")
     keep = office.session.keep
 
-    def fail(commit: object, failed: object) -> None:
+    def fail(commit: object, failed: object, base: object = None) -> None:
         office.session.keep = keep  # type: ignore[method-assign]
         raise ZeroDivisionError
 

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.bom.errors import DocumentError
+from silo.workbench.commit.opened import Base
 from silo.workbench.commit.plan import Plan, State, Taker, leaves_first, plan
 from silo.workbench.commit.snapshot import Snapshot
 
@@ -30,6 +31,9 @@ class Documents:
 
     def __init__(self) -> None:
         self.saved: list[str] = []
+
+    def base(self, doc: Any, /) -> Base:
+        return Base(doc.FileName, None)
 
     def linked(self, doc: Any, /) -> list[Any]:
         found, left = {doc.Name: doc}, [doc]

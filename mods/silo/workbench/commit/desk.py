@@ -7,21 +7,31 @@ With a desk of a test's own the flows run without FreeCAD and Qt. All calls are 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 from silo.workbench.commit.plan import Documents, Plan, Row
 from silo.workbench.commit.snapshot import Snapshot
+from silo.workbench.commit.theirs import Choice, Theirs
+
+Look = Callable[[Callable[[Mapping[str, Theirs]], None]], object]
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What a person says in the commit dialog. ``register``: give it a part number as well."""
+    """What a person says in the commit dialog.
+
+    register
+        give it a part number as well.
+    choices
+        what to do about files that colleagues have changed, beside committing.
+    """
 
     rows: tuple[Row, ...]
     comment: str = ""
     register: bool = False
+    choices: tuple[tuple[Row, Theirs, Choice], ...] = ()
 
 
 class Desk(Protocol):
@@ -42,11 +52,13 @@ class Desk(Protocol):
     def identity(self, doc: Any, /) -> str | None:
         """The item that a document belongs to, without looking at its components."""
 
-    def ask(self, planned: Plan, note: str, comment: str, /) -> Answer | None:
+    def ask(self, planned: Plan, note: str, comment: str, look: Look, /) -> Answer | None:
         """Which documents to commit, with which comment; None where the person does not want to.
 
         comment
             what the person wrote before and is not in Silo yet.
+        look
+            begins to look at Silo, and calls back with what colleagues did meanwhile.
         """
 
     def warn(self, title: str, text: str, /) -> None:

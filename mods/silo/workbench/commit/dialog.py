@@ -4,16 +4,22 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 from silo.workbench.commit.desk import Answer
 from silo.workbench.commit.plan import Plan, Row, State
+from silo.workbench.commit.theirs import Choice, Theirs, choice_texts, line_words
 from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QShortcut, QtCore, QtGui, QtWidgets
 from silo.workbench.pane.activity import Tone
 from silo.workbench.words import counted, plain, tip, translate
+
+_CHOICE = 2
+_MOST_LINES = 40
 
 
 class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
@@ -22,6 +28,8 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
     def __init__(self, plan: Plan, parent: Any, *, note: str = "", comment: str = "") -> None:
         super().__init__(parent)
         self._plan = plan
+        self._theirs: dict[int, Theirs] = {}
+        self._choices: dict[int, Any] = {}
         self.setObjectName("SiloCommitDialog")
         self.setWindowTitle(translate("Silo", "Commit to Silo"))
         self.resize(520, 380)
@@ -49,6 +57,11 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         layout.addWidget(self.register)
         if note:
             layout.addWidget(widgets.label(note, Tone.QUIET))
+        self._looking = widgets.label(
+            translate("Silo", "Looking for what colleagues committed since…"), Tone.QUIET
+        )
+        self._looking.setVisible(not note)
+        layout.addWidget(self._looking)
         layout.addWidget(self._make_buttons())
         self.shortcuts = [QShortcut(QtGui.QKeySequence(keys), self) for keys in ("Ctrl+Return", "Ctrl+Enter")]
         for shortcut in self.shortcuts:
@@ -79,7 +92,10 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         tree = QtWidgets.QTreeWidget()
         tree.setObjectName("files")
         tree.setRootIsDecorated(False)
-        tree.setHeaderLabels([translate("Silo", "File"), translate("Silo", "State")])
+        tree.setHeaderLabels([translate("Silo", "File"), translate("Silo", "State"), ""])
+        tree.setColumnHidden(_CHOICE, True)
+        tree.setWordWrap(True)
+        tree.itemChanged.connect(lambda _item, _column: self._update_commit())
         tree.setSelectionMode(QtWidgets.QAbstractItemView.SelectionMode.NoSelection)
         for number, row in enumerate(self._plan.rows):
             item = QtWidgets.QTreeWidgetItem([plain(os.path.basename(row.path) or row.label, 80), row.note])
@@ -111,13 +127,11 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
     def select(self, wanted: Callable[[Row], bool]) -> None:
         """Check the files that are wanted and can be committed."""
         for number, row in enumerate(self._plan.rows):
-            self._check(self.files.topLevelItem(number), row.can_commit and wanted(row))
+            if number not in self._theirs:
+                self._check(self.files.topLevelItem(number), row.can_commit and wanted(row))
 
     def _check(self, item: Any, on: bool) -> None:
         item.setCheckState(0, QtCore.Qt.CheckState.Checked if on else QtCore.Qt.CheckState.Unchecked)
-
-    def _selected(self, *_changed: Any) -> None:
-        self.commit.setEnabled(bool(self.chosen()))
 
     def _mark(self, item: Any, row: Row, tree: Any) -> None:
         self._check(item, row.wanted)
@@ -138,22 +152,103 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         self.commit.setObjectName("commit")
         self.commit.setDefault(True)
         self.commit.setToolTip(translate("Silo", "Ctrl+Return"))
-        self.files.itemChanged.connect(self._selected)
-        self._selected()
+        self._update_commit()
         box.addButton(translate("Silo", "Cancel"), role.RejectRole)
         box.accepted.connect(self.accept)
         box.rejected.connect(self.reject)
         return box
 
+    def text(self) -> str:
+        """The comment."""
+        return str(self.comment.toPlainText()).strip()
+
+    # -- what colleagues did ----------------------------------------------------------------------------
+
+    def show_theirs(self, found: Mapping[str, Theirs]) -> None:
+        """Show what colleagues committed since; called when the look at Silo is done, perhaps never."""
+        self._looking.hide()
+        for number, row in enumerate(self._plan.rows):
+            theirs = found.get(row.path)
+            if theirs is not None and row.can_commit and self._theirs.get(number) != theirs:
+                self._theirs[number] = theirs
+                self._show_one(self.files.topLevelItem(number), number, theirs)
+        if self._theirs:
+            self._tell_who()
+            self.files.setColumnHidden(_CHOICE, False)
+            self.files.setRootIsDecorated(True)
+            for column in (0, _CHOICE):
+                self.files.resizeColumnToContents(column)
+            self.resize(max(self.width(), 860), max(self.height(), 460))
+        self._update_commit()
+
+    def _show_one(self, item: Any, number: int, theirs: Theirs) -> None:
+        item.takeChildren()
+        item.setText(1, theirs.headline)
+        item.setToolTip(1, tip(theirs.headline))
+        item.setForeground(1, QtGui.QBrush(QtGui.QColor(widgets.colour(Tone.WARNING, self.files))))
+        item.setCheckState(0, QtCore.Qt.CheckState.Unchecked)
+        item.setFlags(item.flags() & ~QtCore.Qt.ItemFlag.ItemIsUserCheckable)
+        for text in self._details(theirs):
+            child = QtWidgets.QTreeWidgetItem(["", text])
+            child.setToolTip(1, tip(text))
+            child.setFirstColumnSpanned(False)
+            item.addChild(child)
+        item.setExpanded(True)
+        box = QtWidgets.QComboBox()
+        box.setObjectName(f"choice{number}")
+        for choice, text in choice_texts().items():
+            box.addItem(text, choice.value)
+        box.currentIndexChanged.connect(lambda _index: self._chose(number, box))
+        self._choices[number] = box
+        self.files.setItemWidget(item, _CHOICE, box)
+
+    def _details(self, theirs: Theirs) -> list[str]:
+        told = []
+        if theirs.revision:
+            when = time.strftime("%Y-%m-%d %H:%M", time.localtime(theirs.when)) if theirs.when else ""
+            said = plain(theirs.comment, 160) or translate("Silo", "(no comment)")
+            told.append(" · ".join(filter(None, (when, said))))
+        lines = [line_words(line, known=theirs.base is not None) for line in theirs.lines]
+        if len(lines) > _MOST_LINES:
+            more = translate("Silo", "… and {n} more lines").replace("{n}", str(len(lines) - _MOST_LINES))
+            lines = [*lines[:_MOST_LINES], more]
+        return told + lines
+
+    def _chose(self, number: int, box: Any) -> None:
+        mine = Choice(box.currentData()) is Choice.ON_TOP
+        state = QtCore.Qt.CheckState.Checked if mine else QtCore.Qt.CheckState.Unchecked
+        self.files.topLevelItem(number).setCheckState(0, state)
+        self._update_commit()
+
+    def _tell_who(self) -> None:
+        names = sorted({plain(one.who, 40) for one in self._theirs.values() if one.who})
+        who = ", ".join(names) or translate("Silo", "Somebody")
+        text = translate("Silo", "Commit to Silo – {who} committed since you opened")
+        if not any(one.revision for one in self._theirs.values()):
+            text = translate("Silo", "Commit to Silo – changed on disk since you opened")
+        self.setWindowTitle(text.replace("{who}", who))
+
+    def _update_commit(self) -> None:
+        if not hasattr(self, "commit"):
+            return
+        rows, chosen = self.chosen(), self.choices()
+        self.commit.setEnabled(bool(rows or chosen))
+        only = translate("Silo", "Do it") if chosen and not rows else translate("Silo", "Commit")
+        self.commit.setText(only)
+
     def answer(self) -> Answer:
         """What the person wants."""
         chosen = self.chosen()
         registering = self.register.isChecked() and any(row.is_top for row in chosen)
-        return Answer(chosen, self.text(), registering)
+        return Answer(chosen, self.text(), registering, self.choices())
 
-    def text(self) -> str:
-        """The comment."""
-        return str(self.comment.toPlainText()).strip()
+    def choices(self) -> tuple[tuple[Row, Theirs, Choice], ...]:
+        """What to do about colleagues' files, beside committing."""
+        return tuple(
+            (self._plan.rows[number], self._theirs[number], choice)
+            for number, box in self._choices.items()
+            if (choice := Choice(box.currentData())) in (Choice.OPEN, Choice.TAKE)
+        )
 
     def chosen(self) -> tuple[Row, ...]:
         """The documents to commit, in order."""
@@ -161,5 +256,7 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         for number in range(self.files.topLevelItemCount()):
             item = self.files.topLevelItem(number)
             if item.checkState(0) == QtCore.Qt.CheckState.Checked:
-                rows.append(self._plan.rows[item.data(0, QtCore.Qt.ItemDataRole.UserRole)])
+                row = self._plan.rows[item.data(0, QtCore.Qt.ItemDataRole.UserRole)]
+                newer = self._theirs[number].newer if number in self._theirs else None
+                rows.append(replace(row, on_top=newer) if newer else row)
         return tuple(rows)

@@ -15,18 +15,21 @@ from __future__ import annotations
 import os
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from silo.bom.changes import Assembly
 from silo.bom.errors import SiloError
-from silo.outbox.entry import Commit, new_key
+from silo.outbox.entry import UNKNOWN, Commit, new_key
+from silo.outbox.store import on_top
 from silo.spelling import one_path
 from silo.workbench.commit.decisions import Decisions
 from silo.workbench.commit.desk import Answer, Desk
 from silo.workbench.commit.plan import Plan, Row, State, Taken, Taker, plan, refusal
 from silo.workbench.commit.snapshot import Snapshot
+from silo.workbench.commit.theirs import Asked, Choice, Theirs, look
 from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone
 from silo.workbench.session.session import Session
 from silo.workbench.settings.preferences import ALLOW, Preferences
@@ -48,10 +51,12 @@ class CommitFlow:
         *,
         path: Path | None = None,
         register: Callable[[str], None] = lambda _path: None,
+        choose: Callable[[str, Theirs, Choice], object] = lambda _path, _theirs, _choice: None,
     ) -> None:
         self._session, self._preferences, self._desk = session, preferences, desk
         self._register = register
         self.decisions = Decisions(path)
+        self.choose = choose
         self._turns: deque[tuple[Iterator[Taken], str]] = deque()
         self._asked_for: set[str] = set()
         # Path → what a person wrote about a file that has no item yet.
@@ -91,11 +96,16 @@ class CommitFlow:
                 self._desk.warn(translate("Silo", "Commit to Silo"), text)
             return
         answer: Answer | None = Answer(planned.wanted)
-        if self._preferences.flag("AskComment") or not planned.is_simple:
-            answer = self._desk.ask(planned, self._note(planned), self._comments.get(planned.top.path, ""))
+        if self._preferences.flag("AskComment") or not planned.is_simple or self._heard(planned):
+            comment = self._comments.get(planned.top.path, "")
+            answer = self._desk.ask(
+                planned, self._note(planned), comment, lambda back: self._look(planned, back)
+            )
         if answer is None:
             return
         self.run(answer.rows, answer.comment)
+        for row, theirs, choice in answer.choices:
+            self.choose(row.path, theirs, choice)
         if answer.register:
             self._turns.append((self._registering(planned.top.path), ""))
 
@@ -108,9 +118,45 @@ class CommitFlow:
         """What a person wrote about a file when it had no item yet; told once."""
         return self._comments.pop(path, "")
 
+    def _heard(self, planned: Plan) -> bool:
+        """True where the server has announced a colleague's commit of one of these documents."""
+        return bool(self._session.shown.newer) and any(
+            self._session.newer_than(one.identity, one.base.since) for one in self._asked(planned)
+        )
+
+    def _asked(self, planned: Plan) -> list[Asked]:
+        return [
+            Asked(row.path, self._desk.identity(row.document) or "", self._desk.documents.base(row.document))
+            for row in planned.rows
+            if row.path
+        ]
+
+    def _look(self, planned: Plan, back: Callable[[Mapping[str, Theirs]], None]) -> None:
+        """Ask Silo, in a worker, what colleagues committed since. What it cannot be asked now is caught when
+        the commit is sent."""
+        local = {row.path: Theirs(row.path) for row in planned.rows if row.replaced}
+        if local:
+            back(local)
+        asked, documents = self._asked(planned), {row.path: row.document for row in planned.rows}
+
+        def question(client: Any, control: Any) -> dict[str, Theirs]:
+            def mine(path: str) -> Assembly | None:
+                taken = self._session.in_gui(lambda: self._desk.snapshot(documents[path]), control)
+                return mine_of(taken)
+
+            return look(client, self._session.outbox, asked, mine, control.cancelled)
+
+        self._session.ask(
+            translate("Silo", "Looking for colleagues' commits"),
+            question,
+            done=lambda found: back({**local, **found}),
+            failed=lambda _error: back(local),
+        )
+
     def run(self, rows: tuple[Row, ...], comment: str = "") -> None:
         """Commit these documents, in order, after those of an earlier commit."""
-        taker = Taker(self._desk.documents, self.snapshot, self._session.outbox.hold, new_key)
+        outbox = self._session.outbox
+        taker = Taker(self._desk.documents, self.snapshot, outbox.hold, new_key, outbox.keep_aside)
         self._turns.append((taker.each(rows), comment))
         if len(self._turns) == 1:
             self._desk.later(self._turn)
@@ -135,7 +181,7 @@ class CommitFlow:
     def send(self, doc: Any, comment: str) -> None:
         """Send a document that has just been saved, as it is."""
         path = one_path(doc.FileName)
-        self.run((Row(doc, path, str(doc.Label), State.SAVED),), comment)
+        self.run((Row(doc, path, str(doc.Label), State.SAVED, is_new=True),), comment)
 
     def _turn(self) -> None:
         try:
@@ -179,8 +225,14 @@ class CommitFlow:
         )
         if commit is None:
             return
+        base = taken.base
+        if base is not None and with_file and not taken.row.is_new:
+            commit = replace(commit, origin=base.origin or UNKNOWN)
+        if newer := taken.row.on_top:
+            said = on_top(comment, newer)
+            commit = replace(commit, on_top_of=newer["revision_number"], comment=said)
         label = taken.row.label
-        self._session.keep(commit, failed=lambda error: self._tell_error(label, str(error)))
+        self._session.keep(commit, failed=lambda error: self._tell_error(label, str(error)), base=base)
 
     def _tell_error(self, label: str, text: str) -> None:
         self._session.add(
@@ -227,6 +279,13 @@ def commit_of(
         allow_missing=allow_missing,
         remark=taken.problem,
     )
+
+
+def mine_of(taken: Snapshot) -> Assembly | None:
+    """The BOM of a snapshot, for comparing; None for a part."""
+    if taken.extraction is None:
+        return None
+    return Assembly(taken.extraction.assembly, tuple(taken.extraction.entries))
 
 
 def not_in_silo(taken: Snapshot) -> Entry:

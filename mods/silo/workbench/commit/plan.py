@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, Protocol
 
 from silo.bom.errors import SiloError
 from silo.spelling import one_path
+from silo.workbench.commit.opened import Base
 from silo.workbench.commit.snapshot import Snapshot
 from silo.workbench.words import plain, translate
 
@@ -41,6 +42,8 @@ class Documents(Protocol):
 
     def save(self, doc: Any, /) -> None: ...
 
+    def base(self, doc: Any, /) -> Base: ...
+
 
 class State(StrEnum):
     """How a document stands before a commit."""
@@ -56,13 +59,24 @@ class State(StrEnum):
 
 @dataclass(frozen=True)
 class Row:
-    """A document of the plan. ``document`` is alive and belongs into the GUI thread."""
+    """A document of the plan. ``document`` is alive and belongs into the GUI thread.
+
+    replaced
+        somebody else has written the file since the document was opened: saving it would undo that.
+    on_top
+        the colleague's revision that a person saw and commits this on top of; empty where there is none.
+    is_new
+        the file has only just got its item, at a person's word: nobody's newer revision is looked for.
+    """
 
     document: Any
     path: str
     label: str
     state: State
     is_top: bool = False
+    replaced: bool = False
+    on_top: Mapping[str, Any] = field(default_factory=dict)
+    is_new: bool = False
 
     @property
     def can_commit(self) -> bool:
@@ -72,7 +86,8 @@ class Row:
     @property
     def wanted(self) -> bool:
         """Checked to begin with? What was only recomputed is as it is in Silo."""
-        return self.can_commit and (self.is_top or self.state is not State.RECOMPUTED)
+        asked = self.is_top or self.state is not State.RECOMPUTED
+        return self.can_commit and asked and not self.replaced
 
     @property
     def note(self) -> str:
@@ -123,7 +138,8 @@ class Plan:
     def is_simple(self) -> bool:
         """True where there is nothing to ask: one document that can be committed, the others unchanged."""
         others = all(row.state is State.RECOMPUTED for row in self.rows[:-1])
-        return others and self.top.can_commit and not self.unregistered
+        replaced = any(row.replaced for row in self.rows)
+        return others and self.top.can_commit and not self.unregistered and not replaced
 
 
 def plan(top: Any, documents: Documents, *, unregistered: bool = False) -> Plan:
@@ -139,7 +155,8 @@ def plan(top: Any, documents: Documents, *, unregistered: bool = False) -> Plan:
             state = _state(doc, documents, until)
             # What was only recomputed, and cannot be saved anyway, is nobody's concern.
             if is_top or state is not State.SAVED:
-                rows.append(Row(doc, path, str(doc.Label), state, is_top))
+                replaced = bool(path) and documents.base(doc).replaced
+                rows.append(Row(doc, path, str(doc.Label), state, is_top, replaced))
     return Plan(tuple(rows), unregistered)
 
 
@@ -215,6 +232,8 @@ def _held(doc: Any, documents: Documents) -> State | None:
 class Taken:
     """One document of a commit is done, as far as the GUI thread is concerned.
 
+    base
+        what the document was made from.
     held
         the saved file's content under a second name; None where that is not possible.
     error
@@ -226,6 +245,7 @@ class Taken:
     key: str = ""
     held: Path | None = None
     error: SiloError | None = None
+    base: Base | None = None
 
 
 @dataclass(frozen=True)
@@ -238,12 +258,15 @@ class Taker:
         keeps a file's content under a second name: (path, key).
     new_key
         names a commit.
+    keep_aside
+        keeps a copy of a file that somebody else has written and that saving replaces.
     """
 
     documents: Documents
     take: Callable[[Any], Snapshot]
     hold: Callable[[str, str], Path | None]
     new_key: Callable[[], str]
+    keep_aside: Callable[[str], object] = lambda _path: None
 
     def each(self, rows: Iterable[Row]) -> Iterator[Taken]:
         """One document after another; a failure does not stop the others. GUI thread."""
@@ -258,9 +281,13 @@ class Taker:
             yield taken
 
     def _one(self, row: Row) -> Taken:
-        if row.state in (State.CHANGED, State.RECOMPUTED):
+        base = self.documents.base(row.document)
+        # What somebody else has written is no file of ours: ours is written anew, at a person's word.
+        if row.state in (State.CHANGED, State.RECOMPUTED) or base.replaced:
+            if base.replaced:
+                self.keep_aside(row.path)
             self.documents.save(row.document)
         snapshot = self.take(row.document)
         key = self.new_key()
         held = self.hold(row.path, key) if snapshot.identity else None
-        return Taken(row, snapshot, key, held)
+        return Taken(row, snapshot, key, held, base=base)

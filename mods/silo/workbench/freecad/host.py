@@ -230,6 +230,11 @@ def same_active_document() -> Iterator[None]:
             FreeCAD.setActiveDocument(name)
 
 
+def close_document(doc: Any) -> None:
+    """Close a document without saving."""
+    FreeCAD.closeDocument(doc.Name)
+
+
 def close_all() -> None:
     """Close every document without saving; for batches, never with a person at work."""
     for name in list(FreeCAD.listDocuments()):

@@ -8,8 +8,10 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+from silo.open_in_freecad import open_in_any
 from silo.workbench.commit import snapshot
-from silo.workbench.commit.desk import Answer
+from silo.workbench.commit.desk import Answer, Look
+from silo.workbench.commit.opened import Opened
 from silo.workbench.commit.plan import Plan
 from silo.workbench.commit.snapshot import Snapshot
 from silo.workbench.freecad import components, host, live, saving
@@ -29,13 +31,16 @@ class LiveDocuments:
     lost_assemblies = staticmethod(live.lost_assemblies)
     save = staticmethod(saving.save)
 
+    def __init__(self, opened: Opened) -> None:
+        self.base = opened.of
+
 
 class LiveDesk:
     """One per FreeCAD. Widgets are imported when a person is to see one."""
 
-    def __init__(self, count_hardware: Callable[[], bool] = lambda: True) -> None:
+    def __init__(self, opened: Opened, count_hardware: Callable[[], bool] = lambda: True) -> None:
         self._count_hardware = count_hardware
-        self.documents = LiveDocuments()
+        self.documents = LiveDocuments(opened)
 
     def snapshot(self, doc: Any) -> Snapshot:
         """The assembly that is active in the 3D view decides between several."""
@@ -49,6 +54,18 @@ class LiveDesk:
         return cached.getObject(active.Name) if active is not None and active.Document == doc else None
 
     find = staticmethod(host.find_document)
+    open = staticmethod(saving.open_fully)
+    close = staticmethod(host.close_document)
+    save_copy = staticmethod(saving.save_copy)
+
+    def open_paths(self) -> tuple[str, ...]:
+        """The files that this FreeCAD has open."""
+        return tuple(doc.FileName for doc in host.documents() if doc.FileName)
+
+    def is_open_elsewhere(self, path: str) -> bool:
+        """True where another FreeCAD of this user has the file open."""
+        return open_in_any().has_file(path)
+
     look_at = staticmethod(components.look_at)
     write_identity = staticmethod(components.write_identity)
     unedited = staticmethod(components.unedited)
@@ -63,11 +80,12 @@ class LiveDesk:
         cached = live.cached_document(doc)
         return snapshot.identity(cached, self._hint(doc, cached))
 
-    def ask(self, planned: Plan, note: str, comment: str) -> Answer | None:
+    def ask(self, planned: Plan, note: str, comment: str, look: Look) -> Answer | None:
         """The commit dialog."""
         from silo.workbench.commit.dialog import CommitDialog
 
         dialog = CommitDialog(planned, host.main_window(), note=note, comment=comment)
+        look(dialog.show_theirs)
         return dialog.answer() if qt.run_dialog(dialog) else None
 
     def preview_window(self, title: str, wishes: preview.Wishes) -> preview.Window:

@@ -8,9 +8,11 @@ main thread only.
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 from silo.workbench.freecad import host
@@ -141,6 +143,25 @@ def _unmarking(owner: Any, name: str) -> Iterator[None]:
         yield
     finally:
         owner.setPropertyStatus(name, "-NoModify")
+
+
+def save_copy(doc: Any, path: Path) -> None:
+    """Write a document, with its unsaved edits, to another file. DocumentError unless that was written.
+
+    A document that FreeCAD has loaded only in part cannot be written; what is in its file is copied.
+    """
+    from silo.bom.errors import DocumentError
+
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if host.is_partial(doc):
+            shutil.copy2(doc.FileName, path)
+        else:
+            doc.saveCopy(str(path))
+    except (OSError, RuntimeError) as problem:
+        raise DocumentError(str(path), f"no copy could be kept: {problem}") from problem
+    if not path.is_file():
+        raise DocumentError(str(path), "FreeCAD wrote no copy; its report view says why")
 
 
 def _stamp(path: str) -> tuple[int, int, int]:

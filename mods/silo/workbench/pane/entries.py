@@ -21,6 +21,7 @@ from silo.bom.report import shorten
 from silo.bom_sync import Resolved, Status
 from silo.outbox.send import Sent
 from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone, shortened
+from silo.workbench.session.session import Newer
 from silo.workbench.words import counted, plain, quantity, translate
 
 # Makes an absolute address of a page such as `resolve_url`; raises SiloError for another server's.
@@ -243,6 +244,18 @@ def of_event(event: ServerEvent, page: Page, now: float | None = None) -> Entry 
         actions=_view(f"/items/{number}", page),
         icon="silo-commit" if event.type == "revision.created" else "silo-register",
     )
+
+
+def commit_of_event(event: ServerEvent) -> tuple[str, Newer] | None:
+    """The identity and the commit that an event announces; None for any other, and for mere properties."""
+    data = event.data if isinstance(event.data, dict) else {}
+    revision, identity = data.get("revision_number"), data.get("id")
+    if event.type != "revision.created" or not isinstance(revision, int) or not isinstance(identity, str):
+        return None
+    if "file_name" in data and not data["file_name"]:
+        return None
+    who = _text(data, "user", "created_by")
+    return identity.lower(), Newer(plain(event.item or ""), revision, who, time.monotonic())
 
 
 def of_gap(when: float) -> Entry:

@@ -21,6 +21,7 @@ from silo.workbench.pane import entries
 from silo.workbench.pane.activity import Entry
 from silo.workbench.session.gui_thread_gc import collection_off
 from silo.workbench.session.jobs import Control
+from silo.workbench.session.session import Newer
 from silo.workbench.settings.server import Known, Server, TokenStore, choose_server
 from silo.workbench.words import translate
 
@@ -28,9 +29,9 @@ from silo.workbench.words import translate
 class Online:
     """Talks to the server that the settings name.
 
-    entry, sent, state
-        told of a box to show, of a commit that arrived (with lines for the report view), and of the
-        connection (kind, reason); from any thread.
+    entry, sent, state, newer
+        called with a box to show, a commit that arrived (with lines for the report view), the connection
+        (kind, reason), and a commit that the server announced (identity, commit); from any thread.
     make_client
         makes the client of a server; :class:`SiloClient` unless told otherwise.
     """
@@ -42,11 +43,12 @@ class Online:
         entry: Callable[[Entry], None],
         sent: Callable[[Sent, tuple[str, ...]], None],
         state: Callable[[str, str], None],
+        newer: Callable[[str, Newer], None] = lambda _identity, _newer: None,
         make_client: Callable[[Server], Any] | None = None,
     ) -> None:
         self._make_client = make_client or _client
         self._outbox = outbox
-        self._entry, self._sent, self._state = entry, sent, state
+        self._entry, self._sent, self._state, self._newer = entry, sent, state, newer
         self._last_ids = LastIds(outbox.path.with_name("last-events.json"))
         self._client: SiloClient | None = None
         self._server = Server()
@@ -142,6 +144,8 @@ class Online:
     def _heard(self, event: ServerEvent, url: str) -> None:
         if event.id is not None:
             self._last_ids.set(url, event.id)
+        if (announced := entries.commit_of_event(event)) is not None:
+            self._newer(*announced)
         entry = entries.of_event(event, self.client.web_url)
         if entry is not None:
             self._entry(entry)

@@ -9,7 +9,7 @@ come back through ``deliver``. No widgets here, and no FreeCAD, so that all of i
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,12 +27,19 @@ if TYPE_CHECKING:
     # These bring requests and pydantic with them, which only a worker may import (start-up time).
     from silo.api.client import SiloClient
     from silo.outbox.send import Sent
+    from silo.workbench.commit.opened import Base
     from silo.workbench.session.online import Online
 
 
 @dataclass(frozen=True)
 class Shown:
-    """Everything that the pane shows. ``waiting`` is all that is in the outbox, oldest first."""
+    """Everything that the pane shows.
+
+    waiting
+        all that is in the outbox, oldest first.
+    newer
+        UUID of an item → the newest commit of it that another FreeCAD has made since this one runs.
+    """
 
     server: Server = field(default_factory=Server)
     connection: str = "stopped"
@@ -40,6 +47,17 @@ class Shown:
     busy: Busy | None = None
     waiting: tuple[Waiting, ...] = ()
     activity: Activity = field(default_factory=Activity)
+    newer: Mapping[str, Newer] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Newer:
+    """A commit that the server announced. ``at``: seconds of :func:`time.monotonic`."""
+
+    part_number: str
+    revision: int
+    who: str
+    at: float
 
 
 @dataclass(frozen=True)
@@ -96,8 +114,10 @@ class Session:
         self._net = Worker("silo-network", deliver, on_busy=self._busy, on_bug=bug)
         # What a person waits for on the preference page must not queue behind a long upload.
         self._aside = Worker("silo-aside", deliver, on_bug=bug)
+        self._looks = Worker("silo-looks", deliver, on_bug=bug)
         self._online: Online | None = None
         self._live = False
+        self._mine: set[tuple[str, int]] = set()
 
     # -- the server -------------------------------------------------------------------------------------
 
@@ -129,6 +149,7 @@ class Session:
                 self.outbox,
                 entry=lambda entry: self._deliver(lambda: self.add(entry)),
                 sent=lambda sent, lines: self._deliver(lambda: self._arrived(sent, lines)),
+                newer=lambda identity, newer: self._deliver(lambda: self._heard(identity, newer)),
                 state=lambda kind, reason: self._deliver(lambda: self._connection(kind, reason)),
                 make_client=self._make_client,
             )
@@ -151,20 +172,28 @@ class Session:
 
     # -- commits ----------------------------------------------------------------------------------------
 
-    def keep(self, commit: Commit, failed: Callable[[SiloError], None]) -> None:
+    def keep(self, commit: Commit, failed: Callable[[SiloError], None], base: Base | None = None) -> None:
         """Put a commit on disk, then send it. ``failed`` is called where the disk does not take it.
+
+        ``base``: what the document was made from, which this commit is from now on.
 
         Its row does not wait for the copies of others: from its row on, a commit is not lost whatever
         happens.
         """
         title = translate("Silo", "Keeping the commit")
 
+        def finish(_control: Control) -> None:
+            made_from = base.origin if base is not None and commit.origin else ""
+            content = self.outbox.finish(commit.key, commit.file, made_from)
+            if base is not None:
+                base.committed(content)
+
         def stage(_control: Control) -> None:
             self.outbox.stage(commit, self._online.address if self._online is not None else "")
             self._disk.submit(
                 Job(
                     title,
-                    lambda _control: self.outbox.finish(commit.key, commit.file),
+                    finish,
                     done=lambda _kept: self.send(force=True),
                     failed=failed,
                 )
@@ -208,7 +237,18 @@ class Session:
             return {"unauthorized": "refused", "read_only": "read-only"}.get(error.code, "offline")
         return self.shown.connection
 
+    def _heard(self, identity: str, newer: Newer) -> None:
+        if (identity, newer.revision) not in self._mine:
+            self._show(newer={**self.shown.newer, identity: newer})
+
     def _arrived(self, sent: Sent, lines: tuple[str, ...]) -> None:
+        if sent.revision is not None:
+            # The server announces our own commit as well, before or after its answer.
+            identity = sent.entry.identity.lower()
+            self._mine.add((identity, sent.revision))
+            known = self.shown.newer.get(identity)
+            if known is not None and known.revision <= sent.revision:
+                self._show(newer={key: one for key, one in self.shown.newer.items() if key != identity})
         for line in lines:
             self._listener.console(line)
         self._listener.sent(sent)
@@ -287,6 +327,16 @@ class Session:
         """Work for a worker that needs no server of the session (settings, keyring)."""
         self._aside.submit(Job(title, work, done=done, failed=failed))
 
+    def look(self, work: Callable[[], object]) -> None:
+        """Read files in a worker; nobody waits for the result."""
+        self._looks.submit(Job("Reading files", lambda _control: work()))
+
+    def newer_than(self, identity: str, since: float) -> Newer | None:
+        """What a colleague has committed of an item since then (:func:`time.monotonic`), as far as the server
+        announced it."""
+        newer = self.shown.newer.get(identity.lower())
+        return newer if newer is not None and newer.at > since else None
+
     def in_gui(self, call: Callable[[], Any], control: Control) -> Any:
         """For a job: run ``call`` in the GUI thread and wait for what it gives or raises."""
         finished = threading.Event()
@@ -325,7 +375,7 @@ class Session:
         self._net.cancel()
         if self._left(0.0):
             wait(self._left)
-        for worker in (self._aside, self._rows, self._disk, self._net):
+        for worker in (self._aside, self._looks, self._rows, self._disk, self._net):
             worker.close(0.5)
         if self._online is not None:
             self._online.close()

@@ -116,6 +116,16 @@
         </message>
         <message>
             <location filename="../../commit/dialog.py" />
+            <source>Register it in Silo as well: it has no part number yet</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>Looking for what colleagues committed since…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
             <source>This file is committed:</source>
             <translation type="unfinished" />
         </message>
@@ -131,6 +141,16 @@
         </message>
         <message>
             <location filename="../../commit/dialog.py" />
+            <source>{n} more was only recomputed; check it to commit it all the same.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>{n} more were only recomputed; check them to commit them all the same.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
             <source>File</source>
             <translation type="unfinished" />
         </message>
@@ -141,13 +161,79 @@
         </message>
         <message>
             <location filename="../../commit/dialog.py" />
+            <source>Select:</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>edited</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>all</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>none</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>only this file</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
             <location filename="../../settings/page.py" />
             <source>Commit</source>
             <translation type="unfinished" />
         </message>
         <message>
             <location filename="../../commit/dialog.py" />
+            <source>Ctrl+Return</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
             <source>Cancel</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>(no comment)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>… and {n} more lines</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <location filename="../../commit/theirs.py" />
+            <source>Somebody</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>Commit to Silo – {who} committed since you opened</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>Commit to Silo – changed on disk since you opened</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <source>Do it</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/flow.py" />
+            <source>Looking for colleagues' commits</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -178,6 +264,11 @@
         <message>
             <location filename="../../commit/plan.py" />
             <source>unsaved edits: will be saved</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/plan.py" />
+            <source>recomputed only: nothing differs from the file</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -218,6 +309,71 @@
         <message>
             <location filename="../../commit/snapshot.py" />
             <source>{name} holds {n} registered parts, so its file is no single item's and stays here.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/theirs.py" />
+            <source>leave out</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/theirs.py" />
+            <source>open theirs beside mine</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/theirs.py" />
+            <source>take theirs</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/theirs.py" />
+            <source>commit mine on top</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/theirs.py" />
+            <source>the file on disk was changed since you opened it</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/theirs.py" />
+            <source>{who} committed revision {n}; yours was made from {base}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/theirs.py" />
+            <source>a file that is no revision in Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/theirs.py" />
+            <source>revision {n}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/theirs.py" />
+            <source>{name}: {theirs} in theirs, {mine} in yours</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/theirs.py" />
+            <source>{name}: {base} → {mine} by both of you</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/theirs.py" />
+            <source>{name}: {base} → {theirs} by them, {mine} by you</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/theirs.py" />
+            <source>{name}: {base} → {theirs} by them, as before in yours</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/theirs.py" />
+            <source>{name}: {base} → {mine} by you, as before in theirs</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1055,6 +1211,66 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../register/rows.py" />
             <source>Silo has {number} with the same name</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>Fetching from Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>Yours is kept at {path}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>Took {who}'s revision {n}: {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>Took the file on disk: {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>Not fetched: {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>Searching</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>Asking Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>This server does not know the item of this document.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>Comparing revisions</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>{name} has edits that are not in Silo; it was left alone.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>{name} is open in FreeCAD; it was left alone.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/flow.py" />
+            <source>{path}, which {name} links to, was not fetched: {reason}</source>
             <translation type="unfinished" />
         </message>
         <message>

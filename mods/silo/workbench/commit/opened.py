@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What each open document was made from: the committed file whose content FreeCAD read.
+
+A document observer. A file is known by its content, so it is hashed when FreeCAD opens it, by a worker; the
+stamp that is taken at once says later whether somebody else has replaced the file since. What a document was
+made from stays the same over its own saves, until a commit of it is copied to the outbox.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+Stamp = tuple[int, int, int]
+
+
+class Origins(Protocol):
+    """What is remembered of saved files; :class:`silo.outbox.store.Store` has it."""
+
+    def origin_of(self, sha256: str, /) -> str: ...
+
+    def derived(self, sha256: str, origin: str, /) -> None: ...
+
+
+@dataclass(eq=False)
+class Base:
+    """What one document was made from.
+
+    stamp
+        the file as this document read or wrote it last; None where there was none.
+    origin
+        SHA-256 of the committed file; "" while nobody has looked yet.
+    since
+        seconds of :func:`time.monotonic`: when it was opened, or committed last.
+    """
+
+    path: str
+    stamp: Stamp | None
+    origin: str = ""
+    since: float = field(default_factory=time.monotonic)
+    _lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
+
+    def settle(self, origins: Origins) -> str:
+        """The origin, found out where that is still to do. Any thread; reads the file once."""
+        with self._lock:
+            if not self.origin:
+                from silo.outbox.entry import UNKNOWN
+
+                content = _unchanged_hash(self.path, self.stamp)
+                self.origin = origins.origin_of(content) if content else UNKNOWN
+            return self.origin
+
+    def committed(self, sha256: str) -> None:
+        """A commit of the document has this content; what comes now is made from it."""
+        if sha256:
+            with self._lock:
+                self.origin, self.since = sha256, time.monotonic()
+
+    @property
+    def replaced(self) -> bool:
+        """True where somebody else has written the file since."""
+        now = stamp_of(self.path)
+        return self.stamp is not None and now is not None and now != self.stamp
+
+
+def stamp_of(path: str) -> Stamp | None:
+    """What changes when a file is written; None where there is no file."""
+    try:
+        status = os.stat(path)
+    except OSError:
+        return None
+    return (status.st_mtime_ns, status.st_size, status.st_ino)
+
+
+def _unchanged_hash(path: str, stamp: Stamp | None) -> str:
+    from silo.files import content_hash  # FreeCAD's start does not wait for it
+
+    try:
+        content = content_hash(path)
+    except OSError:
+        return ""
+    return content if stamp is not None and stamp_of(path) == stamp else ""
+
+
+class Opened:
+    """A document observer: document → :class:`Base`.
+
+    outbox
+        gives the store; called by workers, and in the GUI thread where a document is saved at once.
+    """
+
+    def __init__(self, outbox: Callable[[], Origins]) -> None:
+        self._outbox = outbox
+        self._bases: dict[str, Base] = {}
+        self._work: Callable[[Callable[[], object]], object] | None = None
+        self._left: list[Callable[[], object]] = []
+
+    def begin(self, work: Callable[[Callable[[], object]], object]) -> None:
+        """Hand work to a worker from now on; before FreeCAD's window stands none is started."""
+        self._work = work
+        for call in self._left:
+            work(call)
+        self._left.clear()
+
+    def of(self, doc: Any) -> Base:
+        """The base of a document, also of one that was opened before we looked."""
+        known = self._bases.get(doc.Name)
+        if known is None:
+            known = self._bases[doc.Name] = Base(doc.FileName, stamp_of(doc.FileName))
+        return known
+
+    def forget(self, doc: Any) -> None:
+        """The document is closed, or read again."""
+        self._bases.pop(doc.Name, None)
+
+    def _later(self, call: Callable[[], object]) -> None:
+        if self._work is None:
+            self._left.append(call)
+        else:
+            self._work(call)
+
+    def _settle(self, base: Base) -> None:
+        base.settle(self._outbox())
+
+    # FreeCAD calls these; an exception in them would only be printed.
+
+    def slotChangedDocument(self, doc: Any, prop: str) -> None:
+        """FreeCAD names the file before it reads it."""
+        if prop != "FileName" or not doc.FileName:
+            return
+        known = self._bases.get(doc.Name)
+        if known is not None:
+            if known.path != doc.FileName:  # saved under another name; what it was made from stays
+                self._settle(known)
+                known.path, known.stamp = doc.FileName, None
+            return
+        stamp = stamp_of(doc.FileName)
+        # A document that has objects before it has a file was made here.
+        made_here = stamp is None or bool(doc.Objects)
+        base = self._bases[doc.Name] = Base(doc.FileName, None if made_here else stamp)
+        if not made_here:
+            self._later(lambda: self._settle(base))
+
+    def slotDeletedDocument(self, doc: Any) -> None:
+        """Another one may get its name."""
+        self.forget(doc)
+
+    def slotStartSaveDocument(self, doc: Any, filename: str) -> None:
+        """The file that it was made from is about to be replaced: look at it now, if nobody has."""
+        base = self._bases.get(doc.Name)
+        if base is not None and base.path == filename and not base.origin:
+            self._settle(base)
+
+    def slotFinishSaveDocument(self, doc: Any, filename: str) -> None:
+        """The file is ours now."""
+        base = self._bases.get(doc.Name)
+        if base is None or os.path.realpath(filename) != os.path.realpath(doc.FileName or ""):
+            return
+        base.path, base.stamp = doc.FileName, stamp_of(doc.FileName)
+        stamp, origin = base.stamp, base.origin
+
+        def remember() -> None:
+            self._outbox().derived(_unchanged_hash(base.path, stamp), origin)
+
+        if origin:
+            self._later(remember)

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What a colleague did to a file since it was opened here: the look at Silo, and its words. No widgets.
+
+The look belongs into a worker; what it finds are values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any
+
+from silo.bom.changes import Assembly, ThreeLines
+from silo.bom.errors import SiloError
+from silo.bom.naming import display_name
+from silo.workbench.commit.opened import Base, Origins
+from silo.workbench.words import plain, quantity, translate
+
+if TYPE_CHECKING:
+    from silo.api.client import SiloClient
+
+
+class Choice(StrEnum):
+    """What a person wants to be done about a file that a colleague has changed."""
+
+    LEAVE = "leave"  # leave mine out of this commit
+    OPEN = "open"  # open theirs beside mine
+    TAKE = "take"  # take theirs; mine is kept aside
+    ON_TOP = "on top"  # commit mine on top of theirs
+
+
+def choice_texts() -> dict[Choice, str]:
+    """The choices in words, the harmless one first."""
+    return {
+        Choice.LEAVE: translate("Silo", "leave out"),
+        Choice.OPEN: translate("Silo", "open theirs beside mine"),
+        Choice.TAKE: translate("Silo", "take theirs"),
+        Choice.ON_TOP: translate("Silo", "commit mine on top"),
+    }
+
+
+@dataclass(frozen=True)
+class Theirs:
+    """A colleague's state of a file.
+
+    part_number, revision
+        theirs in Silo; "" and 0 where it is only the file on disk that is another one.
+    base
+        the number of the revision that mine was made from; None where nobody knows.
+    lines
+        the BOM base → theirs → mine, for assemblies.
+    """
+
+    path: str
+    part_number: str = ""
+    revision: int = 0
+    who: str = ""
+    when: float | None = None
+    comment: str = ""
+    base: int | None = None
+    lines: tuple[ThreeLines, ...] = ()
+    newer: Mapping[str, Any] | None = None
+
+    @property
+    def headline(self) -> str:
+        """Who committed which revision, and what mine was made from."""
+        if not self.revision:
+            return translate("Silo", "the file on disk was changed since you opened it")
+        text = translate("Silo", "{who} committed revision {n}; yours was made from {base}")
+        if self.base is None:
+            base = translate("Silo", "a file that is no revision in Silo")
+        else:
+            base = translate("Silo", "revision {n}").replace("{n}", str(self.base))
+        who = plain(self.who, 60) or translate("Silo", "Somebody")
+        return text.replace("{base}", base).replace("{n}", str(self.revision)).replace("{who}", who)
+
+
+def line_words(line: ThreeLines, *, known: bool = True) -> str:
+    """``Bolt: 6 → 4 by them, 8 by you``; ``known``: the base is."""
+    base, theirs, mine = (quantity(value) for value in line.quantities)
+    name = plain(display_name(line.entry) or line.entry.object_name, 60)
+    if not known:
+        text = translate("Silo", "{name}: {theirs} in theirs, {mine} in yours")
+    elif line.by_them and line.by_me and theirs == mine:
+        text = translate("Silo", "{name}: {base} → {mine} by both of you")
+    elif line.by_them and line.by_me:
+        text = translate("Silo", "{name}: {base} → {theirs} by them, {mine} by you")
+    elif line.by_them:
+        text = translate("Silo", "{name}: {base} → {theirs} by them, as before in yours")
+    else:
+        text = translate("Silo", "{name}: {base} → {mine} by you, as before in theirs")
+    for key, value in (("{base}", base), ("{theirs}", theirs), ("{mine}", mine)):
+        text = text.replace(key, value)
+    return text.replace("{name}", name)
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A file to look at: its path, the identity of its item, and what the document was made from."""
+
+    path: str
+    identity: str
+    base: Base
+
+
+def look(
+    client: SiloClient,
+    origins: Origins,
+    asked: Iterable[Asked],
+    mine: Callable[[str], Assembly | None],
+    cancelled: Any = None,
+) -> dict[str, Theirs]:
+    """Path → what a colleague committed since, for the files where that is so. For a worker.
+
+    mine
+        the BOM of the document of a path as it is now.
+    """
+    files = [one for one in asked if one.identity]
+    items = client.get_items_by_uuid([one.identity for one in files], cancelled=cancelled)
+    found: dict[str, Theirs] = {}
+    for one in files:
+        item = items.get(one.identity)
+        if item is not None and (theirs := _one(client, origins, one, item.part_number, mine)) is not None:
+            found[one.path] = theirs
+    return found
+
+
+def _one(
+    client: SiloClient,
+    origins: Origins,
+    one: Asked,
+    part_number: str,
+    mine: Callable[[str], Assembly | None],
+) -> Theirs | None:
+    from silo.api.revisions import is_newest, standing
+    from silo.vault.revisions import RevisionBoms
+
+    origin = one.base.settle(origins)
+    if is_newest(origin, client.revisions(part_number, newest=1)):
+        return None
+    known = getattr(origins, "known_revision", lambda *_: None)(client.base_url, origin, one.identity)
+    stands = standing(client.revisions(part_number), origin, known)
+    newest = stands.newer
+    if newest is None:
+        return None
+    lines: tuple[ThreeLines, ...] = ()
+    try:
+        my_bom = mine(one.path)
+        if my_bom is not None:
+            with RevisionBoms(client, part_number, one.path) as boms:
+                lines = boms.three(stands, my_bom)
+    except SiloError:
+        pass  # the question stands without its details
+    return Theirs(
+        one.path,
+        part_number,
+        newest.revision_number,
+        newest.created_by or "",
+        newest.created_at.timestamp() if newest.created_at else None,
+        newest.comment,
+        stands.base.revision_number if stands.base is not None else None,
+        lines,
+        newest.model_dump(mode="json", exclude={"properties", "links"}),
+    )

@@ -1,0 +1,322 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Getting files from Silo into FreeCAD: take a colleague's, open it beside one's own, open an item, history.
+
+Nothing of the user's is replaced without their word, and a copy of what is replaced is kept. Downloads and
+reading are a worker's; opening and closing documents is done in the GUI thread.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+from silo.bom.errors import DocumentError, SiloError
+from silo.folders import cache_folder
+from silo.workbench.commit.snapshot import part_identity
+from silo.workbench.commit.theirs import Choice, Theirs
+from silo.workbench.pane.activity import Entry, Line, Tone
+from silo.workbench.session.session import Session
+from silo.workbench.words import plain, translate
+
+if TYPE_CHECKING:
+    from silo.api.client import SiloClient
+    from silo.api.wire import Item, Revision
+    from silo.vault.pull import Pulled
+    from silo.workbench.session.jobs import Control
+
+MOST_FOUND = 60
+
+
+class Desk(Protocol):
+    """What is needed of FreeCAD (:class:`silo.workbench.freecad.live_desk.LiveDesk`)."""
+
+    def find(self, path: str, /) -> Any | None: ...
+
+    def open(self, path: str, /) -> Any: ...
+
+    def close(self, doc: Any, /) -> None: ...
+
+    def save_copy(self, doc: Any, path: Path, /) -> None: ...
+
+    def open_paths(self) -> tuple[str, ...]: ...
+
+    def is_open_elsewhere(self, path: str, /) -> bool: ...
+
+
+@dataclass(frozen=True)
+class Known:
+    """An item with its revisions that have a file, newest first, and its picture (PNG)."""
+
+    item: Item
+    revisions: tuple[Revision, ...]
+    picture: bytes = b""
+
+
+@dataclass(frozen=True)
+class History:
+    """The item of a document, its revisions, and the one that the document was made from; None: unknown."""
+
+    known: Known
+    base: int | None = None
+
+
+class RevisionFlow:
+    """One per FreeCAD."""
+
+    def __init__(self, session: Session, desk: Desk) -> None:
+        self._session, self._desk = session, desk
+
+    # -- a colleague's file -----------------------------------------------------------------------------
+
+    def choose(self, path: str, theirs: Theirs, choice: Choice) -> None:
+        """Carry out what a person chose in the commit dialog or in the pane."""
+        if choice is Choice.TAKE:
+            self._take(path, theirs)
+        elif choice is Choice.OPEN:
+            self._open_beside(path, theirs)
+
+    def _open_beside(self, path: str, theirs: Theirs) -> None:
+        if not theirs.revision:
+            target = _aside("on-disk", os.path.basename(path))
+            self._guarded(path, lambda: self._open_copy(path, target))
+            return
+        folder = _aside(f"{_word(theirs.part_number)}-r{theirs.revision}")
+        self.pull(
+            theirs.part_number,
+            theirs.revision,
+            folder,
+            overwrite=True,
+            done=lambda pulled: self._guarded(path, lambda: self._desk.open(str(pulled.top))),
+            failed=lambda error: self._box_error(path, error),
+        )
+
+    def _open_copy(self, path: str, target: Path) -> None:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(path, target)
+        self._desk.open(str(target))
+
+    def _take(self, path: str, theirs: Theirs) -> None:
+        if not theirs.revision:
+            self._guarded(path, lambda: self._replace(path, None, theirs))
+            return
+        content = self._session.outbox.path.parent / "fetched" / f"{time.monotonic_ns()}.FCStd"
+
+        def fetch(client: SiloClient, control: Control) -> None:
+            content.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            client.download_file(theirs.part_number, content, theirs.revision, cancelled=control.cancelled)
+
+        self._session.ask(
+            translate("Silo", "Fetching from Silo"),
+            fetch,
+            done=lambda _none: self._guarded(path, lambda: self._replace(path, content, theirs)),
+            failed=lambda error: self._box_error(path, error),
+        )
+
+    def _replace(self, path: str, content: Path | None, theirs: Theirs) -> None:
+        """Theirs in the place of mine, of which a copy is kept. ``content`` None: theirs is there already."""
+        from silo.durable import replacing
+
+        doc = self._desk.find(path)
+        kept = self._session.outbox.keep_aside(path)
+        if doc is not None:
+            mine = kept or _aside("mine", os.path.basename(path))
+            self._desk.save_copy(doc, mine)
+            kept = mine
+            self._desk.close(doc)
+        if content is not None:
+            try:
+                with content.open("rb") as read, replacing(path, mode=0o644) as write:
+                    shutil.copyfileobj(read, write)
+            except OSError as error:
+                raise DocumentError(path, f"cannot be written ({error.strerror or error})") from error
+            content.unlink(missing_ok=True)
+        self._desk.open(path)
+        text = translate("Silo", "Yours is kept at {path}").replace("{path}", str(kept))
+        title = translate("Silo", "Took {who}'s revision {n}: {name}") if theirs.revision else ""
+        title = title or translate("Silo", "Took the file on disk: {name}")
+        for key, value in (("{who}", theirs.who), ("{n}", str(theirs.revision)), ("{name}", _name(path))):
+            title = title.replace(key, value)
+        self._box(path, title, text)
+
+    def _guarded(self, path: str, call: Callable[[], object]) -> None:
+        try:
+            call()
+        except SiloError as error:
+            self._box_error(path, error)
+        except OSError as error:
+            self._box_error(path, DocumentError(path, error.strerror or str(error)))
+
+    def _box_error(self, path: str, error: SiloError) -> None:
+        self._box(
+            path,
+            translate("Silo", "Not fetched: {name}").replace("{name}", _name(path)),
+            str(error),
+            Tone.ERROR,
+        )
+
+    def _box(self, path: str, title: str, text: str, tone: Tone = Tone.PLAIN) -> None:
+        entry = Entry(
+            key=f"fetched:{path}:{time.time()}",
+            title=title,
+            when=time.time(),
+            tone=tone,
+            lines=(Line(text, tone),),
+            rank=1,
+            icon="silo-open",
+        )
+        self._session.add(entry)
+
+    # -- items ------------------------------------------------------------------------------------------
+
+    def search(
+        self, words: str, done: Callable[[list[Item]], None], failed: Callable[[SiloError], None]
+    ) -> None:
+        """Items whose number, name or description have all these words."""
+        self._session.ask(
+            translate("Silo", "Searching"),
+            lambda client, _control: client.search_items(words, limit=MOST_FOUND),
+            done,
+            failed,
+        )
+
+    def details(
+        self, part_number: str, done: Callable[[Known], None], failed: Callable[[SiloError], None]
+    ) -> None:
+        """An item's revisions and picture."""
+        self._session.ask(
+            translate("Silo", "Asking Silo"),
+            lambda client, _control: _known(client, part_number),
+            done,
+            failed,
+        )
+
+    def pull(
+        self,
+        part_number: str,
+        revision: int | None,
+        folder: Path,
+        *,
+        overwrite: bool = False,
+        done: Callable[[Pulled], None],
+        failed: Callable[[SiloError], None],
+    ) -> None:
+        """Fetch a file with all that it links to. What FreeCAD has open, and what has edits that are not in
+        Silo, is left alone; ``overwrite`` replaces the latter and keeps copies."""
+        mine = {os.path.realpath(path) for path in self._desk.open_paths()}
+        outbox = self._session.outbox
+
+        def run(client: SiloClient, control: Control) -> Pulled:
+            from silo.vault.pull import Rules, fetched, place
+
+            def progress(name: str, count: int) -> None:
+                control.progress(f"{count + 1}: {plain(name, 60)}", None)
+
+            rules = Rules(
+                overwrite=overwrite,
+                keep=outbox.keep_aside,
+                is_open=lambda path: os.path.realpath(path) in mine or self._desk.is_open_elsewhere(path),
+                learn=lambda sha256, item, number: outbox.learn(client.base_url, sha256, item, number),
+            )
+            with fetched(
+                client, part_number, revision, cancelled=control.cancelled, progress=progress
+            ) as tree:
+                folder.mkdir(parents=True, exist_ok=True)
+                return place(tree, folder, rules)
+
+        self._session.ask(translate("Silo", "Fetching from Silo"), run, done, failed)
+
+    def open(self, path: str) -> None:
+        """Open a fetched file in FreeCAD; a problem becomes a box of the pane."""
+        self._guarded(path, lambda: self._desk.open(path))
+
+    # -- the history of a document ----------------------------------------------------------------------
+
+    def history(
+        self, doc: Any, base: Any, done: Callable[[History], None], failed: Callable[[SiloError], None]
+    ) -> bool:
+        """The revisions of a document's item; False where the document has none.
+
+        base
+            what the document was made from (:class:`silo.workbench.commit.opened.Base`).
+        """
+        identity = part_identity(doc)
+        if not identity:
+            return False
+        outbox = self._session.outbox
+
+        def run(client: SiloClient, _control: Control) -> History:
+            from silo.api.revisions import standing
+            from silo.bom.errors import NotFoundError
+
+            item = client.get_item_by_uuid(identity)
+            if item is None:
+                raise NotFoundError(translate("Silo", "This server does not know the item of this document."))
+            known = _known(client, item.part_number)
+            origin = base.settle(outbox)
+            number = outbox.known_revision(client.base_url, origin, identity)
+            made_from = standing(known.revisions, origin, number).base
+            return History(known, made_from.revision_number if made_from is not None else None)
+
+        self._session.ask(translate("Silo", "Asking Silo"), run, done, failed)
+        return True
+
+    def bom_change(
+        self,
+        part_number: str,
+        path: str,
+        older: int | None,
+        newer: int,
+        done: Callable[[str], None],
+        failed: Callable[[SiloError], None],
+    ) -> None:
+        """What a revision changed in the BOM, in words; read from both files."""
+
+        def run(client: SiloClient, control: Control) -> str:
+            from silo.vault.revisions import RevisionBoms, words
+
+            with RevisionBoms(client, part_number, path, control.cancelled) as boms:
+                return words(boms.change(older, newer), 40)
+
+        self._session.ask(translate("Silo", "Comparing revisions"), run, done, failed)
+
+
+def _known(client: SiloClient, part_number: str) -> Known:
+    from silo.vault.revisions import file_revisions
+
+    item = client.get_item(part_number)
+    found = file_revisions(client.revisions(part_number))
+    return Known(item, tuple(found), client.thumbnail(part_number) or b"")
+
+
+def left_alone(pulled: Pulled) -> Sequence[str]:
+    """What a pull did not do, in sentences."""
+    from silo.vault.pull import State
+
+    texts = {
+        State.EDITED: translate("Silo", "{name} has edits that are not in Silo; it was left alone."),
+        State.OPEN: translate("Silo", "{name} is open in FreeCAD; it was left alone."),
+    }
+    told = [texts[one.state].replace("{name}", one.path.name) for one in pulled.files if one.state in texts]
+    lost = translate("Silo", "{path}, which {name} links to, was not fetched: {reason}")
+    for one in pulled.lost:
+        text = lost.replace("{path}", one.path or "?").replace("{name}", one.position)
+        told.append(plain(text.replace("{reason}", one.reason), 300))
+    return told
+
+
+def _aside(*names: str) -> Path:
+    return cache_folder().joinpath("revisions", *names)
+
+
+def _word(text: str) -> str:
+    return re.sub(r"[^\w.-]", "_", text) or "item"
+
+
+def _name(path: str) -> str:
+    return plain(os.path.basename(path), 80)

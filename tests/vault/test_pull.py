@@ -1,0 +1,297 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""A project committed on one computer and fetched on another: each file in its place, no edits lost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fcstd_writer import Doc, locals_, part
+from hypothesis import given
+from hypothesis import strategies as st
+
+from silo.bom.errors import DocumentError, NotFoundError
+from silo.bom.links import extract
+from silo.bom.model import Extraction
+from silo.bom.roots import choose_assembly
+from silo.fcstd import Library
+from silo.fcstd.linked import place_of, recorded_paths
+from silo.outbox.entry import Commit
+from silo.outbox.send import send_all
+from silo.outbox.store import Store
+from silo.testing import FakeSilo
+from silo.vault.pull import Pulled, Rules, State, fetched, lay_out, place
+from silo.vault.revisions import RevisionBoms, words
+
+
+def assembly(identity: str, *links: tuple[str, str, int]) -> Doc:
+    """An assembly as Assembly4 makes it; links: (name, file, element count)."""
+    doc = Doc("Top", meta={"SiloUUID": identity})
+    for name, file, count in links:
+        doc.link(name, file, "Box", ElementCount=count)
+    return doc.add("App::Part", "Assembly", Type="Assembly", Group=locals_(*(name for name, _, _ in links)))
+
+
+def bom(path: Path) -> list[tuple[str | None, float, bool]]:
+    """(identity, quantity, missing) of the lines."""
+    with Library() as library:
+        found: Extraction = extract(choose_assembly(library.open(path)))
+    return sorted((e.silo_uuid, e.quantity, e.missing) for e in found.entries)
+
+
+@dataclass
+class Project:
+    """A project of three folders on the first computer, and a Silo.
+
+    ``robot/arm/Arm.FCStd`` links ``parts/Plate.FCStd`` and ``../lib/Bolt.FCStd``; the bolt links
+    ``../../vendor/Nut.FCStd``.
+    """
+
+    folder: Path
+    silo: FakeSilo
+
+    def __post_init__(self) -> None:
+        self.ids = {
+            name: self.silo.create_item("kindred-rd", category, name, item_type=kind).id
+            for name, category, kind in (
+                ("Arm", "A01", "assembly"),
+                ("Plate", "M01", "part"),
+                ("Bolt", "F01", "assembly"),
+                ("Nut", "F01", "part"),
+            )
+        }
+        self.store = Store(self.folder / "data" / "outbox.sqlite3")
+        self.arm = self.folder / "work" / "robot" / "arm" / "Arm.FCStd"
+        self.write(bolts=4)
+        part("Plate", uuid=self.ids["Plate"]).save(self.path("arm/parts/Plate.FCStd"))
+        part("Nut", uuid=self.ids["Nut"]).save(self.folder / "work" / "vendor" / "Nut.FCStd")
+        nut = assembly(self.ids["Bolt"], ("Nut", "../../vendor/Nut.FCStd", 1)).add("Part::Box", "Box")
+        nut.save(self.path("lib/Bolt.FCStd"))
+
+    def path(self, below: str) -> Path:
+        return self.folder / "work" / "robot" / below
+
+    def write(self, bolts: int) -> None:
+        links = (("Plate", "parts/Plate.FCStd", 0), ("Bolts", "../lib/Bolt.FCStd", bolts))
+        assembly(self.ids["Arm"], *links).save(self.arm)
+
+    def stored(self, name: str) -> Any:
+        return next(s for s in self.silo.items.values() if s.item.name == name)
+
+    def number(self, name: str) -> str:
+        return str(self.stored(name).item.part_number)
+
+    def commit(self, *names: str) -> None:
+        paths = {
+            "Arm": self.arm,
+            "Plate": self.path("arm/parts/Plate.FCStd"),
+            "Bolt": self.path("lib/Bolt.FCStd"),
+            "Nut": self.folder / "work" / "vendor" / "Nut.FCStd",
+        }
+        for name in names or ("Nut", "Bolt", "Plate", "Arm"):
+            path = paths[name]
+            self.store.add(
+                Commit(path=str(path), taken_at=1.0, label=name, identity=self.ids[name], file=path)
+            )
+        send_all(self.store, self.silo)
+        assert self.store.entries() == ()
+
+    def pull(self, into: Path, name: str = "Arm", revision: int | None = None, **rules: Any) -> Pulled:
+        with fetched(self.silo, self.number(name), revision) as tree:
+            return place(tree, into, Rules(**rules))
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Project:
+    return Project(tmp_path, FakeSilo())
+
+
+def states(pulled: Pulled, into: Path) -> dict[str, State]:
+    return {one.path.relative_to(into.resolve()).as_posix(): one.state for one in pulled.files}
+
+
+TREE = {
+    "robot/arm/Arm.FCStd",
+    "robot/arm/parts/Plate.FCStd",
+    "robot/lib/Bolt.FCStd",
+    "vendor/Nut.FCStd",
+}
+
+
+def test_a_tree_is_fetched_with_every_file_in_its_place(project: Project, tmp_path: Path) -> None:
+    """Folders above the top have the names that they had; no link is missing, the BOMs are equal."""
+    project.commit()
+    into = tmp_path / "other computer"
+    pulled = project.pull(into)
+    assert states(pulled, into) == dict.fromkeys(TREE, State.NEW)
+    assert pulled.complete
+    assert pulled.top == (into / "robot" / "arm" / "Arm.FCStd").resolve()
+    assert bom(pulled.top) == bom(project.arm)
+    assert not any(missing for _, _, missing in bom(pulled.top))
+    again = project.pull(into)
+    assert set(states(again, into).values()) == {State.SAME}
+
+
+def test_a_chosen_revision_brings_the_files_of_its_time(project: Project, tmp_path: Path) -> None:
+    """And the newest brings the newest of all."""
+    project.commit()
+    part("Plate, thicker", uuid=project.ids["Plate"]).save(project.path("arm/parts/Plate.FCStd"))
+    project.write(bolts=6)
+    project.commit("Plate", "Arm")
+    part("Plate, thickest", uuid=project.ids["Plate"]).save(project.path("arm/parts/Plate.FCStd"))
+    project.commit("Plate")
+
+    plates = [content for _, content in sorted(project.stored("Plate").files.items())]
+    for revision, plate, bolts in ((1, plates[0], 4), (2, plates[1], 6), (None, plates[2], 6)):
+        into = tmp_path / f"at {revision}"
+        pulled = project.pull(into, revision=revision)
+        assert pulled.complete
+        assert (into / "robot/arm/parts/Plate.FCStd").read_bytes() == plate
+        assert next(q for i, q, _ in bom(pulled.top) if i == project.ids["Bolt"]) == bolts
+
+
+def test_local_edits_are_not_overwritten_unasked(project: Project, tmp_path: Path) -> None:
+    """An older revision is replaced, an edited file is not; at the user's word it is, and a copy is kept."""
+    project.commit()
+    into = tmp_path / "mine"
+    project.pull(into)
+    project.write(bolts=6)
+    part("Plate, thicker", uuid=project.ids["Plate"]).save(project.path("arm/parts/Plate.FCStd"))
+    project.commit("Plate", "Arm")
+    plate = into / "robot/arm/parts/Plate.FCStd"
+    part("mine", uuid=project.ids["Plate"]).save(plate)
+    edited = plate.read_bytes()
+    pulled = project.pull(into)
+    told = states(pulled, into)
+    assert told["robot/arm/Arm.FCStd"] is State.UPDATED
+    assert told["robot/arm/parts/Plate.FCStd"] is State.EDITED
+    assert not pulled.complete
+    assert plate.read_bytes() == edited
+    pulled = project.pull(into, overwrite=True, keep=project.store.keep_aside)
+    (one,) = [one for one in pulled.files if one.state is State.OVERWRITTEN]
+    assert one.kept is not None
+    assert one.kept.read_bytes() == edited
+    assert plate.read_bytes() == project.path("arm/parts/Plate.FCStd").read_bytes()
+
+
+def test_what_freecad_has_open_is_left_alone(project: Project, tmp_path: Path) -> None:
+    """Its next save would undo what is written."""
+    project.commit()
+    into = tmp_path / "mine"
+    project.pull(into)
+    project.write(bolts=6)
+    project.commit("Arm")
+    pulled = project.pull(into, is_open=lambda path: path.endswith("Arm.FCStd"))
+    assert states(pulled, into)["robot/arm/Arm.FCStd"] is State.OPEN
+    assert bom(pulled.top) != bom(project.arm)
+
+
+def test_a_part_goes_where_the_folder_has_it_already(project: Project, tmp_path: Path) -> None:
+    """Fetched alone it would begin a second copy beside the project."""
+    project.commit()
+    into = tmp_path / "mine"
+    project.pull(into)
+    part("Plate, thicker", uuid=project.ids["Plate"]).save(project.path("arm/parts/Plate.FCStd"))
+    project.commit("Plate")
+    pulled = project.pull(into, "Plate")
+    assert states(pulled, into) == {"robot/arm/parts/Plate.FCStd": State.UPDATED}
+    alone = tmp_path / "alone"
+    assert set(states(project.pull(alone, "Plate"), alone)) == {"Plate.FCStd"}
+
+
+def test_what_is_not_in_silo_is_reported(project: Project, tmp_path: Path) -> None:
+    """A part that was never committed: the rest comes, and the pull is not complete."""
+    project.commit("Nut", "Bolt", "Arm")
+    pulled = project.pull(tmp_path / "into")
+    (lost,) = pulled.lost
+    assert (lost.position, lost.path) == ("Arm.FCStd", "parts/Plate.FCStd")
+    assert "has no file in Silo" in lost.reason
+    assert len(pulled.files) == 3
+    with pytest.raises(NotFoundError, match="no file with the revision 9"):
+        project.pull(tmp_path / "into", revision=9)
+    with pytest.raises(NotFoundError, match="no file yet"):
+        project.pull(tmp_path / "into", "Plate")
+
+
+def test_without_what_the_commit_wrote_down_the_bom_says_it(project: Project, tmp_path: Path) -> None:
+    """Files of an older client or another server: by the BOM's components, else by the files' names."""
+    project.commit()
+    for stored in project.silo.items.values():
+        stored.revisions[:] = [
+            r.model_copy(update={"links": [], "file_path": None}) for r in stored.revisions
+        ]
+    for parent, children in (("Arm", ("Plate", "Bolt")), ("Bolt", ("Nut",))):
+        for child in children:
+            project.silo.add_bom_line(project.number(parent), project.number(child), quantity=1)
+    into = tmp_path / "into"
+    pulled = project.pull(into)
+    assert pulled.complete
+    assert bom(pulled.top) == bom(project.arm)
+
+
+def test_a_hostile_path_leaves_the_folder_alone(project: Project, tmp_path: Path) -> None:
+    """Absolute, on the network, a device, no FreeCAD file, and a folder that is a link to elsewhere."""
+    bad = ("/etc/passwd.FCStd", "//host/x.FCStd", "C:/x.FCStd", "NUL.FCStd", "../.bashrc", "parts/run.py")
+    links = tuple((f"L{n}", path, 0) for n, path in enumerate(bad))
+    assembly(project.ids["Arm"], *links, ("Plate", "parts/Plate.FCStd", 0)).save(project.arm)
+    project.commit("Plate", "Arm")
+    into = tmp_path / "into"
+    pulled = project.pull(into)
+    assert {lost.path for lost in pulled.lost} == set(bad)
+    assert set(states(pulled, into)) == {"Arm.FCStd", "parts/Plate.FCStd"}
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "parts").symlink_to(elsewhere)
+    with pytest.raises(DocumentError, match="leads out of"):
+        project.pull(other)
+    assert list(elsewhere.iterdir()) == []
+
+
+def test_a_file_knows_its_place_and_links(project: Project) -> None:
+    """Each recorded path once, with the identity in the file and its hash."""
+    found = place_of(project.arm, str(project.arm))
+    assert found.path == "arm/Arm.FCStd"
+    assert {link.path: link.item for link in found.links} == {
+        "parts/Plate.FCStd": project.ids["Plate"],
+        "../lib/Bolt.FCStd": project.ids["Bolt"],
+    }
+    assert all(len(link.sha256) == 64 for link in found.links)
+    project.path("lib/Bolt.FCStd").unlink()
+    gone = place_of(project.arm, str(project.arm))
+    assert [(link.item, link.sha256) for link in gone.links if "Bolt" in link.path] == [("", "")]
+    assert set(recorded_paths(project.arm)) == {link.path for link in gone.links}
+
+
+def test_the_bom_of_each_revision(project: Project) -> None:
+    """Read from the files as if they lay where the user's file lies."""
+    project.commit()
+    project.write(bolts=6)
+    project.commit("Arm")
+    with RevisionBoms(project.silo, project.number("Arm"), str(project.arm)) as boms:
+        assert words(boms.change(1, 2)) == "Box 4 → 6"
+        assert words(boms.change(None, 1)).startswith("+ ")
+    with RevisionBoms(project.silo, project.number("Plate"), "/nowhere/Plate.FCStd") as boms:
+        assert boms.change(None, 1) == ()
+
+
+NAMES = st.sampled_from(["a", "b", "c"])
+
+
+@given(st.lists(NAMES, max_size=4), st.lists(st.tuples(st.lists(NAMES, max_size=3), NAMES), max_size=6))
+def test_relative_places_are_kept_whatever_the_folders(
+    top: list[str], others: list[tuple[list[str], str]]
+) -> None:
+    """A law: wherever the files lie, laid out anew each is in the same place relative to the top."""
+    import posixpath
+
+    files = {"/".join(["root", *folders, f"{name}.FCStd"]) for folders, name in others}
+    top_path = "/".join(["root", *top, "Top.FCStd"])
+    positions = ["Top.FCStd", *(posixpath.relpath(one, posixpath.dirname(top_path)) for one in sorted(files))]
+    places = lay_out((position, None) for position in positions)
+    assert not any(".." in one.split("/") for one in places)
+    for position, where in zip(positions, places, strict=True):
+        assert posixpath.relpath(where, posixpath.dirname(places[0]) or ".") == position

@@ -1,0 +1,304 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Two people, one item: what the commit dialog is given, and what its choices do. Without FreeCAD and Qt."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+from desk import Document, Office
+
+from silo.api.wire import Origin
+from silo.bom.changes import ThreeLines
+from silo.bom.model import BomEntry
+from silo.outbox.entry import State
+from silo.workbench.commit.desk import Answer, Look
+from silo.workbench.commit.flow import CommitFlow
+from silo.workbench.commit.opened import Opened, stamp_of
+from silo.workbench.commit.plan import Plan
+from silo.workbench.commit.theirs import Choice, Theirs, line_words
+
+
+@pytest.fixture(name="flow")
+def _flow(office: Office) -> CommitFlow:
+    return CommitFlow(office.session, office.preferences, office.desk, path=office.folder / "same.json")
+
+
+def number_of(office: Office, name: str) -> str:
+    return next(s.item.part_number for s in office.silo.items.values() if s.item.name == name)
+
+
+def colleague(office: Office, name: str, content: bytes, base: int) -> None:
+    """A commit from another computer."""
+    path = office.folder / "theirs" / f"{name}.FCStd"
+    path.parent.mkdir(exist_ok=True)
+    path.write_bytes(content)
+    office.silo.user = "alice"
+    office.silo.upload_file(number_of(office, name), path, "less", origin=Origin(base_revision=base))
+    office.silo.user = "designer"
+
+
+def committed(office: Office, flow: CommitFlow, name: str, content: bytes) -> Document:
+    """A document whose file is revision 1."""
+    doc = office.document(name, content)
+    flow.start(doc)
+    office.settle()
+    return doc
+
+
+def edit(doc: Document, content: bytes) -> None:
+    doc.content, doc.changed = content, True
+
+
+class Person:
+    """Answers the dialog once the look at Silo is done."""
+
+    def __init__(self, office: Office, choice: Choice | None = None) -> None:
+        self.office, self.choice = office, choice
+        self.seen: dict[str, Theirs] = {}
+        office.preferences.set("AskComment", True)
+        office.desk.decide = self
+
+    def __call__(self, planned: Plan, look: Look) -> Answer | None:
+        answers: list[Mapping[str, Theirs]] = []
+        look(answers.append)
+        self.office.gui.run_until(lambda: self.office.session.idle and answers)
+        self.seen = dict(answers[-1])
+        from dataclasses import replace
+
+        rows = []
+        choices = []
+        for row in planned.rows:
+            theirs = self.seen.get(row.path)
+            if theirs is None:
+                rows.append(row)
+            elif self.choice is Choice.ON_TOP:
+                rows.append(replace(row, on_top=theirs.newer or {}))
+            elif self.choice is not None:
+                choices.append((row, theirs, self.choice))
+        return Answer(tuple(rows), "mine", choices=tuple(choices))
+
+
+def test_nothing_is_asked_where_nobody_else_committed(office: Office, flow: CommitFlow) -> None:
+    """Own commits, one after the other."""
+    doc = committed(office, flow, "Plate", b"one")
+    person = Person(office)
+    for content in (b"two", b"three"):
+        edit(doc, content)
+        flow.start(doc)
+        office.settle()
+        assert person.seen == {}
+    assert office.files("Plate") == [b"one", b"two", b"three"]
+
+
+def test_a_colleagues_commit_is_a_question_and_nothing_goes_without_a_choice(
+    office: Office, flow: CommitFlow
+) -> None:
+    """Who, when, what; neither saved nor sent."""
+    doc = committed(office, flow, "Plate", b"one")
+    colleague(office, "Plate", b"one less", 1)
+    edit(doc, b"one other")
+    person = Person(office)
+    flow.start(doc)
+    office.settle()
+    (theirs,) = person.seen.values()
+    assert (theirs.who, theirs.revision, theirs.base, theirs.comment) == ("alice", 2, 1, "less")
+    assert theirs.headline == "alice committed revision 2; yours was made from revision 1"
+    assert office.files("Plate") == [b"one", b"one less"]
+    assert Path(doc.FileName).read_bytes() == b"one"
+
+
+def test_on_top_at_a_persons_word(office: Office, flow: CommitFlow) -> None:
+    """The comment notes it; the next commit is made from that one."""
+    doc = committed(office, flow, "Plate", b"one")
+    colleague(office, "Plate", b"one less", 1)
+    edit(doc, b"one other")
+    person = Person(office, Choice.ON_TOP)
+    flow.start(doc)
+    office.settle()
+    newest = office.silo.revisions(number_of(office, "Plate"))[0]
+    assert newest.comment == "mine (on top of revision 2 by alice, which is not in it)"
+    assert newest.base_revision == 2
+    edit(doc, b"next")
+    flow.start(doc)
+    office.settle()
+    assert person.seen == {}
+    assert office.files("Plate")[-1] == b"next"
+
+
+def test_other_choices_are_handed_on(office: Office, flow: CommitFlow) -> None:
+    """The other files of the commit go."""
+    leaf, top = committed(office, flow, "Leaf", b"one"), committed(office, flow, "Top", b"top")
+    top.OutList = [leaf]
+    colleague(office, "Leaf", b"theirs", 1)
+    edit(leaf, b"mine")
+    edit(top, b"new top")
+    wanted: list[Any] = []
+    flow.choose = lambda *what: wanted.append(what)
+    Person(office, Choice.TAKE)
+    flow.start(top)
+    office.settle()
+    assert office.files("Top") == [b"top", b"new top"]
+    assert office.files("Leaf") == [b"one", b"theirs"]
+    ((path, theirs, choice),) = wanted
+    assert (path, theirs.revision, choice) == (leaf.FileName, 2, Choice.TAKE)
+
+
+def test_without_the_dialog_it_waits_in_the_pane(office: Office, flow: CommitFlow) -> None:
+    """The look at sending catches it; file and BOM are held with the question."""
+    doc = committed(office, flow, "Plate", b"one")
+    colleague(office, "Plate", b"one less", 1)
+    edit(doc, b"one other")
+    flow.start(doc)
+    office.settle()
+    (held,) = office.session.shown.waiting
+    assert (held.state, held.newer["revision_number"]) == (State.HELD, 2)
+    assert office.files("Plate") == [b"one", b"one less"]
+
+
+def test_a_file_that_somebody_replaced_is_asked_about_also_offline(office: Office, flow: CommitFlow) -> None:
+    """A colleague's save on a shared drive: the dialog comes although comments are not asked for."""
+    doc = committed(office, flow, "Plate", b"one")
+    Path(doc.FileName).write_bytes(b"by a colleague, not committed")
+    edit(doc, b"mine")
+
+    asked: list[Plan] = []
+
+    def person(planned: Plan, look: Look) -> Answer | None:
+        asked.append(planned)
+        found: list[Mapping[str, Theirs]] = []
+        look(found.append)
+        assert found[0][doc.FileName].headline == "the file on disk was changed since you opened it"
+        return None
+
+    office.desk.decide = person
+    flow.start(doc)
+    office.settle()
+    assert [row.replaced for row in asked[0].rows] == [True]
+    office.desk.decide = lambda planned, _look: Answer(planned.rows, "mine")
+    flow.start(doc)
+    office.settle()
+    kept = [path.read_bytes() for path in (office.folder / "data" / "kept-aside").rglob("*.FCStd")]
+    assert kept == [b"by a colleague, not committed"]
+    assert office.files("Plate")[-1] == b"mine"
+
+
+def test_a_lines_words() -> None:
+    """Base, theirs and mine, in a sentence."""
+
+    def entry(quantity: int) -> BomEntry | None:
+        return (
+            BomEntry("Bolt.FCStd", object_name="Body", label="Bolt", quantity=quantity) if quantity else None
+        )
+
+    def said(base: int, theirs: int, mine: int) -> str:
+        return line_words(ThreeLines(entry(base), entry(theirs), entry(mine)))
+
+    assert said(6, 0, 6) == "Bolt: 6 → 0 by them, as before in yours"
+    assert said(6, 4, 8) == "Bolt: 6 → 4 by them, 8 by you"
+    assert said(6, 6, 8) == "Bolt: 6 → 8 by you, as before in theirs"
+    assert said(6, 8, 8) == "Bolt: 6 → 8 by both of you"
+
+
+# --- what a document was made from -----------------------------------------------------------------------
+
+
+class Store:
+    """What is remembered of saved files."""
+
+    def __init__(self) -> None:
+        self.known: dict[str, str] = {}
+
+    def origin_of(self, sha256: str, /) -> str:
+        return self.known.get(sha256, sha256)
+
+    def derived(self, sha256: str, origin: str, /) -> None:
+        self.known[sha256] = origin
+
+
+class Doc:
+    """A document with FreeCAD's names."""
+
+    def __init__(self, name: str) -> None:
+        self.Name, self.FileName, self.Objects = name, "", []  # type: ignore[var-annotated]
+
+
+def opened_as(opened: Opened, path: Path, name: str = "Doc") -> Doc:
+    doc = Doc(name)
+    doc.FileName = str(path)
+    opened.slotChangedDocument(doc, "FileName")
+    return doc
+
+
+def save(opened: Opened, doc: Doc, content: bytes) -> None:
+    opened.slotStartSaveDocument(doc, doc.FileName)
+    new = Path(doc.FileName + ".new")
+    new.write_bytes(content)
+    new.replace(doc.FileName)
+    opened.slotFinishSaveDocument(doc, doc.FileName)
+
+
+def sha(content: bytes) -> str:
+    import hashlib
+
+    return hashlib.sha256(content).hexdigest()
+
+
+@pytest.mark.parametrize("busy", [False, True], ids=["a worker is there", "it has no time"])
+def test_own_saves_keep_the_origin_over_a_restart(tmp_path: Path, busy: bool) -> None:
+    """Opened, saved twice, opened again by another FreeCAD: still made from what was opened first."""
+    path, store = tmp_path / "a.FCStd", Store()
+    path.write_bytes(b"one")
+    opened = Opened(lambda: store)
+    if not busy:
+        opened.begin(lambda call: call())
+    doc = opened_as(opened, path)
+    for content in (b"two", b"three"):
+        save(opened, doc, content)
+        assert not opened.of(doc).replaced
+    if busy:
+        opened.begin(lambda call: call())
+    assert opened.of(doc).settle(store) == sha(b"one")
+    again = Opened(lambda: store)
+    assert again.of(opened_as(again, path)).settle(store) == sha(b"one")
+
+
+def test_a_file_that_another_wrote_is_replaced_and_its_origin_stays(tmp_path: Path) -> None:
+    """Two FreeCADs on one file."""
+    path, store = tmp_path / "a.FCStd", Store()
+    path.write_bytes(b"one")
+    mine, other = Opened(lambda: store), Opened(lambda: store)
+    for opened in (mine, other):
+        opened.begin(lambda call: call())
+    doc, theirs = opened_as(mine, path), opened_as(other, path)
+    save(other, theirs, b"by the other")
+    assert (mine.of(doc).replaced, other.of(theirs).replaced) == (True, False)
+    assert mine.of(doc).settle(store) == sha(b"one")
+
+
+def test_a_document_that_was_made_here_has_no_origin(tmp_path: Path) -> None:
+    """Saved over an existing file it is not made from that one."""
+    path, store = tmp_path / "a.FCStd", Store()
+    path.write_bytes(b"somebody's")
+    opened = Opened(lambda: store)
+    doc = Doc("New")
+    doc.Objects.append("Box")
+    doc.FileName = str(path)
+    opened.slotChangedDocument(doc, "FileName")
+    save(opened, doc, b"new")
+    assert opened.of(doc).settle(store) != sha(b"somebody's")
+
+
+def test_a_commit_is_what_comes_after_it_is_made_from(tmp_path: Path) -> None:
+    """And closing a document forgets it."""
+    path, store = tmp_path / "a.FCStd", Store()
+    path.write_bytes(b"one")
+    opened = Opened(lambda: store)
+    doc = opened_as(opened, path)
+    opened.of(doc).committed(sha(b"two"))
+    assert opened.of(doc).settle(store) == sha(b"two")
+    opened.slotDeletedDocument(doc)
+    assert opened.of(doc).origin == ""
+    assert opened.of(doc).stamp == stamp_of(str(path))
