@@ -8,6 +8,7 @@ import os
 import shlex
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -37,13 +38,66 @@ def test_a_reader_that_has_seen_enough_is_no_failure(gearbox: Path, option: str)
     assert len(ran.stdout.splitlines()) == 1
 
 
-@pytest.mark.usefixtures("needs_dev_full")
+FULL = pytest.mark.usefixtures("needs_dev_full")
+
+
+@FULL
 @pytest.mark.parametrize("option", ["", "--json"])
 def test_a_full_disk_is_one_sentence(gearbox: Path, option: str) -> None:
     """And not exit code 0: the answer did not arrive."""
     ran = shell(f"silo-mod bom '{gearbox}' {option} > /dev/full")
     assert ran.returncode == 2
     assert len(ran.stderr.splitlines()) == 1
+
+
+@FULL
+@pytest.mark.parametrize("ending", ["| head -1", "> /dev/full"])
+def test_a_sync_that_nobody_reads_is_done_to_its_end(silo: Any, run: Any, gearbox: Path, ending: str) -> None:
+    """With its report: the output is for people, the work is what was asked for."""
+    run("register", gearbox, "--yes")
+    report = gearbox.parent / "report.md"
+    options = f"--recursive --report '{report}' --server {silo.client.base_url} --token {silo.token}"
+    ran = shell(f"silo-mod sync '{gearbox.parent}' {options} {ending}")
+    assert ran.returncode == (0 if "head" in ending else 2), ran.stderr
+    assert "files in order" in report.read_text()
+    assert {line.child_part_number for line in silo.client.get_bom(_number(silo, "TopAssembly"))}
+
+
+def _number(silo: Any, name: str) -> str:
+    return next(str(item["part_number"]) for item in silo.client.search_items(name))
+
+
+def test_watch_ends_with_its_reader(silo: Any) -> None:
+    """It has no end of its own: ``silo-mod watch | head -1`` is over with the event after that one."""
+    watch = f"{SILO_MOD} watch --json --server {silo.client.base_url} --token {silo.token} | head -1"
+    with subprocess.Popen(["bash", "-c", watch], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as shell:
+        for number in range(100):  # it may not listen yet at the first ones
+            silo.client.create_item("kindred-rd", "F01", f"Screw {number}")
+            with suppress(subprocess.TimeoutExpired):
+                shell.wait(timeout=0.5)
+                break
+        assert shell.stdout is not None
+        assert json.loads(shell.stdout.read())["id"]
+        assert shell.returncode == 0
+
+
+@pytest.mark.usefixtures("needs_signals")
+def test_a_term_signal_ends_a_command_as_ctrl_c_does() -> None:
+    """Exit code 130, with a sentence: nobody takes it for done."""
+    code = (
+        "import sys, time\nfrom silo.cli import bom, main\n"
+        "bom.run = lambda args: (print('up', flush=True), time.sleep(60))\n"
+        "sys.argv = ['silo-mod', 'bom', 'x.FCStd']\nsys.exit(main.main())"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as job:
+        assert job.stdout is not None
+        assert job.stderr is not None
+        assert job.stdout.readline() == b"up\n"
+        job.terminate()
+        assert job.stderr.read() == b"\nCancelled.\n"
+    assert job.returncode == 130
 
 
 def test_a_job_may_have_no_streams(gearbox: Path) -> None:

@@ -11,12 +11,16 @@ import argparse
 import importlib
 import io
 import os
+import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
+from typing import TextIO, TypeVar
 
 from silo.bom.errors import CancelledError, ConflictError, RejectedError, RemoteError, SiloError
 
+T = TypeVar("T")
 OK, UNDONE, BAD_INPUT, REMOTE, CANCELLED = 0, 1, 2, 3, 130
 
 _COMMANDS = (
@@ -69,18 +73,33 @@ def _version() -> str:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; returns its exit code."""
     _open_streams()
+    if argv is None:  # a program of its own: a TERM signal ends it as Ctrl-C does, with its report
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+    output, errors = sys.stdout, sys.stderr
+    sys.stdout = kept = _Output(output)
+    sys.stderr = _Output(errors)
+    try:
+        code = _run(argv)
+        kept.flush()
+    finally:
+        sys.stdout, sys.stderr = output, errors
+    if kept.failure is None or isinstance(kept.failure, BrokenPipeError):
+        return code
+    return max(code, _system_said_no(kept.failure))
+
+
+def _run(argv: Sequence[str] | None) -> int:
     try:
         args = build_parser().parse_args(argv)
+        if getattr(args, "ends_with_its_reader", False):
+            sys.stdout.strict = True  # type: ignore[union-attr]
         code: int = args.run(args)
-        sys.stdout.flush()
         return code
     except KeyboardInterrupt:
         print("\nCancelled.", file=sys.stderr)
         return CANCELLED
     except BrokenPipeError:
-        # The reader (head, less) has seen enough; that is no error. Nothing may be flushed any more.
-        _forget_output()
-        return OK
+        return OK  # of a command that only ends with its reader
     except OSError as error:
         return _system_said_no(error)
     except CancelledError:
@@ -102,17 +121,58 @@ def _open_streams() -> None:
             stream.reconfigure(errors="replace")
 
 
-def _forget_output() -> None:
-    """Python writes what is left at its end, which fails as what came before did."""
-    sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+class _Output(io.TextIOBase):
+    """A stream whose end does not end the work: what nobody can read any more is dropped, the rest is done.
+
+    ``head`` closes its pipe after ten lines, a disk is full: a sync is finished all the same, and its report
+    written. ``failure`` is what went wrong. ``strict``: raise it instead, for commands without an end.
+    """
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        self.failure: OSError | None = None
+        self.strict = False
+
+    def write(self, text: str, /) -> int:
+        return self._attempt(lambda: self._stream.write(text), len(text))
+
+    def flush(self) -> None:
+        self._attempt(self._stream.flush, None)
+
+    def _attempt(self, act: Callable[[], T], otherwise: T) -> T:
+        if self.failure is None:
+            try:
+                return act()
+            except OSError as error:
+                self.failure = error
+                self._forget()
+        if self.strict:
+            raise self.failure
+        return otherwise
+
+    def _forget(self) -> None:
+        """Python writes what is left at its end, which would fail again."""
+        with suppress(OSError, ValueError):
+            null = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(null, self._stream.fileno())
+            os.close(null)
+
+    def fileno(self) -> int:
+        return self._stream.fileno()
+
+    def isatty(self) -> bool:
+        return self._stream.isatty()
+
+    @property
+    def encoding(self) -> str:  # type: ignore[override]
+        """That of the stream."""
+        return getattr(self._stream, "encoding", None) or "utf-8"
 
 
 def _system_said_no(error: OSError) -> int:
     """A file that we were told to write, or the output itself: no such folder, no right, a full disk."""
     what = error.filename or "the output cannot be written"
     print(f"silo-mod: {what}: {error.strerror or error}", file=sys.stderr)
-    if error.filename is None:
-        _forget_output()
     return BAD_INPUT
 
 

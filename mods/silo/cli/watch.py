@@ -35,7 +35,7 @@ def register(commands: Commands) -> None:
     parser.add_argument("--count", type=int, metavar="N", help="end after N events")
     common.add_json_option(parser)
     common.add_server_options(parser)
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, ends_with_its_reader=True)
 
 
 def run(args: argparse.Namespace) -> int:
