@@ -148,7 +148,7 @@ class SiloServer(uvicorn.Server):
 
 def serve(
     host: str = "127.0.0.1",
-    port: int = 8000,
+    port: int = 8080,
     database_url: str | None = None,
     *,
     workers: int = 1,
@@ -174,8 +174,12 @@ def serve(
             "(--workers 1); it answers several requests at once."
         )
     given = token or os.environ.get("SILO_API_TOKEN") or None
-    welcome = _prepare(settings, given, reset_admin)
-    sock = _bind(host, port)
+    sock = _bind(host, port)  # first: where the port is taken, no token is made that nobody sees
+    try:
+        welcome = _prepare(settings, given, reset_admin)
+    except BaseException:
+        sock.close()
+        raise
     base_url = _base_url(host, sock.getsockname()[1])
     settings = replace(settings, public_url=settings.public_url or base_url)
     database, login_url = _without_password(settings), _login_url(settings, welcome)
@@ -211,8 +215,12 @@ def running_server(
     """
     base = settings or Settings(database_url=database_url)
     given = replace(base, database_url=database_url, files_dir=files_dir or base.files_dir)
-    welcome = _prepare(given, token)
     sock = _bind(host, port)
+    try:
+        welcome = _prepare(given, token)
+    except BaseException:
+        sock.close()
+        raise
     base_url = _base_url(host, sock.getsockname()[1])
     given = replace(given, public_url=given.public_url or base_url)
     app = create_app(given)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import logging
 import os
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -31,11 +32,11 @@ def test_without_a_server_the_message_says_how_to_get_one(path: Path) -> None:
 
 
 def test_options_win_over_the_environment_and_that_over_the_file(path: Path) -> None:
-    """Each may be given alone; blanks count as nothing."""
+    """Each may be given alone; an empty variable counts as none."""
     save_config("http://file", "silo_file", path=path)
     env = {"SILO_API_URL": "http://env", "SILO_API_TOKEN": " silo_env "}
     assert resolve_server("http://option", "silo_option", env=env, path=path).url == "http://option"
-    from_env = resolve_server(" ", None, env=env, path=path)
+    from_env = resolve_server(None, None, env=env, path=path)
     assert (from_env.url, from_env.token) == ("http://env", "silo_env")
     assert (from_env.url_from, from_env.token_from) == ("SILO_API_URL", "SILO_API_TOKEN")
     from_file = resolve_server(env={}, path=path)
@@ -123,6 +124,31 @@ def test_a_broken_file_is_told_with_its_name(path: Path, text: str, told: str) -
     with pytest.raises(ConfigError, match=told) as caught:
         resolve_server(env={}, path=path)
     assert str(path) in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ('# mine\nurl = "http://h"\n', "line 2: unknown key url; it belongs below [server]"),
+        ('\n[Server]\nurl = "http://h"\n', "line 2: unknown table [Server]; did you mean [server]?"),
+        (
+            '[server]\nurl = "http://h"\ntokn = "t"\n',
+            "line 3: unknown key tokn in [server]; did you mean token?",
+        ),
+        (
+            '[server]\nurl = "http://h"\nproxy = 1\n',
+            "line 3: unknown key proxy in [server] (known: url, token",
+        ),
+        ("[server.url]\nx = 1\n", "server.url wants a text"),
+    ],
+)
+def test_what_means_nothing_is_an_error_with_its_line(path: Path, text: str, told: str) -> None:
+    """A misspelt token must not look like no token."""
+    path.parent.mkdir()
+    path.write_text(text)
+    path.chmod(0o600)
+    with pytest.raises(ConfigError, match=re.escape(told)):
+        resolve_server(env={}, path=path)
 
 
 def test_nonsense_is_not_saved(path: Path) -> None:

@@ -147,3 +147,4 @@ def test_a_port_that_is_taken_is_one_sentence(tmp_path: Path, capsys: pytest.Cap
         port = str(other.getsockname()[1])
         assert main(["serve", "--port", port, "--database", f"sqlite:///{tmp_path / 'silo.db'}"]) == 2
     assert "--port 0" in capsys.readouterr().err
+    assert not (tmp_path / "silo.db").exists()  # nor a user or a token that nobody has seen

@@ -11,12 +11,14 @@ The file is TOML, readable by its owner only::
 
 from __future__ import annotations
 
+import difflib
 import json
 import logging
 import os
+import re
 import stat
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -31,10 +33,11 @@ log = logging.getLogger("silo.api")
 
 URL, TOKEN, VERIFY = "SILO_API_URL", "SILO_API_TOKEN", "SILO_SSL_VERIFY"
 
+_KEYS = ("url", "token", "verify")
 _YES, _NO = ("1", "true", "yes", "on"), ("0", "false", "no", "off")
 _HOW = (
-    "Start one on this computer with `silo-mod serve` (it prints its address and a token), then set "
-    f"{URL} and {TOKEN}, or give --server and --token"
+    "Start one on this computer with `silo-mod serve` (it prints its address and a token), then run "
+    f"`silo-mod login URL`, set {URL} and {TOKEN}, or give --server and --token"
 )
 
 
@@ -68,7 +71,10 @@ def resolve_server(
     environment names.
     """
     path = path or config_path(env)
-    stored = _server_table(path)
+    for option, given in (("--server", server), ("--token", token)):
+        if given is not None and not given.strip():
+            raise ConfigError(f"{option} is empty; leave it out, or give a value (a variable may be unset)")
+    stored = checked_config(path).get("server", {})
     file_url, file_token = _text(stored, "url", path), _text(stored, "token", path)
     url, url_from = _first(("--server", server), (URL, env.get(URL)), (str(path), file_url))
     if url is None:
@@ -116,11 +122,38 @@ def save_config(
     return path
 
 
-def _server_table(path: Path) -> dict[str, Any]:
-    table = load_config(path).get("server", {})
-    if not isinstance(table, dict):
-        raise ConfigError(f"{path}: wanted a table [server], got {table!r}")
-    return table
+def checked_config(path: Path) -> dict[str, Any]:
+    """The file's tables; ConfigError, with the lines, where a key or a table means nothing to us."""
+    config = load_config(path)
+    problems = []
+    for name, value in config.items():
+        if name != "server":
+            inside = "; it belongs below [server]" if name in _KEYS else _meant(name, ("server",), "[{}]")
+            what = f"unknown table [{name}]" if isinstance(value, dict) else f"unknown key {name}"
+            problems.append(f"line {_line(path, name)}: {what}{inside}")
+        elif not isinstance(value, dict):
+            problems.append(f"line {_line(path, name)}: wanted a table [server], got {value!r}")
+        else:
+            problems += [
+                f"line {_line(path, key)}: unknown key {key} in [server]{_meant(key, _KEYS, '{}')}"
+                for key in value
+                if key not in _KEYS
+            ]
+    if problems:
+        raise ConfigError(f"{path}: {'; '.join(problems)}. Mend or remove it")
+    return config
+
+
+def _meant(name: str, known: Sequence[str], form: str) -> str:
+    near = difflib.get_close_matches(name.lower(), known, 1)
+    return f"; did you mean {form.format(near[0])}?" if near else f" (known: {', '.join(known)})"
+
+
+def _line(path: Path, name: str) -> int:
+    """Where a key or a table is first named; TOML's reader does not say."""
+    begins = re.compile(rf"""\s*\[*\s*["']?{re.escape(name)}["']?\s*[.=\]]""")
+    lines = path.read_text(encoding="utf-8").splitlines()
+    return next((number for number, line in enumerate(lines, start=1) if begins.match(line)), 1)
 
 
 def _text(table: Mapping[str, Any], key: str, path: Path) -> str | None:

@@ -158,6 +158,11 @@ def error_of(reply: Reply, *, writing: bool = False) -> SiloError:
     said = complaint(reply)
     told = f": {said.text}" if said.text else ""
     asked, host, status = reply.where.asked, reply.where.host, reply.status
+    if status == 401 and not reply.secret:
+        return AuthError(
+            f"{host} wants a token, and none was given. `silo-mod login {host}` asks for one and keeps it; "
+            "SILO_API_TOKEN or the settings name one too"
+        )
     if status == 401:
         return AuthError(
             f"{host} does not accept the token{told}. Give a valid one (SILO_API_TOKEN, or the settings)"

@@ -77,10 +77,10 @@ def _machine() -> Rows:
 
 
 def _configuration() -> str:
-    from silo.api.config import config_path, load_config
+    from silo.api.config import checked_config, config_path
 
     path = config_path()
-    load_config(path)
+    checked_config(path)
     return str(path) if path.exists() else f"{path} (none yet; everything has a default)"
 
 

@@ -34,6 +34,7 @@ _COMMANDS = (
     "serve",
     "backup",
     "watch",
+    "login",
     "doctor",
     "inertia",
     "links",
