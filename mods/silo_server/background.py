@@ -19,6 +19,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from silo.bom.errors import SiloError
 from silo_server.db.engine import Database, mode_of
+from silo_server.errors import cause_of
 from silo_server.files import FileStore
 from silo_server.services.access.credentials import note_token_uses
 
@@ -55,7 +56,7 @@ class TokenUses:
             try:
                 note_token_uses(self._db)
             except (SQLAlchemyError, SiloError) as error:
-                logger.debug("the last use of tokens is noted later: %s", type(error).__name__)
+                logger.debug("the last use of tokens is noted later: %s", cause_of(error))
 
 
 @dataclass(frozen=True, slots=True)

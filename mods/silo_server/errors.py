@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from silo.bom.errors import ConflictError, RejectedError, RemoteError, VersionConflictError
+from silo.bom.errors import ConflictError, RejectedError, RemoteError, UnreachableError, VersionConflictError
 
 
 class TooLargeError(RejectedError):
@@ -26,6 +26,13 @@ class TooManyAttemptsError(RemoteError):
         self.retry_after = retry_after
 
 
+class InDoubtError(UnreachableError):
+    """503 without ``Retry-After``: nobody knows whether the change was stored."""
+
+    status_hint = 503
+    code = "unavailable"
+
+
 class DuplicateError(ConflictError):
     """409: there is one already."""
 
@@ -38,3 +45,8 @@ class LinesChangedError(VersionConflictError):
     def __init__(self, message: str, line_ids: Sequence[str]) -> None:
         super().__init__(message)
         self.line_ids = tuple(line_ids)
+
+
+def cause_of(error: BaseException) -> str:
+    """What the database's driver or the operating system said, in one line; no SQL and no values."""
+    return str(getattr(error, "orig", None) or error).strip().partition("\n")[0] or type(error).__name__

@@ -24,7 +24,7 @@ from silo.bom.errors import (
     RouteMissingError,
     SiloError,
 )
-from silo_server.errors import TooManyAttemptsError
+from silo_server.errors import InDoubtError, TooManyAttemptsError, cause_of
 from silo_server.operation.requests import info_of
 
 logger = logging.getLogger("silo_server")
@@ -112,7 +112,14 @@ async def _database_error(request: Request, error: Exception) -> Response:
     if isinstance(error, IntegrityError):
         return error_answer(409, "conflict", "somebody else changed the same thing just now; read it again")
     if isinstance(error, OperationalError | TimeoutError):
-        logger.error("database: %s", type(error).__name__)
+        logger.error("request %s: the database: %s", info_of(request.scope).id, cause_of(error))
+        if request.method not in ("GET", "HEAD") and getattr(error, "connection_invalidated", False):
+            # The commit may have come through before the connection was lost; Retry-After would deny that.
+            doubt = InDoubtError(
+                "the connection to the database was lost; the change may be stored or not. Read it again "
+                "before you send it once more"
+            )
+            return await _silo_error(request, doubt)
         busy = BusyError("the database cannot be reached at the moment; nothing was changed, try again later")
         return await _silo_error(request, busy)
     return await _fault(request, error)

@@ -31,6 +31,7 @@ from silo.platform import WORKERS_CAN_SHARE_A_SOCKET, allow_many_files, own_the_
 from silo_server.app import create_app, observed
 from silo_server.bootstrap import Welcome, prepare
 from silo_server.db.engine import Database
+from silo_server.errors import cause_of
 from silo_server.operation.metrics import SHARED
 from silo_server.operation.requests import log_to_stderr
 from silo_server.services.access import credentials
@@ -250,8 +251,9 @@ def _prepare(settings: Settings, token: str | None, reset_admin: str | None = No
         finally:
             db.close()
     except (SQLAlchemyError, OSError) as error:
-        cause = str(getattr(error, "orig", None) or error).strip().partition("\n")[0]
-        raise ConfigError(f"the database {_without_password(settings)} cannot be used: {cause}") from error
+        raise ConfigError(
+            f"the database {_without_password(settings)} cannot be used: {cause_of(error)}"
+        ) from error
 
 
 def _config(app: FastAPI, settings: Settings) -> uvicorn.Config:

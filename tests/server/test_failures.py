@@ -51,6 +51,22 @@ def test_what_goes_wrong_inside_stays_inside(
     assert "secret" not in str(answer)
 
 
+def test_the_log_names_the_request_and_what_the_database_said(
+    server: RunningServer, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The id is the one that the client sees; values and SQL stay out of the log."""
+
+    def fail() -> None:
+        raise OperationalError("SELECT secret inside", {}, Exception("disk I/O error\nmore"))
+
+    server.app.add_api_route("/fail", fail)
+    server.app.router.routes.insert(0, server.app.router.routes.pop())
+    with Api(server.base_url, "silo_failures") as api:
+        number = api.call("GET", "/fail").headers["x-request-id"]
+    assert f"request {number}: the database: disk I/O error" in caplog.messages
+    assert "secret" not in caplog.text
+
+
 def test_a_database_that_is_away_is_503_and_not_ready(tmp_path: Path) -> None:
     """``/health`` still answers, ``/ready`` says no, requests may be sent again later."""
     path = tmp_path / "x.db"

@@ -7,6 +7,7 @@ import contextlib
 import json
 import os
 import signal
+import socket
 import sqlite3
 import threading
 from collections.abc import Iterator
@@ -131,6 +132,72 @@ def test_a_frozen_postgres_stops_neither_health_nor_us(databases: Databases, tmp
                 os.kill(pid, signal.SIGCONT)
         wait_until(lambda: api.call("GET", f"/api/items/{number}").status == 200, "a read after the thaw")
         wait_until(lambda: api.call("GET", "/ready").status == 200, "being ready after the thaw")
+
+
+class LosesAnswers:
+    """A way to PostgreSQL that hangs up where the answer to the COMMIT of a new BOM line should come."""
+
+    def __init__(self, url: str) -> None:
+        given = make_url(url)
+        self._target = f"{given.query['host']}/.s.PGSQL.{given.port or 5432}"
+        self.lost = 0
+        self._open = [socket.create_server(("127.0.0.1", 0))]
+        port = self._open[0].getsockname()[1]
+        self.url = given.set(host="127.0.0.1", port=port, query={}).render_as_string(hide_password=False)
+        threading.Thread(target=self._accept, daemon=True).start()
+
+    def close(self) -> None:
+        """Hang up everywhere, and let nobody in any more."""
+        for each in self._open:
+            with contextlib.suppress(OSError):
+                each.shutdown(socket.SHUT_RDWR)
+            each.close()
+
+    def _accept(self) -> None:
+        with contextlib.suppress(OSError):
+            while True:
+                client, _ = self._open[0].accept()
+                server = socket.socket(socket.AF_UNIX)
+                self._open += [client, server]
+                server.connect(self._target)
+                writes = threading.Event()
+                threading.Thread(target=self._ask, args=(client, server, writes), daemon=True).start()
+                threading.Thread(target=self._answer, args=(server, client, writes), daemon=True).start()
+
+    def _ask(self, client: socket.socket, server: socket.socket, writes: threading.Event) -> None:
+        with contextlib.suppress(OSError):
+            while data := client.recv(65536):
+                if b"INSERT INTO bom_lines" in data:
+                    writes.set()
+                server.sendall(data)
+            server.shutdown(socket.SHUT_RDWR)
+
+    def _answer(self, server: socket.socket, client: socket.socket, writes: threading.Event) -> None:
+        with contextlib.suppress(OSError):
+            while data := server.recv(65536):
+                if writes.is_set() and b"COMMIT\0" in data:  # the tag of the server's word that it is done
+                    self.lost += 1
+                    break
+                client.sendall(data)
+            client.shutdown(socket.SHUT_RDWR)
+
+
+@pytest.mark.postgres
+def test_a_commit_whose_answer_was_lost_is_not_denied(databases: Databases, tmp_path: Path) -> None:
+    """503 that says it may be stored; no ``Retry-After``, which clients take as "send it again"."""
+    way = LosesAnswers(databases.new("postgres"))
+    with (
+        running_server(way.url, token=TOKEN, files_dir=tmp_path) as server,
+        Api(server.base_url, TOKEN) as api,
+    ):
+        parent, child = api.items(2)
+        answer = api.call("POST", bom(parent), {"child_part_number": child, "quantity": 2})
+        assert way.lost == 1
+        assert (answer.status, answer.json()["error"]) == (503, "unavailable")
+        assert "may be stored" in answer.json()["message"]
+        assert "retry-after" not in answer.headers
+        assert api.quantities(parent) == {child: 2}  # and stored it was
+    way.close()
 
 
 def put_back(url: str, saved: Path, *, save: bool) -> None:

@@ -24,7 +24,6 @@ from datetime import datetime
 from typing import Any
 
 from sqlalchemy import Connection, Engine, create_engine, event, func, insert, select
-from sqlalchemy.exc import OperationalError
 
 from silo.bom.errors import ReadOnlyError
 from silo_server.clock import Clock, stamp, utc_now
@@ -225,8 +224,3 @@ def _prepare_sqlite(connection: Any, _record: Any) -> None:
 def _begin_sqlite(conn: Connection) -> None:
     write = conn.get_execution_options().get("silo_write", False)
     conn.exec_driver_sql("BEGIN IMMEDIATE" if write else "BEGIN")
-
-
-def is_unavailable(error: Exception) -> bool:
-    """True for a database that cannot be reached or is too busy now; the same request may succeed later."""
-    return isinstance(error, OperationalError)

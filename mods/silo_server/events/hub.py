@@ -24,6 +24,7 @@ from dataclasses import dataclass
 from sqlalchemy.exc import SQLAlchemyError
 
 from silo_server.db.engine import Database
+from silo_server.errors import cause_of
 from silo_server.services import events as log
 from silo_server.services.events import LoggedEvent, Mark
 
@@ -141,15 +142,19 @@ class Hub:
         return await asyncio.to_thread(self._read_place, last)
 
     async def _dispatch(self) -> None:
+        away = False
         while True:
             with suppress(TimeoutError):
                 await asyncio.wait_for(self._poke.wait(), self._db.settings.poll_seconds)
             self._poke.clear()
             try:
                 await self._read_news()
+                away = False
             except SQLAlchemyError as error:
                 # The database is away; the poll finds out when it is back, and nothing is lost meanwhile.
-                logger.warning("the event log cannot be read at the moment: %s", type(error).__name__)
+                if not away:
+                    logger.warning("the event log cannot be read at the moment: %s", cause_of(error))
+                away = True
 
     async def _read_news(self) -> None:
         while True:
@@ -222,6 +227,7 @@ class _PostgresListener:
     def __init__(self, db: Database, heard: Callable[[], None]) -> None:
         self._db = db
         self._heard = heard
+        self._away = False
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="silo-listen", daemon=True)
 
@@ -238,10 +244,10 @@ class _PostgresListener:
         while not self._stopping.is_set():
             try:
                 self._listen()
-            except Error as error:
-                logger.warning(
-                    "listening to PostgreSQL was interrupted (%s), trying again", type(error).__name__
-                )
+            except (Error, OSError) as error:
+                if not self._away:
+                    logger.warning("PostgreSQL cannot be listened to, trying again: %s", cause_of(error))
+                self._away = True
                 self._stopping.wait(1.0)
 
     def _listen(self) -> None:
@@ -252,6 +258,7 @@ class _PostgresListener:
         url = self._db.engine.url.set(drivername="postgresql").render_as_string(hide_password=False)
         with psycopg.connect(url, autocommit=True) as connection:
             connection.execute(psycopg.sql.SQL("LISTEN {}").format(psycopg.sql.Identifier(EVENT_CHANNEL)))
+            self._away = False
             self._heard()  # what happened before the LISTEN is in the log
             while not self._stopping.is_set():
                 for _ in connection.notifies(timeout=0.5):

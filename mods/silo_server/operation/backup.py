@@ -37,6 +37,7 @@ from silo_server.db.engine import EVENT_CHANNEL, MIGRATION_LOCK, Database, Tx, m
 from silo_server.db.migrate import check_revision, upgrade
 from silo_server.db.state import put_state
 from silo_server.db.tables import events, items, metadata, revisions
+from silo_server.errors import cause_of
 from silo_server.files import FileStore
 from silo_server.json_values import dumps
 from silo_server.services import search
@@ -169,8 +170,7 @@ def _open(settings: Settings) -> Iterator[Database]:
     try:
         yield db
     except SQLAlchemyError as error:
-        cause = str(getattr(error, "orig", None) or error).strip().partition("\n")[0]
-        raise ConfigError(f"the database cannot be used: {cause}") from error
+        raise ConfigError(f"the database cannot be used: {cause_of(error)}") from error
     finally:
         db.close()
 

@@ -21,6 +21,7 @@ from pathlib import Path
 from sqlalchemy import Table, delete, func, insert, select, update
 from sqlalchemy.exc import SQLAlchemyError
 
+from silo.bom.errors import SiloError
 from silo_server.clock import stamp
 from silo_server.db.engine import Database, Tx
 from silo_server.db.state import get_state, put_state
@@ -36,6 +37,7 @@ from silo_server.db.tables import (
     revisions,
     sessions,
 )
+from silo_server.errors import cause_of
 from silo_server.files import FileStore
 from silo_server.json_values import dumps
 from silo_server.services import events
@@ -80,12 +82,12 @@ def tidy(db: Database, store: FileStore) -> Run:
     for name, step in _STEPS.items():
         try:
             removed[name] = _repeat(db, step)
-        except SQLAlchemyError as error:
-            problems.append(f"{name}: {type(error).__name__}")
+        except (SQLAlchemyError, SiloError) as error:
+            problems.append(f"{name}: {cause_of(error)}")
     try:
         removed["files"] = _remove_orphans(db, store)
-    except (OSError, SQLAlchemyError) as error:
-        problems.append(f"files: {type(error).__name__}")
+    except (OSError, SQLAlchemyError, SiloError) as error:
+        problems.append(f"files: {cause_of(error)}")
     run = Run(
         at=at,
         seconds=round(time.monotonic() - started, 3),
