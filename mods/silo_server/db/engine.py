@@ -126,6 +126,12 @@ class Database:
         if tx.pending:
             self.on_events()
 
+    @property
+    def connections(self) -> int:
+        """How many are in use now, by readers, writers and those who look after the whole."""
+        pools: list[Any] = [engine.pool for engine in {self.engine, self._reads, self._writes}]
+        return sum(pool.checkedout() for pool in pools)
+
     def close(self) -> None:
         """Give all connections back."""
         for engine in (self.engine, self._reads, self._writes):

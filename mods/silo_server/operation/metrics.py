@@ -65,7 +65,7 @@ class Metrics:
     def render(self, db: Database, hub: Hub, files: FileStore) -> bytes:
         """The text for Prometheus. The database's numbers are left out while it cannot be read."""
         self._listeners.set(hub.listeners)
-        self._connections.set(getattr(db.engine.pool, "checkedout", lambda: 0)())
+        self._connections.set(db.connections)
         now = CollectorRegistry()
         with db.read() as tx:
             mode, run = mode_of(tx), last_run(tx)
