@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import math
 import sys
+from decimal import Decimal
 from typing import Any
 
 from silo.bom.errors import RejectedError
@@ -20,6 +21,8 @@ MAX_BYTES = 256 * 1024
 MAX_KEY = 200
 # JSON does not tell 1e300 from a whole number of 301 digits, and so neither do we: what a double can hold.
 MAX_NUMBER = sys.float_info.max
+# The same as it is written, which is what the API document's readers compare with.
+_MAX_WHOLE = int(Decimal(repr(MAX_NUMBER)))
 _DIGITS = 309
 
 
@@ -92,7 +95,7 @@ def _scalar_problem(value: Any) -> str | None:
         return None if _is_text(value) else "wanted text, got a character that is no valid Unicode (or NUL)"
     if isinstance(value, float) and not math.isfinite(value):
         return f"wanted finite numbers, got {value}"
-    if isinstance(value, int) and not -MAX_NUMBER <= value <= MAX_NUMBER:
+    if isinstance(value, int) and not -_MAX_WHOLE <= value <= _MAX_WHOLE:
         return f"wanted numbers of at most {_DIGITS} digits, got a longer one; send it as text"
     return None
 

@@ -45,6 +45,7 @@ ROWS: list[tuple[tuple[str, str], dict[str, Any], bool]] = [
     (ITEM, {"category": "F01", "properties": {"k" * 201: 1}}, False),
     (ITEM, {"category": "F01", "properties": {"n": 2**63, "m": -(10**308)}}, True),
     (ITEM, {"category": "F01", "properties": {"n": 6.02214076e23, "m": [1e300]}}, True),
+    (ITEM, {"category": "F01", "properties": {"n": 17976931348623157 * 10**292}}, True),
     (ITEM, {"category": "F01", "properties": {"n": 2 * 10**308}}, False),
     (ITEM, {"category": "F01", "properties": {"a": [-(10**309)]}}, False),
     (CHANGE, {"part_number": ""}, False),

@@ -33,6 +33,7 @@ HOSTILE = {
     "a long key": json.dumps({"k" * 201: 1}),
     "a deep long key": json.dumps({"a": [{"k" * 201: 1}]}),
     "a long whole number": '{"m": ' + "9" * 309 + "}",
+    "one more than a double": json.dumps({"m": 17976931348623157 * 10**292 + 1}),
     "a whole number that Python refuses": '{"m": ' + "9" * 5000 + "}",
     "half a surrogate pair": '{"m": "\\ud800"}',
     "NUL": '{"m": "\\u0000"}',
