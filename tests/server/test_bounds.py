@@ -103,6 +103,35 @@ def test_one_level_reads_one_level(db: Database) -> None:
     assert [row.total for row in tree.expand(read[4], 4, 100)] == [2, 4, 8, 16]
 
 
+def test_a_structure_that_would_fill_the_memory_is_not_read(url: str, tmp_path: Path) -> None:
+    """Below the bound all views; above it 413 with a way out, and pages that still show the item."""
+    bounded = Settings(database_url=url, files_dir=tmp_path, max_expanded_rows=3)
+    with (
+        running_server(url, token="silo_bound", settings=bounded) as server,
+        Api(server.base_url, "silo_bound") as api,
+    ):
+        top, sub, *leaves = api.items(5)
+        api.merge(sub, dict.fromkeys(leaves, 1))
+        assert len(api.get(bom(sub, "flat"))["flat_bom"]) == 3
+        api.merge(top, {sub: 1})
+        for what in ("flat", "expanded", "cost", "mass", "export.csv?view=flat"):
+            assert "sub-assemblies" in api.bad(413, "GET", bom(top, what))["message"]
+        assert len(api.get(bom(top, "expanded?depth=1"))) == 1
+        assert len(api.good("POST", "/api/items/boms", {"part_numbers": [sub]})["boms"][sub]) == 3
+        assert "fewer" in api.bad(413, "POST", "/api/items/boms", {"part_numbers": [top, sub]})["message"]
+        api.good("POST", "/api/users", {"username": "ann", "role": "viewer", "password": "a pass phrase"})
+        session = api.as_(None).call(
+            "POST", "/api/auth/login", {"username": "ann", "password": "a pass phrase"}
+        )
+        cookie = session.headers["set-cookie"].partition(";")[0]
+        for view in ("tree", "flat"):
+            html = api.as_(None).call(
+                "GET", f"/items/{top}?view={view}", headers={"Cookie": cookie, "Accept": "text/html"}
+            )
+            assert html.status == 200
+            assert "more than 3 different lines" in html.body.decode()
+
+
 def test_a_file_that_is_no_bom_is_not_read_to_its_end() -> None:
     """The header is looked for near the top; what stands at the end of such a file does not matter."""
     rows = b"a;b,c\td\n" * 5000

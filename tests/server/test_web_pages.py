@@ -287,6 +287,7 @@ def test_a_file_that_is_no_bom(visitors: dict[str, Visitor], api: Api) -> None:
 
 def test_activity_gives_only_what_is_new(visitors: dict[str, Visitor], api: Api) -> None:
     """With ``after`` the page holds the later events only, and says up to where it knows."""
+    api.item()
     first = visitors[VIEWER].get("/activity").body.decode()
     last = re.search(r'data-last="(\d+)-[0-9a-f]{8}"', first)
     assert last is not None

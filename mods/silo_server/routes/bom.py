@@ -38,7 +38,7 @@ from silo_server.routes.models import (
 from silo_server.routes.render import render_expanded
 from silo_server.services.bom import edits, rollup, tree
 from silo_server.services.bom.last_sync import NEVER, last_syncs, marks, remember_refusal
-from silo_server.services.bom.lines import LineId, line_to_wire, lines_of_many
+from silo_server.services.bom.lines import LineId, check_line_count, line_to_wire, lines_of_many
 from silo_server.services.bom.merge import MergeOutcome, merge_bom, preview_merge
 from silo_server.services.bom.merge_json import MergeOrder, read_merge_order
 from silo_server.services.bom.review import told_quantities
@@ -75,6 +75,7 @@ def get_boms(server: ServerDep, caller: Viewer, body: NumbersBody) -> Response:
     """The lines of many items, one level each; items that are not known are absent. Reads only."""
     with server.db.read(caller) as tx:
         found = get_by_numbers(tx, body.part_numbers)
+        check_line_count(tx, [item.id for item in found.values()])
         rows = _lines_of(tx, list(found.values()))
     return json_answer({"boms": {number: rows[item.id] for number, item in found.items()}})
 

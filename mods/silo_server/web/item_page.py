@@ -113,11 +113,22 @@ def item_page(
 
 def structure_of(tx: Tx, item: Item, look: Look) -> dict[str, Any]:
     """What the templates of a BOM over all levels show: table, totals, what the last sync left out."""
-    graph = tree.load_graph(tx, item)
+    try:
+        graph, problem = tree.load_graph(tx, item), ""
+    except TooLargeError as error:
+        graph, problem = tree.load_graph(tx, item, 1), str(error)
     last, marks = last_sync(tx, item), marks_of(tx, graph)
     values: dict[str, Any] = {"last": last, "gaps": in_sentences(last.gaps), "marks": marks}
-    values |= {"problem": "", "table": None, "above": (), "levels": 0, "depth": 0, "cost": None, "mass": None}
-    if item.id not in graph.lines:
+    values |= {
+        "problem": problem,
+        "table": None,
+        "above": (),
+        "levels": 0,
+        "depth": 0,
+        "cost": None,
+        "mass": None,
+    }
+    if problem or item.id not in graph.lines:
         return values
     counts = level_counts(graph)
     depth = look.depth or usual_depth(counts)

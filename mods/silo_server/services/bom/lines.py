@@ -9,13 +9,14 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
-from sqlalchemy import Integer, Select, select, type_coerce
+from sqlalchemy import Integer, Select, func, select, type_coerce
 
 from silo.bom.errors import ConflictError, NotFoundError
 from silo_server.clock import wire
 from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import bom_lines, items
+from silo_server.errors import TooLargeError
 from silo_server.json_values import MAX_DEPTH, dumps, loads
 from silo_server.values import Item, Line, LineState, number
 
@@ -99,6 +100,15 @@ def lines_of(tx: Tx, parent: Item) -> list[Line]:
     """The parent's lines in their order."""
     query = select_lines().where(bom_lines.c.parent_id == parent.id).order_by(bom_lines.c.position)
     return [to_line(row) for row in tx.conn.execute(query)]
+
+
+def check_line_count(tx: Tx, parent_ids: Collection[int]) -> None:
+    """TooLargeError where these BOMs have more lines in all than one answer may have."""
+    within = one_of(tx, bom_lines.c.parent_id, parent_ids)
+    count = tx.conn.scalar(select(func.count()).select_from(bom_lines).where(within)) or 0
+    most = tx.settings.max_expanded_rows
+    if count > most:
+        raise TooLargeError(f"these BOMs have {count} lines, an answer at most {most}; ask for fewer")
 
 
 def lines_of_many(tx: Tx, parent_ids: Collection[int]) -> dict[int, list[Line]]:

@@ -79,14 +79,24 @@ class Usage:
 
 
 def load_graph(tx: Tx, root: Item, depth: int | None = None) -> Graph:
-    """All lines below ``root``, each once; of the first ``depth`` levels only, where that is given."""
+    """All lines below ``root``, each once; of the first ``depth`` levels only, where that is given.
+
+    TooLargeError where there are more than ``max_expanded_rows``: they would fill the memory.
+    """
     query = select_lines().order_by(bom_lines.c.parent_id, bom_lines.c.position)
     if depth == 1:
         query = query.where(bom_lines.c.parent_id == root.id)
     else:
         query = query.where(bom_lines.c.parent_id.in_(_reach(root, depth)))
+    most = tx.settings.max_expanded_rows
+    rows = tx.conn.execute(query.limit(most + 1)).all()
+    if len(rows) > most:
+        raise TooLargeError(
+            f"there are more than {most} different lines below {root.part_number}; ask for one of its "
+            "sub-assemblies, or for less with depth="
+        )
     lines: dict[int, list[Line]] = {}
-    for row in tx.conn.execute(query).all():
+    for row in rows:
         lines.setdefault(row[1], []).append(to_line(row))
     return Graph(root, lines)
 
