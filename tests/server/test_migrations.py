@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import sqlite3
 from collections.abc import Iterator
 from pathlib import Path
@@ -142,6 +143,11 @@ def test_a_released_database_comes_up_with_its_data(
         assert top.at is not None
         told_since = request.node.callspec.params["released"] >= "schema-0003"
         assert [gap["name"] for gap in top.left_out] == (["Lid"] if told_since else [])
+        told = [
+            (event.username, json.loads(event.data).get("user")) for event in tx.conn.execute(select(events))
+        ]
+        assert any(user for _, user in told)
+        assert all(name == user for name, user in told)
         item = get_item(tx, "asm-001")
         lines = {line.child_part_number: line.state for line in lines_of(tx, item)}
         newest = list_changes(tx, item)[0]

@@ -292,7 +292,7 @@ def test_activity_gives_only_what_is_new(visitors: dict[str, Visitor], api: Api)
     last = re.search(r'data-last="(\d+)-[0-9a-f]{8}"', first)
     assert last is not None
     number = api.item()
-    news = visitors[VIEWER].get(f"/activity?after={last[1]}").body.decode()
+    news = visitors[VIEWER].get(f"/activity?newer_than={last[1]}").body.decode()
     assert news.count('<li class="entry">') == 1
     assert number in news
 

@@ -14,6 +14,7 @@ from typing import Any
 from sqlalchemy import (
     Column,
     ColumnElement,
+    Select,
     Table,
     TableValuedAlias,
     any_,
@@ -88,3 +89,19 @@ def _unnest(table: Table, names: Sequence[str], rows: Sequence[Mapping[str, Any]
 
 def _plain(column: Column[Any]) -> Column[Any]:
     return Column(column.name, column.type)
+
+
+def newest_first(
+    tx: Tx,
+    query: Select[Any],
+    column: ColumnElement[int],
+    limit: int,
+    before: int | None = None,
+    after: int | None = None,
+) -> list[Any]:
+    """A page of a list by its ids, newest first: those before an id, or the nearest after one."""
+    if before is not None:
+        query = query.where(column < before)
+    if after is None:
+        return list(tx.conn.execute(query.order_by(column.desc()).limit(limit)))
+    return list(tx.conn.execute(query.where(column > after).order_by(column).limit(limit)))[::-1]

@@ -160,6 +160,7 @@ def _flush_events(tx: Tx) -> None:
                 "part_number_key": new.part_number.casefold() if new.part_number else None,
                 "data": new.data,
                 "at": tx.stamp,
+                "username": tx.actor.username[:64],
             }
             for new in tx.pending
         ],

@@ -235,6 +235,7 @@ events = Table(
     Column("part_number_key", String(64)),
     Column("data", Text, nullable=False),
     Column("at", Stamp, nullable=False),
+    Column("username", String(64)),
     sqlite_autoincrement=True,
 )
 

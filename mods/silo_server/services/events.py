@@ -9,16 +9,17 @@ from __future__ import annotations
 
 import json
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy import ColumnElement, LargeBinary, Select, cast, delete, func, select
 
 from silo_server.clock import spec_time
+from silo_server.db.bulk import newest_first
 from silo_server.db.engine import Tx
 from silo_server.db.state import get_state, put_state
-from silo_server.db.tables import events
+from silo_server.db.tables import events, items
 from silo_server.json_values import dumps
 from silo_server.values import Item, NewEvent, Revision
 
@@ -119,23 +120,53 @@ def read_after(tx: Tx, after: int, limit: int = 500) -> list[LoggedEvent]:
 
 @dataclass(frozen=True, slots=True)
 class DatedEvent:
-    """An event as people read it: with its time, and its data decoded."""
+    """An event as people read it: with its time, its user, and its data decoded."""
 
     id: int
     name: str
     at: str
     data: Mapping[str, Any]
+    username: str = ""
+    item_uuid: str | None = None
 
 
-def newest(tx: Tx, limit: int, after: int = 0) -> list[DatedEvent]:
-    """The newest events, newest first; only those after id ``after``."""
-    rows = tx.conn.execute(
-        select(events.c.id, events.c.name, events.c.at, events.c.data)
-        .where(events.c.id > after)
-        .order_by(events.c.id.desc())
-        .limit(limit)
-    ).all()
-    return [DatedEvent(row.id, row.name, row.at, json.loads(row.data)) for row in rows]
+@dataclass(frozen=True, slots=True)
+class EventQuery:
+    """Which events; "" and none: all. ``part_number``: of this item, under whatever number it had."""
+
+    names: Sequence[str] = ()
+    username: str = ""
+    part_number: str = ""
+
+
+def newest(
+    tx: Tx,
+    asked: EventQuery,
+    limit: int,
+    before: int | None = None,
+    after: int | None = None,
+) -> list[DatedEvent]:
+    """The newest events that were asked for, newest first; ``before`` and ``after`` are ids to page from."""
+    query = select(events)
+    if asked.names:
+        query = query.where(events.c.name.in_(asked.names))
+    if asked.username:
+        query = query.where(events.c.username == asked.username)
+    if asked.part_number:
+        key = asked.part_number.casefold()
+        item = select(items.c.uuid).where(items.c.part_number_key == key).scalar_subquery()
+        query = query.where((events.c.part_number_key == key) | (events.c.item_uuid == item))
+    rows = newest_first(tx, query, events.c.id, limit, before, after)
+    return [
+        DatedEvent(row.id, row.name, row.at, json.loads(row.data), row.username or "", row.item_uuid)
+        for row in rows
+    ]
+
+
+def usernames(tx: Tx) -> list[str]:
+    """Everybody of whom there are events."""
+    found = tx.conn.scalars(select(events.c.username).distinct().where(events.c.username.is_not(None)))
+    return sorted(found, key=str.casefold)
 
 
 def horizon_of(tx: Tx) -> int:

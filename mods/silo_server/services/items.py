@@ -122,12 +122,11 @@ def get_by_uuid(tx: Tx, uuid: str) -> Item:
     return to_item(row)
 
 
-def get_by_uuids(tx: Tx, wanted: Sequence[str]) -> list[Item]:
+def get_by_uuids(tx: Tx, wanted: Sequence[str], *, include_archived: bool = False) -> list[Item]:
     """The items with these UUIDs, each once, in the order asked; those that are missing are absent."""
     known = [normal for uuid in wanted if (normal := uuid_or_none(uuid)) is not None]
-    rows = tx.conn.execute(
-        select(items).where(one_of(tx, items.c.uuid, known), items.c.archived_at.is_(None))
-    ).all()
+    query = select(items).where(one_of(tx, items.c.uuid, known))
+    rows = tx.conn.execute(query if include_archived else query.where(items.c.archived_at.is_(None))).all()
     found = {row.uuid: to_item(row) for row in rows}
     return [found[uuid] for uuid in dict.fromkeys(known) if uuid in found]
 

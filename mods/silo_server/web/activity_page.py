@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request
@@ -12,22 +13,25 @@ from starlette.responses import Response
 
 from silo_server.routes.context import ServerDep
 from silo_server.services import events
-from silo_server.services.events import DatedEvent
+from silo_server.services.events import DatedEvent, EventQuery
+from silo_server.services.items import get_by_uuids
+from silo_server.values import Item
 from silo_server.web.guard import Reader
-from silo_server.web.render import page, segment
+from silo_server.web.render import isolate, page, segment
+from silo_server.web.tables import Address, Part, part_of
 
 router = APIRouter(include_in_schema=False)
 
 MOST = 100
-NAMES = (
-    "bom_merge",
-    "bom.updated",
-    "item.created",
-    "item.updated",
-    "item.deleted",
-    "revision.created",
-    "server.state",
-)
+# What a person may look for, and the events that it is.
+KINDS = {
+    "syncs": ("bom_merge",),
+    "BOM edits": ("bom.updated",),
+    "items": ("item.created", "item.updated", "item.deleted"),
+    "files and revisions": ("revision.created",),
+    "the server": ("server.state",),
+}
+NAMES = tuple(name for names in KINDS.values() for name in names)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +45,7 @@ class Entry:
     words: str
     user: str
     counts: tuple[tuple[str, int, str], ...] = ()
+    item_name: str = ""
 
 
 @router.get("/activity")
@@ -48,44 +53,81 @@ def activity_page(
     request: Request,
     server: ServerDep,
     caller: Reader,
-    after: Annotated[int, Query(ge=0, le=2**62)] = 0,
+    before: Annotated[int | None, Query(ge=0, le=2**62)] = None,
+    after: Annotated[int | None, Query(ge=0, le=2**62)] = None,
+    kind: Annotated[str, Query(max_length=40)] = "",
+    user: Annotated[str, Query(max_length=64)] = "",
+    item: Annotated[str, Query(max_length=64)] = "",
+    newer_than: Annotated[int | None, Query(ge=0, le=2**62)] = None,
 ) -> Response:
-    """The newest events, newest first; ``after`` leaves out what is known already."""
+    """What happened, newest first, by kind, user and item.
+
+    ``before`` and ``after`` page through it; ``newer_than`` is for the page's script, which knows the rest.
+    """
+    asked = EventQuery(KINDS.get(kind, ()), user.strip(), item.strip())
     with server.db.read(caller) as tx:
-        found = events.newest(tx, MOST, after)
+        if newer_than is None:
+            part = part_of(partial(events.newest, tx, asked), MOST, before, after)
+        else:
+            # The newest of them, where there are more than a page holds.
+            newest = [event for event in events.newest(tx, asked, MOST) if event.id > newer_than]
+            part = Part(newest, None, None)
         last = events.head(tx)
-    entries = [entry_of(event) for event in found]
+        users = events.usernames(tx)
+        uuids = [event.item_uuid for event in part.rows if event.item_uuid]
+        items = {one.uuid: one for one in get_by_uuids(tx, uuids, include_archived=True)}
+    entries = [entry_of(event, items.get(event.item_uuid or "")) for event in part.rows]
+    address = Address("/activity", {"kind": kind if kind in KINDS else "", "user": user, "item": item})
     return page(
-        request, "activity.html", caller, entries=entries, last=last, names=" ".join(NAMES), live=True
+        request,
+        "activity.html",
+        caller,
+        entries=entries,
+        part=part,
+        address=address,
+        kinds=list(KINDS),
+        users=sorted({*users, *([user] if user else [])}),
+        last=last,
+        names=" ".join(NAMES),
+        live=before is None and after is None,
     )
 
 
-def entry_of(event: DatedEvent) -> Entry:
-    """An event in words."""
+def entry_of(event: DatedEvent, item: Item | None = None) -> Entry:
+    """An event in words. ``item``: what it is about, as it is now."""
     data = event.data
-    item = str(data.get("item") or data.get("part_number") or "")
-    path = f"/items/{segment(item)}" if item else ""
+    number = item.part_number if item else str(data.get("item") or data.get("part_number") or "")
+    path = f"/items/{segment(number)}" if number else ""
     if event.name in ("bom_merge", "bom.updated"):
         path += "/bom"
-    user = str(data.get("user") or "")
-    return Entry(event.at, event.name, item, path, _words(event.name, data), user, _counts(event.name, data))
+    return Entry(
+        event.at,
+        event.name,
+        number,
+        path,
+        _words(event.name, data),
+        event.username or str(data.get("user") or ""),
+        _counts(event.name, data),
+        item.name if item else str(data.get("name") or ""),
+    )
 
 
 def _words(name: str, data: Mapping[str, Any]) -> str:
-    called = str(data.get("name") or "")
     if name == "bom_merge":
         return "BOM merged from CAD"
     if name == "bom.updated":
         return f"BOM: {data.get('summary', 'changed')}"
     if name == "item.created":
-        return f"{called} registered"
+        return "registered"
     if name == "item.updated":
-        return f"{called} changed"
+        return "changed"
     if name == "item.deleted":
         return "archived"
     if name == "revision.created":
         comment = data.get("comment")
-        return f"revision {data.get('revision_number', '')}" + (f": {comment}" if comment else "")
+        return f"revision {data.get('revision_number', '')}" + (
+            f": {isolate(str(comment))}" if comment else ""
+        )
     if name == "server.state":
         closed = data.get("mode") == "read-only"
         return "The server takes no changes at the moment" if closed else "The server takes changes again"

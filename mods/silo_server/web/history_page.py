@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request
@@ -17,13 +18,13 @@ from silo_server.web.forms import Form, back, text, whole
 from silo_server.web.guard import Reader, Writer
 from silo_server.web.merge_page import bom_path
 from silo_server.web.render import page, plural
+from silo_server.web.tables import part_of
 from silo_server.web.words import changes, sentences
 
 router = APIRouter(include_in_schema=False)
 
 PAGE_SIZE = 50
-# Of this many newest changes the lines are told on the list; those of older ones are a click away.
-TOLD = 10
+# So many lines of each change stand on the list; the others are a click away.
 TOLD_LINES = 12
 KNOWN = 500
 
@@ -32,27 +33,31 @@ Point = Annotated[int | None, Query(ge=0, le=2**62)]
 
 @router.get("/items/{part_number}/history")
 def history_page(
-    request: Request, server: ServerDep, caller: Reader, part_number: str, before: Point = None
+    request: Request,
+    server: ServerDep,
+    caller: Reader,
+    part_number: str,
+    before: Point = None,
+    after: Point = None,
 ) -> Response:
-    """All changes, newest first; ``before`` is the change to page on from."""
+    """All changes with their lines, newest first; ``before`` and ``after`` are the changes to page from."""
     with server.db.read(caller) as tx:
         item = get_item(tx, part_number, include_archived=True)
-        found = history.list_changes(tx, item, PAGE_SIZE + 1, before)
-        told = {
-            change.id: sentences(history.get_change(tx, item, change.id)[1], TOLD_LINES)
-            for change in found[:TOLD]
-        }
+        part = part_of(partial(history.list_changes, tx, item), PAGE_SIZE, before, after)
+        lines = history.lines_of_changes(tx, [change.id for change in part.rows], TOLD_LINES)
         newest = next(iter(history.list_changes(tx, item, 1)), None)
-    shown = found[:PAGE_SIZE]
+    told = {
+        change.id: sentences(lines.get(change.id, []), TOLD_LINES, change.line_count) for change in part.rows
+    }
     return page(
         request,
         "history.html",
         caller,
         item=item,
-        changes=shown,
+        changes=part.rows,
         told=told,
         newest=newest,
-        more=shown[-1].id if len(found) > PAGE_SIZE else None,
+        part=part,
     )
 
 
@@ -86,9 +91,12 @@ def _compare(
     with server.db.read(caller) as tx:
         item = get_item(tx, part_number, include_archived=True)
         known = history.list_changes(tx, item, KNOWN)
-        points = [0, 0, *(change.id for change in reversed(known))]
-        second = points[-1] if new is None else new
-        first = max((point for point in points if point < second), default=0) if old is None else old
+        asked = {point for point in (old, new) if point} - {change.id for change in known}
+        known += [history.get_change(tx, item, point)[0] for point in sorted(asked, reverse=True)]
+        latest = known[0].id if known else 0
+        second = latest if new is None else new
+        before = history.list_changes(tx, item, 1, second) if old is None else []
+        first = (before[0].id if before else 0) if old is None else old
         first, second = sorted((first, second))
         rows = history.compare(history.state_at(tx, item, first), history.state_at(tx, item, second))
     counts = {status: sum(row.status == status for row in rows) for status in STATUSES}
@@ -110,7 +118,7 @@ def _compare(
         new=second,
         known=known,
         show_all=show_all,
-        latest=points[-1],
+        latest=latest,
         problem=problem,
         reason=reason,
     )

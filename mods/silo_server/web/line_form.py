@@ -18,7 +18,10 @@ from silo.bom.errors import RejectedError
 from silo.bom.numbers import read_quantity
 from silo_server.db.engine import Tx
 from silo_server.services.bom import history
-from silo_server.values import Item, LineState
+from silo_server.services.bom.changes import ChangeKind
+from silo_server.services.bom.history import Change, ChangedLine
+from silo_server.services.bom.review import Review, told_quantities
+from silo_server.values import Item, Line, LineState
 from silo_server.web.forms import Edit, amount, compared, text
 from silo_server.web.render import quantity
 from silo_server.web.words import FIELDS, by_whom, changes
@@ -121,7 +124,48 @@ def meanwhile(tx: Tx, parent: Item, line_ids: Sequence[str], after: int) -> dict
     }
 
 
-def _became(line: history.ChangedLine) -> str:
+@dataclass(frozen=True, slots=True)
+class Disputed:
+    """Line id → who set its quantity here, and what CAD says of it: in words, for lines of which both speak."""
+
+    by_hand: Mapping[str, str]
+    cad_words: Mapping[str, str]
+
+
+def disputed(tx: Tx, parent: Item, lines: Sequence[Line], found: Review) -> Disputed:
+    """What is known of the quantities that a person changed."""
+    told = told_quantities(tx, [parent.id]).get(parent.id, {})
+    overrides = [line for line in lines if line.state.override]
+    asked = {*(line.id for line in overrides), *(conflict.line.id for conflict in found.conflicts)}
+    stories = history.stories(tx, parent, asked)
+    by_hand = {line_id: who for line_id, story in stories.items() if (who := _quantity_by(story))}
+    return Disputed(
+        {line_id: by_whom(change) for line_id, change in by_hand.items()},
+        {line.id: _cad_words(line, told, by_hand.get(line.id), found.last_merge) for line in overrides},
+    )
+
+
+def _quantity_by(story: Sequence[tuple[Change, ChangedLine]]) -> Change | None:
+    """The change in which a person gave a line the quantity that it has."""
+    for change, line in story:
+        before = line.before.quantity if line.before else None
+        if line.after is not None and line.after.quantity != before:
+            return None if change.kind == ChangeKind.MERGE else change
+    return None
+
+
+def _cad_words(line: Line, told: Mapping[int, float], by_hand: Change | None, merge: Change | None) -> str:
+    """What CAD says of a line whose quantity a person changed: the same as the conflict above it says."""
+    unit = line.state.unit
+    if line.child_id in told:
+        said = told[line.child_id]
+        return f"CAD says {quantity(said, unit)}" if said else "CAD has it no more"
+    if merge is not None and by_hand is not None and merge.id > by_hand.id:
+        return "CAD says the same"
+    return f"CAD said {quantity(line.state.cad_quantity, unit)} before"
+
+
+def _became(line: ChangedLine) -> str:
     if line.before is None or line.after is None:
         return "removed" if line.after is None else "added"
     return ", ".join(changes(line.before, line.after)) or "changed"

@@ -31,7 +31,7 @@ from silo_server.web.guard import Reader, Writer
 from silo_server.web.line_form import MINE, THEIRS, LineForm
 from silo_server.web.render import isolate, page, plural, segment
 from silo_server.web.tables import Address, Page, arranged, fits, page_of
-from silo_server.web.words import FIELDS, sentences
+from silo_server.web.words import FIELDS, by_whom, sentences
 
 router = APIRouter(include_in_schema=False)
 
@@ -295,6 +295,7 @@ def _show(
         merged = history.get_change(tx, item, merge.id)[1] if merge else []
         recent = history.list_changes(tx, item, LATER_CHANGES)
         seen = events.head(tx)
+        disputed = line_form.disputed(tx, item, lines, found)
     conflicts = {conflict.line.id: conflict for conflict in found.conflicts}
     editing = _editing(lines, asked, item)
     problem = asked.problem
@@ -320,6 +321,9 @@ def _show(
         labels=FIELDS,
         group_of=line_form.group_of,
         at=recent[0].id if recent else 0,
+        by_hand=disputed.by_hand,
+        cad_words=disputed.cad_words,
+        by_sync=by_whom(merge) if merge else "",
         last=last,
         gaps=in_sentences(last.gaps),
         unreferenced=found.unreferenced,

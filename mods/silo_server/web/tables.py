@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 from urllib.parse import urlencode
 
 from silo_server.services.search import words_of
@@ -104,3 +104,42 @@ def fits(asked: str) -> Callable[..., bool]:
         return all(word in written or word in joined for word in wanted)
 
     return test
+
+
+class Numbered(Protocol):
+    """A row with the id that its list is paged by."""
+
+    @property
+    def id(self) -> int: ...
+
+
+N = TypeVar("N", bound=Numbered)
+
+
+@dataclass(frozen=True, slots=True)
+class Part(Generic[N]):
+    """A part of a list that is newest first; the ids to page on from, None at its ends."""
+
+    rows: Sequence[N]
+    older: int | None
+    newer: int | None
+
+
+def part_of(
+    read: Callable[[int, int | None, int | None], Sequence[N]],
+    size: int,
+    before: int | None,
+    after: int | None,
+) -> Part[N]:
+    """The part before an id, or the nearest one after an id; the newest where neither is given.
+
+    read
+        (limit, before, after) → rows, newest first.
+    """
+    if after is not None and (found := read(size + 1, None, after)):
+        rows = found[-size:]
+        return Part(rows, rows[-1].id, rows[0].id if len(found) > size else None)
+    found = read(size + 1, before if after is None else None, None)
+    rows = found[:size]
+    newer = rows[0].id if before is not None and after is None and rows else None
+    return Part(rows, rows[-1].id if len(found) > size else None, newer)

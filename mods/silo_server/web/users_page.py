@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request
@@ -28,10 +29,12 @@ from silo_server.web.forms import (
 )
 from silo_server.web.guard import Administrator
 from silo_server.web.render import page
+from silo_server.web.tables import part_of
 
 router = APIRouter(include_in_schema=False)
 
 AUDIT_SIZE = 100
+Point = Annotated[int | None, Query(ge=0, le=2**62)]
 MODES = ("normal", "read-only")
 
 
@@ -107,8 +110,8 @@ def set_mode(server: ServerDep, caller: Administrator, form: Form) -> Response:
     if mode not in MODES:
         raise RejectedError("mode: wanted normal or read-only; load the page again")
     with server.db.write(caller, even_when_read_only=True) as tx:
+        audit.note(tx, "mode.set", mode, f"{mode_of(tx)} → {mode}")
         put_state(tx, "mode", mode)
-        audit.note(tx, "mode.set", mode)
         events.server_state(tx, mode_of(tx))
     return back(
         "/users", "The server takes changes." if mode == "normal" else "The server takes no changes now."
@@ -120,14 +123,13 @@ def audit_page(
     request: Request,
     server: ServerDep,
     caller: Administrator,
-    before: Annotated[int | None, Query(ge=0, le=2**62)] = None,
+    before: Point = None,
+    after: Point = None,
 ) -> Response:
     """Who did what, newest first."""
     with server.db.read(caller) as tx:
-        entries = audit.list_entries(tx, AUDIT_SIZE + 1, before)
-    shown = entries[:AUDIT_SIZE]
-    more = shown[-1].id if len(entries) > AUDIT_SIZE else None
-    return page(request, "audit.html", caller, entries=shown, more=more)
+        part = part_of(partial(audit.list_entries, tx), AUDIT_SIZE, before, after)
+    return page(request, "audit.html", caller, entries=part.rows, part=part)
 
 
 def _show(

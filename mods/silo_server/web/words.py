@@ -70,10 +70,12 @@ def changes(before: LineState, after: LineState) -> list[str]:
     return said
 
 
-def sentences(lines: Sequence[ChangedLine], most: int = 30) -> list[tuple[str, str]]:
-    """The lines of a change; beyond ``most`` only how many more."""
+def sentences(
+    lines: Sequence[ChangedLine], most: int = 30, count: int | None = None
+) -> list[tuple[str, str]]:
+    """The lines of a change, which has ``count`` of them; beyond ``most`` only how many more."""
     told = [sentence(line) for line in lines[:most]]
-    rest = len(lines) - most
+    rest = (len(lines) if count is None else count) - most
     return [*told, ("", f"and {plural(rest, 'more line', 'more lines')}")] if rest > 0 else told
 
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 
@@ -135,10 +136,25 @@ def change_user(
         values["password_hash"] = hash_password(password)
     if values:
         tx.conn.execute(update(users).where(users.c.id == user.id).values(**values))
-        audit.note(tx, "user.changed", user.username, ", ".join(sorted(values)).replace("_hash", ""))
+        audit.note(tx, "user.changed", user.username, _what_changed(user, values))
     if password is not None or active is False:
         tx.conn.execute(sessions.delete().where(sessions.c.user_id == user.id))
     return get_user(tx, username)
+
+
+def _what_changed(user: User, values: Mapping[str, object]) -> str:
+    """``role viewer → editor``; never a password."""
+    before: dict[str, object] = {
+        "role": user.role.value,
+        "display_name": user.display_name,
+        "active": user.active,
+    }
+    told = [
+        f"{name.replace('_', ' ')} {old} → {values[name]}"
+        for name, old in before.items()
+        if values.get(name, old) != old
+    ]
+    return ", ".join([*told, *(["password"] if "password_hash" in values else [])]) or "nothing"
 
 
 def make_admin(tx: Tx, username: str) -> User:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from sqlalchemy import insert, select
 
+from silo_server.db.bulk import newest_first
 from silo_server.db.engine import Tx
 from silo_server.db.tables import audit
 
@@ -38,10 +39,9 @@ def note(tx: Tx, action: str, target: str = "", detail: str = "") -> None:
     )
 
 
-def list_entries(tx: Tx, limit: int = 100, before: int | None = None) -> list[AuditEntry]:
-    """The newest entries first; ``before`` is an id to page on."""
-    query = select(audit).order_by(audit.c.id.desc()).limit(limit)
-    if before is not None:
-        query = query.where(audit.c.id < before)
-    rows = tx.conn.execute(query).all()
+def list_entries(
+    tx: Tx, limit: int = 100, before: int | None = None, after: int | None = None
+) -> list[AuditEntry]:
+    """The newest entries first; ``before`` and ``after`` are ids to page on and back."""
+    rows = newest_first(tx, select(audit), audit.c.id, limit, before, after)
     return [AuditEntry(r.id, r.at, r.username, r.action, r.target, r.detail, r.address) for r in rows]

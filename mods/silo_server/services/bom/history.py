@@ -14,7 +14,7 @@ from typing import Any
 from sqlalchemy import func, select
 
 from silo.bom.errors import ConflictError, NotFoundError
-from silo_server.db.bulk import one_of
+from silo_server.db.bulk import newest_first, one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import bom_change_lines, bom_changes, bom_conflicts
 from silo_server.json_values import loads
@@ -84,12 +84,30 @@ class Difference:
     fields: Sequence[str]
 
 
-def list_changes(tx: Tx, parent: Item, limit: int = 50, before: int | None = None) -> list[Change]:
-    """The BOM's changes, newest first; ``before`` is a change id to page on."""
-    conditions = [bom_changes.c.parent_id == parent.id]
-    if before is not None:
-        conditions.append(bom_changes.c.id < before)
-    return _changes(tx, conditions, limit)
+def list_changes(
+    tx: Tx, parent: Item, limit: int = 50, before: int | None = None, after: int | None = None
+) -> list[Change]:
+    """The BOM's changes, newest first; ``before`` and ``after`` are change ids to page on and back."""
+    return _changes(tx, [bom_changes.c.parent_id == parent.id], limit, before, after)
+
+
+def lines_of_changes(tx: Tx, change_ids: Collection[int], most: int) -> dict[int, list[ChangedLine]]:
+    """The first ``most`` lines of each of these changes, in one question."""
+    place = func.row_number().over(
+        partition_by=bom_change_lines.c.change_id, order_by=bom_change_lines.c.position
+    )
+    numbered = (
+        select(bom_change_lines, place.label("place"))
+        .where(one_of(tx, bom_change_lines.c.change_id, change_ids))
+        .subquery()
+    )
+    query = select(numbered).where(numbered.c.place <= most)
+    rows = tx.conn.execute(query.order_by(numbered.c.change_id, numbered.c.place)).all()
+    children = by_ids(tx, {row.child_id for row in rows})
+    found: dict[int, list[ChangedLine]] = {}
+    for row in rows:
+        found.setdefault(row.change_id, []).append(_changed_line(row, children))
+    return found
 
 
 def get_change(tx: Tx, parent: Item, change_id: int) -> tuple[Change, list[ChangedLine]]:
@@ -267,14 +285,20 @@ def _reopen(tx: Tx, parent: Item, change: Change) -> None:
             )
 
 
-def _changes(tx: Tx, conditions: Sequence[Any], limit: int) -> list[Change]:
+def _changes(
+    tx: Tx,
+    conditions: Sequence[Any],
+    limit: int,
+    before: int | None = None,
+    after: int | None = None,
+) -> list[Change]:
     lines = (
         select(func.count())
         .where(bom_change_lines.c.change_id == bom_changes.c.id)
         .scalar_subquery()
         .label("line_count")
     )
-    query = select(bom_changes, lines).where(*conditions).order_by(bom_changes.c.id.desc()).limit(limit)
+    query = select(bom_changes, lines).where(*conditions)
     return [
         Change(
             id=row.id,
@@ -292,7 +316,7 @@ def _changes(tx: Tx, conditions: Sequence[Any], limit: int) -> list[Change]:
             decisions=loads(row.decisions) if row.decisions else (),
             line_count=row.line_count,
         )
-        for row in tx.conn.execute(query)
+        for row in newest_first(tx, query, bom_changes.c.id, limit, before, after)
     ]
 
 

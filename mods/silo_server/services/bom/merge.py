@@ -216,16 +216,20 @@ def _note(prepared: _Prepared, order: MergeOrder) -> ChangeNote:
 
 
 def _remember_conflicts(tx: Tx, prepared: _Prepared) -> None:
-    tx.conn.execute(delete(bom_conflicts).where(bom_conflicts.c.parent_id == prepared.parent.id))
+    ours = bom_conflicts.c.parent_id == prepared.parent.id
+    before = {row.child_id: row for row in tx.conn.execute(select(bom_conflicts).where(ours))}
+    tx.conn.execute(delete(bom_conflicts).where(ours))
     rows = []
     for conflict in prepared.conflicts:
         child_id = prepared.child_ids[conflict.part_number]
+        known = before.get(child_id)
+        same = known is not None and known.cad_quantity == float(conflict.local_quantity)
         rows.append(
             {
                 "parent_id": prepared.parent.id,
                 "child_id": child_id,
                 "cad_quantity": float(conflict.local_quantity),
-                "since": tx.stamp,
+                "since": known.since if known is not None and same else tx.stamp,
                 "accepted": prepared.accepted.get(child_id) == conflict.local_quantity,
             }
         )

@@ -16,7 +16,9 @@ async function refresh() {
   if (busy) return;
   busy = true;
   try {
-    const answer = await fetch(`${root}/activity?after=${parseInt(list.dataset.last, 10)}`);
+    const query = new URLSearchParams(location.search);
+    query.set("newer_than", parseInt(list.dataset.last, 10));
+    const answer = await fetch(`${root}/activity?${query}`);
     const page = new DOMParser().parseFromString(await answer.text(), "text/html");
     const fresh = page.getElementById("entries");
     if (!fresh) return location.reload(); // logged out meanwhile
