@@ -84,15 +84,20 @@ def read(form: FormData) -> LineForm:
 
 def edit_of(sent: LineForm, now: LineState) -> Edit:
     """What the form changes on the line as it is now; RejectedError where a choice was not made."""
-    unmade = [FIELDS[name] for name in sent.asked if sent.picked.get(name) not in (MINE, THEIRS)]
-    if unmade:
-        raise RejectedError(f"{', '.join(unmade)}: choose yours or theirs")
+    if unmade(sent):
+        raise RejectedError(f"{', '.join(FIELDS[name] for name in unmade(sent))}: choose yours or theirs")
     typed = dict(sent.typed)
     for name, pick in sent.picked.items():
         if pick == THEIRS:
             for other in group_of(name):
                 typed[other] = sent.seen.get(other, typed.get(other, ""))
     return compared(shown(now), sent.seen, typed, together=TOGETHER, same=_same)
+
+
+def unmade(sent: LineForm) -> list[str]:
+    """The fields for which a choice was asked for and not made."""
+    names = [name for name in sent.asked if sent.picked.get(name) not in (MINE, THEIRS)]
+    return [other for name in names for other in group_of(name)]
 
 
 def group_of(name: str) -> Sequence[str]:
@@ -126,7 +131,7 @@ def meanwhile(tx: Tx, parent: Item, line_ids: Sequence[str], after: int) -> dict
 
 @dataclass(frozen=True, slots=True)
 class Disputed:
-    """Line id → who set its quantity here, and what CAD says of it: in words, for lines of which both speak."""
+    """Line id → who set its quantity here, and what CAD says of it, both in words."""
 
     by_hand: Mapping[str, str]
     cad_words: Mapping[str, str]

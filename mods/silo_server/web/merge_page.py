@@ -28,7 +28,7 @@ from silo_server.values import Actor, Item, Line
 from silo_server.web import line_form
 from silo_server.web.forms import AmbiguousError, Form, back, text, texts, whole
 from silo_server.web.guard import Reader, Writer
-from silo_server.web.line_form import MINE, THEIRS, LineForm
+from silo_server.web.line_form import LineForm
 from silo_server.web.render import isolate, page, plural, segment
 from silo_server.web.tables import Address, Page, arranged, fits, page_of
 from silo_server.web.words import FIELDS, by_whom, sentences
@@ -173,10 +173,7 @@ def change_line(
     def work(tx: Tx) -> tuple[str, int]:
         parent = get_item(tx, part_number, lock=True)
         line = _line_to_change(tx, parent, line_id, sent, asked, text(form, "child"))
-        # Without a choice, the choice is asked for again, with the fields that clash.
-        unmade = [name for name in sent.asked if sent.picked.get(name) not in (MINE, THEIRS)]
-        if unmade:
-            clashes = [other for name in unmade for other in line_form.group_of(name)]
+        if clashes := line_form.unmade(sent):
             raise Refused(replace(asked, problem="Choose yours or theirs, then save.", clashes=clashes), 400)
         edit = line_form.edit_of(sent, line.state)
         told = line_form.meanwhile(tx, parent, [line.id], sent.at).get(line.id, [])
