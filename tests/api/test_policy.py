@@ -14,7 +14,14 @@ from silo.api.client import SiloClient
 from silo.api.policy import LONGEST_TOLD, Backoff, Retries, Scope, Then, Verdict, judge, may_repeat
 from silo.api.replies import WebPageError
 from silo.bom import errors
-from silo.bom.errors import BusyError, CycleError, DocumentError, SiloError, UnreachableError
+from silo.bom.errors import (
+    BusyError,
+    CycleError,
+    DocumentError,
+    NewerRevisionError,
+    SiloError,
+    UnreachableError,
+)
 
 ENTRY_PERSON, ALL_RETRY = (Scope.ENTRY, Then.PERSON), (Scope.ALL, Then.RETRY)
 VERDICTS = {
@@ -36,6 +43,7 @@ VERDICTS = {
     "ConflictError": ENTRY_PERSON,
     "CycleError": ENTRY_PERSON,
     "VersionConflictError": ENTRY_PERSON,
+    "NewerRevisionError": ENTRY_PERSON,
     "CancelledError": ALL_RETRY,
 }
 TREE = [cls for _, cls in inspect.getmembers(errors, inspect.isclass) if issubclass(cls, SiloError)]
@@ -45,6 +53,8 @@ def made(kind: type[SiloError]) -> SiloError:
     """An error of this class."""
     if issubclass(kind, DocumentError):
         return kind("a.FCStd", "x")
+    if issubclass(kind, NewerRevisionError):
+        return kind("x", {"revision_number": 2})
     return kind(["A", "A"]) if issubclass(kind, CycleError) else kind("x")
 
 
