@@ -28,6 +28,8 @@ PAGES = (
     "/items",
     "/items?q=nothing-like-this",
     "/items?sort=-name&archived=1",
+    "/items/{parent}/print",
+    "/items/{parent}/print?view=flat&pieces=4",
     "/waiting",
     "/waiting?q=nothing-like-this",
     "/items/new",

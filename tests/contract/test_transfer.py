@@ -15,7 +15,7 @@ EVIL = ['=HYPERLINK("http://x")', "+1+1", "-2", "@SUM(A1)", "\t=1", "＝1"]
 
 def read(data: bytes) -> list[dict[str, str]]:
     """The rows of a CSV export."""
-    return list(csv.DictReader(io.StringIO(data.decode("utf-8"), newline="")))
+    return list(csv.DictReader(io.StringIO(data.decode("utf-8-sig"), newline="")))
 
 
 @pytest.fixture
@@ -42,7 +42,8 @@ def test_csv_is_rfc_4180(api: Api, tree: tuple[str, ...]) -> None:
         ("1", sub, "2", "assembly"),
         ("2", leaf, "3", "assembly"),
     ]
-    assert (rows[1]["Mass"], rows[1]["Material"]) == ("0.25 kg", "Steel")
+    assert (rows[1]["Unit mass [kg]"], rows[1]["Material"]) == ("0.25", "Steel")
+    assert answer.body.startswith(b"\xef\xbb\xbfItem,")
     assert rows[1]["Reference designators"] == "R1 R2"
 
 
@@ -85,6 +86,74 @@ def test_xlsx_has_numbers_as_numbers(api: Api, tree: tuple[str, ...]) -> None:
     book = load_workbook(io.BytesIO(api.call("GET", bom(tree[0], "export.xlsx")).body))
     header = [cell.value for cell in book.active[1]]
     assert [row[header.index("Quantity")].value for row in book.active.iter_rows(min_row=2)] == [2, 3]
+
+
+def test_a_purchaser_can_order_from_it(api: Api, tree: tuple[str, ...]) -> None:
+    """Unit and total mass and cost as numbers, supplier and its number, for as many as are built."""
+    top, _sub, leaf, other = tree
+    bought = {"supplier": "=Bolt & Co", "supplier_part_number": "00123", "lead_time_days": 14}
+    api.good("PATCH", f"/api/items/{leaf}/properties", {"standard_cost": 0.1, "currency": "CHF", **bought})
+    api.good(
+        "PATCH", f"/api/items/{other}/properties", {"mass_kg": 0.00001, "standard_cost": 2, "currency": "CHF"}
+    )
+    flat = {row["part_number"]: row for row in api.get(bom(top, "export.json?view=flat&pieces=10"))["lines"]}
+    assert (
+        flat[leaf]
+        | {
+            "quantity": 110,
+            "total_quantity": 110,
+            "unit_mass_kg": 0.25,
+            "overall_mass_kg": 27.5,
+            "unit_cost": 0.1,
+            "overall_cost": 11,
+            "currency": "CHF",
+            "item_type": "part",
+            "relation_type": None,
+            "lead_time_days": 14,
+            "supplier": "=Bolt & Co",
+            "supplier_part_number": "00123",
+        }
+        == flat[leaf]
+    )
+    rows = read(api.call("GET", bom(top, "export.csv?view=indented")).body)
+    assert (rows[0]["Unit mass [kg]"], rows[0]["Overall mass [kg]"]) == ("1.00001", "2.00002")
+    assert (rows[0]["Unit cost"], rows[0]["Relation type"]) == ("2.4", "component")
+    assert (rows[2]["Unit mass [kg]"], rows[2]["Overall mass [kg]"]) == ("0.00001", "0.00002")
+    assert rows[1]["Supplier"] == "'=Bolt & Co"
+    answer = api.call("GET", bom(top, "export.xlsx?view=flat&pieces=10"))
+    assert 'filename="' + f'{top}-bom-flat-for-10.xlsx"' in answer.headers["content-disposition"]
+    sheet = load_workbook(io.BytesIO(answer.body)).active
+    assert sheet["A1"].value.startswith(f"For 10 pieces of {top}")
+    header = [cell.value for cell in sheet[2]]
+    cells = {row[header.index("Part number")].value: row for row in sheet.iter_rows(min_row=3)}
+    cost = cells[leaf][header.index("Overall cost")]
+    assert (cost.value, cost.data_type, cost.number_format) == (11, "n", "#,##0.00")
+    assert cells[leaf][header.index("Supplier's part number")].data_type == "s"
+    assert sheet.auto_filter.ref.startswith("A2:")
+    for wrong in (0, -1, "x", 10**9):
+        api.bad(400, "GET", bom(top, f"export.csv?pieces={wrong}"))
+
+
+def test_a_sum_with_something_unknown_in_it_is_empty(api: Api, tree: tuple[str, ...]) -> None:
+    """Nobody orders by, or weighs with, half a sum; nor are two currencies added."""
+    top, sub, leaf, other = tree
+    api.good("PATCH", f"/api/items/{leaf}/properties", {"standard_cost": 1, "currency": "CHF"})
+    first = api.get(bom(top, "export.json?view=single"))["lines"][0]
+    assert (first["part_number"], first["unit_mass_kg"], first["unit_cost"]) == (sub, None, None)
+    api.good("PATCH", f"/api/items/{other}/properties", {"mass_kg": 1, "standard_cost": 1, "currency": "EUR"})
+    first = api.get(bom(top, "export.json?view=single"))["lines"][0]
+    assert (first["unit_mass_kg"], first["unit_cost"], first["currency"]) == (2, None, None)
+
+
+def test_csv_for_an_excel_that_writes_commas(api: Api, tree: tuple[str, ...]) -> None:
+    """Semicolons and decimal commas; the import reads it as what it is."""
+    top, leaf = tree[0], tree[2]
+    api.good("PUT", bom(top, leaf), {"quantity": 2.5, "notes": "a;b"})
+    data = api.call("GET", bom(top, "export.csv?semicolons=true")).body
+    rows = list(csv.DictReader(io.StringIO(data.decode("utf-8-sig"), newline=""), delimiter=";"))
+    assert (rows[1]["Quantity"], rows[1]["Unit mass [kg]"], rows[1]["Notes"]) == ("2,5", "0,25", "a;b")
+    answer = api.good("POST", bom(top, "import"), body=data, headers={"Content-Type": "text/csv"})
+    assert answer["counts"] == {"add": 0, "change": 0, "same": 2, "skip": 0, "error": 0}
 
 
 def test_our_own_export_imported_again_changes_nothing(api: Api, tree: tuple[str, ...]) -> None:

@@ -33,6 +33,7 @@ TABLE = {
     ("GET", "/items"): VIEWER,
     ("GET", "/items/{part_number}"): VIEWER,
     ("GET", "/waiting"): VIEWER,
+    ("GET", "/items/{part_number}/print"): VIEWER,
     ("POST", "/waiting/decide"): EDITOR,
     ("GET", "/items/new"): EDITOR,
     ("POST", "/items/new"): EDITOR,

@@ -29,7 +29,6 @@ from silo_server.routes.context import (
 from silo_server.routes.review import state_to_wire
 from silo_server.services.bom import csv_file, exports, imports
 from silo_server.services.bom.exports import View
-from silo_server.values import Item
 
 router = APIRouter(prefix="/api/items/{part_number}/bom", tags=["bom transfer"])
 
@@ -63,32 +62,49 @@ IMPORT_BODY = {
 }
 
 
+Pieces = Annotated[int, Query(ge=1, le=1_000_000)]
+
+
 @router.get("/export.csv", response_class=Response, responses=_content("text/csv"))
-def export_csv(server: ServerDep, caller: Viewer, part_number: str, view: View = View.SINGLE) -> Response:
-    """The BOM as CSV (RFC 4180, UTF-8); cells that would run as formulas are made text."""
+def export_csv(
+    server: ServerDep,
+    caller: Viewer,
+    part_number: str,
+    view: View = View.SINGLE,
+    pieces: Pieces = 1,
+    semicolons: bool = False,
+) -> Response:
+    """The BOM as CSV (RFC 4180, UTF-8); cells that would run as formulas are made text.
+
+    ``pieces``: totals for so many of it. ``semicolons``: for an Excel that expects 1,5 instead of 1.5.
+    """
     with server.db.read(caller) as tx:
-        root, rows = exports.export_rows(tx, part_number, view)
+        made = exports.export(tx, part_number, view, pieces)
     out = _spool()
-    exports.to_csv(rows, out)
-    return _file(out, "text/csv; charset=utf-8; header=present", root, view, "csv")
+    exports.to_csv(made, out, semicolons=semicolons)
+    return _file(out, "text/csv; charset=utf-8; header=present", made, "csv")
 
 
 @router.get("/export.xlsx", response_class=Response, responses=_content(XLSX))
-def export_xlsx(server: ServerDep, caller: Viewer, part_number: str, view: View = View.SINGLE) -> Response:
+def export_xlsx(
+    server: ServerDep, caller: Viewer, part_number: str, view: View = View.SINGLE, pieces: Pieces = 1
+) -> Response:
     """The BOM as a workbook."""
     with server.db.read(caller) as tx:
-        root, rows = exports.export_rows(tx, part_number, view)
+        made = exports.export(tx, part_number, view, pieces)
     out = _spool()
-    exports.to_xlsx(rows, root.part_number, out)
-    return _file(out, XLSX, root, view, "xlsx")
+    exports.to_xlsx(made, out)
+    return _file(out, XLSX, made, "xlsx")
 
 
 @router.get("/export.json", responses=READ_ERRORS)
-def export_json(server: ServerDep, caller: Viewer, part_number: str, view: View = View.SINGLE) -> Response:
+def export_json(
+    server: ServerDep, caller: Viewer, part_number: str, view: View = View.SINGLE, pieces: Pieces = 1
+) -> Response:
     """The BOM as JSON."""
     with server.db.read(caller) as tx:
-        root, rows = exports.export_rows(tx, part_number, view)
-    return json_answer(exports.to_json(root, view, rows))
+        made = exports.export(tx, part_number, view, pieces)
+    return json_answer(exports.to_json(made))
 
 
 @router.post("/import", responses=WRITE_ERRORS, openapi_extra=IMPORT_BODY)
@@ -160,9 +176,10 @@ def _sent(out: IO[bytes]) -> Iterator[bytes]:
             yield chunk
 
 
-def _file(out: IO[bytes], media_type: str, root: Item, view: View, suffix: str) -> Response:
-    stem = "".join(c if c.isascii() and (c.isalnum() or c in "-_.") else "_" for c in root.part_number)
-    disposition = f'attachment; filename="{stem}-bom-{view.value}.{suffix}"'
+def _file(out: IO[bytes], media_type: str, made: exports.Export, suffix: str) -> Response:
+    stem = "".join(c if c.isascii() and (c.isalnum() or c in "-_.") else "_" for c in made.root.part_number)
+    many = f"-for-{made.pieces}" if made.pieces > 1 else ""
+    disposition = f'attachment; filename="{stem}-bom-{made.view.value}{many}.{suffix}"'
     headers = {"Content-Disposition": disposition, "Content-Length": str(out.seek(0, os.SEEK_END))}
     out.seek(0)
     return StreamingResponse(_sent(out), media_type=media_type, headers=headers)

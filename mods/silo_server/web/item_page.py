@@ -25,12 +25,14 @@ from silo_server.web.guard import Reader
 from silo_server.web.item_edit_page import shown_properties
 from silo_server.web.render import page, segment
 from silo_server.web.structure import Structure, Wanted, flat_page, level_counts, tree_page, usual_depth
-from silo_server.web.tables import Address
+from silo_server.web.tables import PAGE_ROWS, Address
 
 router = APIRouter(include_in_schema=False)
 
 MOST_USES = 200
 MOST_PIECES = 1_000_000
+# Some 400 sheets of paper.
+MOST_PRINTED = 20_000
 
 
 @dataclass(frozen=True)
@@ -111,7 +113,21 @@ def item_page(
     )
 
 
-def structure_of(tx: Tx, item: Item, look: Look) -> dict[str, Any]:
+@router.get("/items/{part_number}/print")
+def print_page(
+    request: Request, server: ServerDep, caller: Reader, part_number: str, look: Asked
+) -> Response:
+    """The BOM for paper: all rows of the view on one page, with what a reader must know on top."""
+    with server.db.read(caller) as tx:
+        item = get_item(tx, part_number, include_archived=True)
+        shown = structure_of(tx, item, look, MOST_PRINTED)
+        now = tx.stamp
+    path = f"/items/{segment(item.part_number)}"
+    values = {"item": item, "look": look, "at": look.address(path), "now": now, **shown}
+    return page(request, "print.html", caller, **values)
+
+
+def structure_of(tx: Tx, item: Item, look: Look, size: int = PAGE_ROWS) -> dict[str, Any]:
     """What the templates of a BOM over all levels show: table, totals, what the last sync left out."""
     try:
         graph, problem = tree.load_graph(tx, item), ""
@@ -131,15 +147,16 @@ def structure_of(tx: Tx, item: Item, look: Look) -> dict[str, Any]:
     if problem or item.id not in graph.lines:
         return values
     counts = level_counts(graph)
-    depth = look.depth or usual_depth(counts)
+    depth = look.depth or (len(counts) if size > PAGE_ROWS else usual_depth(counts))
+    wanted = replace(look.wanted, depth=depth, rows=size)
     values |= {"levels": len(counts), "occurrences": sum(counts), "depth": depth}
     try:
         parts = rollup.parts_of(tx, graph)
         values |= {"cost": rollup.roll_up_cost(graph, parts), "mass": rollup.roll_up_mass(graph, parts)}
         shown = Structure(graph, parts, rollup.worths(graph, parts), marks)
         if look.is_flat:
-            return values | {"table": flat_page(shown, look.wanted)}
-        table, above = tree_page(shown, replace(look.wanted, depth=depth), sum(counts))
+            return values | {"table": flat_page(shown, wanted)}
+        table, above = tree_page(shown, wanted, sum(counts))
         return values | {"table": table, "above": above}
     except (ConflictError, TooLargeError) as error:
         return {**values, "problem": str(error)}

@@ -32,6 +32,8 @@ class Wanted:
         levels that are open (0: as many as fit on a page); ``flipped`` names the branches that are not so.
     pieces
         for how many of the assembly the quantities are.
+    rows
+        how many make a page.
     """
 
     words: str = ""
@@ -41,6 +43,7 @@ class Wanted:
     depth: int = 0
     flipped: frozenset[str] = frozenset()
     pieces: int = 1
+    rows: int = PAGE_ROWS
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +121,7 @@ def tree_page(shown: Structure, wanted: Wanted, total: int) -> tuple[Page[Branch
             raise TooLargeError(
                 f"more than {MOST_OPEN} rows of this tree are open; show fewer levels or take an export"
             )
-    found = page_of(rows, total if wanted.words or wanted.item_type else len(rows), wanted.page)
+    found = page_of(rows, total if wanted.words or wanted.item_type else len(rows), wanted.page, wanted.rows)
     above: list[Branch] = []
     for row in reversed(rows[: found.start]):
         if row.depth < (above[-1] if above else rows[found.start]).depth:
@@ -226,7 +229,7 @@ def flat_page(shown: Structure, wanted: Wanted) -> Page[Branch]:
         for row in tree.flatten(shown.graph)
     ]
     found = [row for row in rows if _fits_flat(row, test, wanted)]
-    return page_of(arranged(found, wanted.sort, _FLAT_KEYS), len(rows), wanted.page)
+    return page_of(arranged(found, wanted.sort, _FLAT_KEYS), len(rows), wanted.page, wanted.rows)
 
 
 def _fits_flat(row: Branch, test: Callable[..., bool], wanted: Wanted) -> bool:

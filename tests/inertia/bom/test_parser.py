@@ -355,24 +355,19 @@ def test_no_cells_are_lost(rows: list[tuple[str, str, str]]) -> None:
 
 
 def test_the_servers_real_export_is_read() -> None:
-    """What silo_server writes as CSV comes back: names like formulae, structure, exact masses."""
+    """What silo_server writes as CSV comes back, in both forms: odd names, structure, masses."""
     exports = pytest.importorskip("silo_server.services.bom.exports")
+    common = {"Item type": "part", "Relation type": "component", "Source": "assembly"}
     rows = [
-        {
-            "Item": "1",
-            "Level": 1,
-            "Part number": "A01-0002",
-            "Name": "Gearbox",
-            "Quantity": 2.0,
-            "Unit": "ea",
-        },
-        {
-            "Item": "1.1",
-            "Level": 2,
-            "Part number": "F01-0001",
-            "Name": "=Bolt",
-            "Quantity": 4.0,
-            "Mass": "0.3 kg",
+        {"Item": "1", "Level": 1, "Part number": "A01-0002", "Name": "Gearbox", "Quantity": 2.0, "Unit": "ea"}
+        | {"Total quantity": 2, "Unit mass [kg]": 1.2, "Overall mass [kg]": 2.4, **common},
+        {"Item": "1.1", "Level": 2, "Part number": "F01-0001", "Name": "=Bolt", "Quantity": 4.0}
+        | {
+            "Total quantity": 8,
+            "Unit mass [kg]": 0.3,
+            "Overall mass [kg]": 2.4,
+            "Supplier": "Bolt & Co",
+            **common,
         },
         {
             "Item": "2",
@@ -381,15 +376,19 @@ def test_the_servers_real_export_is_read() -> None:
             "Name": "Lid, red",
             "Quantity": 1.0,
             "Material": "PLA",
-        },
+        }
+        | {"Total quantity": 1, **common},
     ]
-    exports.to_csv(rows, out := io.BytesIO())
-    table = BOMParser().parse_bytes(out.getvalue())
-    assert [(r.name, r.part_number, r.quantity, r.level) for r in table.rows] == [
-        ("Gearbox", "A01-0002", 2, 1),
-        ("=Bolt", "F01-0001", 4, 2),
-        ("Lid, red", "F01-0002", 1, 1),
-    ]
-    assert (table["=Bolt"].mass_kg, table["=Bolt"].quantum_kg) == (pytest.approx(0.3), 0)
-    assert table["Lid, red"].material == "PLA"
-    assert table.warnings == ()
+    for semicolons in (False, True):
+        made = exports.Export(None, exports.View.INDENTED, iter(rows), ["Incomplete: A01-0001 1 missing"])
+        exports.to_csv(made, out := io.BytesIO(), semicolons=semicolons)
+        table = BOMParser().parse_bytes(out.getvalue())
+        assert [(r.name, r.part_number, r.quantity, r.level) for r in table.rows] == [
+            ("Gearbox", "A01-0002", 2, 1),
+            ("=Bolt", "F01-0001", 4, 2),
+            ("Lid, red", "F01-0002", 1, 1),
+        ]
+        assert table["=Bolt"].mass_kg == pytest.approx(0.3)
+        assert table["Gearbox"].mass_kg == pytest.approx(1.2)
+        assert table["Lid, red"].material == "PLA"
+        assert table.warnings == ()

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What a purchaser takes along: exports for so many pieces, and a page for paper."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from openpyxl import load_workbook
+from playwright.sync_api import Page, expect
+from server_testing import Api, bom, merge_body
+
+Visit = Callable[..., Page]
+
+
+def test_an_order_for_ten(api: Api, visit: Visit, tmp_path: Path) -> None:
+    """The number on the page is that of the exports and of the paper; without script."""
+    top, part = api.items(2)
+    api.good("PATCH", f"/api/items/{part}/properties", {"standard_cost": 2, "supplier": "Nordic"})
+    api.merge(top, {part: 3})
+    page = visit("viewer", java_script_enabled=False)
+    page.goto(f"/items/{top}?view=flat")
+    page.get_by_label("For how many").fill("10")
+    page.get_by_role("button", name="Show").click()
+    with page.expect_download() as waiting:
+        page.get_by_role("link", name="flat as XLSX").click()
+    file = tmp_path / waiting.value.suggested_filename
+    assert file.name == f"{top}-bom-flat-for-10.xlsx"
+    waiting.value.save_as(file)
+    rows = [[cell.value for cell in row] for row in load_workbook(file).active.iter_rows()]
+    order = dict(zip(rows[1], rows[2], strict=True))
+    assert (order["Part number"], order["Quantity"], order["Overall cost"], order["Supplier"]) == (
+        part,
+        30,
+        60,
+        "Nordic",
+    )
+    page.get_by_role("link", name="Print").click()
+    expect(page.locator("main")).to_contain_text("For 10 pieces")
+    expect(page.locator("tr", has_text=part)).to_contain_text("Nordic")
+    expect(page.locator("main")).to_contain_text("60.00 EUR")
+
+
+def test_paper_has_all_of_it_and_nothing_else(api: Api, visit: Visit) -> None:
+    """All levels, what is missing on top, the head on every sheet; no menus, no buttons, dark ink."""
+    top, sub, part = api.items(3)
+    api.merge(sub, {part: 2})
+    gap = {"reason": "missing", "name": "Lid", "file": "Lid.FCStd", "object": "Body", "quantity": 1}
+    api.good("POST", bom(top, "merge"), {**merge_body({sub: 2}), "left_out": [gap]})
+    page = visit("viewer", color_scheme="dark")
+    page.goto(f"/items/{top}/print")
+    expect(page.get_by_role("button", name="Print")).to_be_visible()
+    page.emulate_media(media="print")
+    for gone in (".top", "#print", "footer"):
+        expect(page.locator(gone)).to_be_hidden()
+    expect(page.locator(".banner.warn")).to_contain_text("Incomplete: 1 missing")
+    expect(page.locator("tbody th")).to_have_text([sub, part])
+    style = "e => [getComputedStyle(e).color, getComputedStyle(document.body).backgroundColor]"
+    assert page.locator("h1").evaluate(style) == ["rgb(0, 0, 0)", "rgb(255, 255, 255)"]
+    assert page.locator("thead").evaluate("e => getComputedStyle(e).display") == "table-header-group"
+    # The item's own page prints as well.
+    page.goto(f"/items/{top}")
+    for gone in (".top", "#view", ".twist"):
+        expect(page.locator(gone).first).to_be_hidden()
