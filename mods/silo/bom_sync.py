@@ -60,6 +60,7 @@ __all__ = [
     "diff_bom",
     "extract",
     "extract_bom_links",
+    "identities_before",
     "plan_merge",
     "resolve",
     "resolve_part_numbers",
@@ -197,6 +198,24 @@ def server_lines(resolved: Resolved, api: SyncApi) -> tuple[Mapping[str, Any], .
     if number is None:
         return ()
     return tuple(line if isinstance(line, Mapping) else line.model_dump() for line in api.get_bom(number))
+
+
+def identities_before(
+    compared: Iterable[tuple[Resolved, Iterable[Mapping[str, Any]]]],
+) -> dict[tuple[str, str], str]:
+    """What the last syncs said of components: (file, object) → the Silo UUID of its item.
+
+    compared
+        assemblies, each with the server's lines.
+    """
+    found: dict[tuple[str, str], str] = {}
+    for one, lines in compared:
+        for line in lines:
+            for part in line.get("components") or ():
+                if line.get("child_id") and isinstance(part.get("file"), str):
+                    path = os.path.normpath(os.path.join(one.folder, part["file"]))
+                    found[path, str(part.get("object") or "")] = str(line["child_id"])
+    return found
 
 
 def compare(resolved: Resolved, api: SyncApi) -> MergePlan:

@@ -19,7 +19,8 @@ from silo.fcstd import Library, check_stampable, stamp
 from silo.fcstd.objects import FcstdObject
 from silo.registration import Ask, Journal, Registration, RegistrationApi, register, unclear
 
-Write = Callable[[str, str], None]
+# Writes an identity on all objects of an article at once.
+Write = Callable[[str], None]
 
 
 def modelled(path: str, assembly: str | None = None) -> list[Modelled]:
@@ -78,16 +79,16 @@ def declare(
     check
         raises DocumentError where the file must not be written now.
     write
-        writes an identity on one object; in the file where none is given.
+        writes an identity on all its objects; where none is given, in the file.
     """
     path = article.entry.doc_path
 
-    def on_disk(name: str, identity: str) -> None:
-        stamp(path, identity, object_name=name, item_object=name)
-
     def stamp_all(_entry: object, identity: str) -> None:
+        if write is not None:
+            write(identity)
+            return
         for name in article.objects:
-            (write or on_disk)(name, identity)
+            stamp(path, identity, object_name=name, item_object=name)
 
     def check_all(_entry: object) -> None:
         check(path)

@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 
 from silo.bom.errors import SiloError
+from silo.bom.findings import Finding
 from silo.bom.model import BomEntry, Extraction
 from silo.outbox.send import Sent
 from silo.registration import Registration
@@ -147,6 +148,7 @@ class PreviewWindow:
     wishes: Any
     filled: list[Preview] = field(default_factory=list)
     failed: list[SiloError] = field(default_factory=list)
+    seen: list[tuple[str, bool]] = field(default_factory=list)
     raised: int = 0
 
     def busy(self) -> None:
@@ -157,6 +159,9 @@ class PreviewWindow:
 
     def fail(self, error: SiloError) -> None:
         self.failed.append(error)
+
+    def tell_view(self, text: str, *, agrees: bool) -> None:
+        self.seen.append((text, agrees))
 
     def show(self) -> None:
         return
@@ -175,6 +180,7 @@ class RegisterWindow:
     results: list[Registration] = field(default_factory=list)
     numbers: dict[str, str] = field(default_factory=dict)
     told: list[str] = field(default_factory=list)
+    undone: list[Any] = field(default_factory=list)
     stops: int = 0
 
     def fill(self, offer: Offer) -> None:
@@ -188,6 +194,9 @@ class RegisterWindow:
 
     def registered(self, _order: Order, result: Registration) -> None:
         self.results.append(result)
+
+    def undeclared(self, row: Any) -> None:
+        self.undone.append(row)
 
     def stopped(self) -> None:
         self.stops += 1
@@ -215,6 +224,10 @@ class Desk:
     decide: Callable[[Plan, Look], Answer | None] | None = None
     open: list[Document] = field(default_factory=list)
     previews: list[PreviewWindow] = field(default_factory=list)
+    witnessed: list[Any] = field(default_factory=list)
+    relinked: list[str] = field(default_factory=list)
+    taken_back: list[tuple[str, ...]] = field(default_factory=list)
+    refusal: SiloError | None = None
     registers: list[RegisterWindow] = field(default_factory=list)
 
     def snapshot(self, doc: Any) -> Snapshot:
@@ -227,6 +240,17 @@ class Desk:
             )
             extraction = Extraction(head, tuple(entries))
         return Snapshot(doc.FileName, doc.Label, doc.identity or None, extraction)
+
+    def accounts(self, extraction: Extraction) -> list[Any]:
+        if self.refusal is not None:
+            raise self.refusal
+        return self.witnessed
+
+    def relink(self, finding: Finding) -> list[str]:
+        if self.refusal is not None:
+            raise self.refusal
+        self.relinked.append(finding.did_you_mean)
+        return ["Link"]
 
     def find(self, path: str) -> Document | None:
         return next((doc for doc in self.open if doc.FileName == path), None)
@@ -241,6 +265,11 @@ class Desk:
 
     def look_at(self, paths: Iterable[str]) -> dict[str, Seen]:
         return {path: Seen(State.READY) for path in paths}
+
+    def remove_identity(self, candidate: Candidate) -> None:
+        if self.refusal is not None:
+            raise self.refusal
+        self.taken_back.append(candidate.article.objects if candidate.article is not None else ())
 
     def write_identity(self, candidate: Candidate, identity: str) -> None:
         assert threading.current_thread() is threading.main_thread()

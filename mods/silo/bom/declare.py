@@ -75,18 +75,16 @@ def modelled_in(top: Any, shape_of: Callable[[Any], str]) -> list[Modelled]:
     for objects, alike in _alike(found, shape_of):
         articles.append(_article(objects, alike, sum(counts[object_name(obj)] for obj in objects)))
     reader = silent_reader()
-    declared: dict[str, tuple[Any, int]] = {}
+    declared: dict[str, tuple[list[Any], int]] = {}
     for count in reader.contents(top).counts:
         target = count.target
-        if getattr(target, "Document", None) is document and not reader.standard(target)[0]:
-            before = declared.get(object_name(target), (target, 0))[1]
-            declared[object_name(target)] = (target, before + count.quantity)
-    for name, (target, quantity) in declared.items():
-        if identity := own_identity(target):
-            article = _article([target], "", quantity)
-            articles.append(
-                replace(article, entry=replace(article.entry, silo_uuid=identity), objects=(name,))
-            )
+        if getattr(target, "Document", None) is document and (identity := own_identity(target)):
+            objects, before = declared.get(identity, ([], 0))
+            objects += [] if target in objects else [target]
+            declared[identity] = (objects, before + count.quantity)
+    for identity, (objects, quantity) in declared.items():
+        article = _article(objects, "", quantity)
+        articles.append(replace(article, entry=replace(article.entry, silo_uuid=identity)))
     return articles
 
 

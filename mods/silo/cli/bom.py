@@ -11,7 +11,7 @@ from silo.bom.errors import SiloError
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.report import base_of, bom_json, flat_json
 from silo.bom.resolve import consolidation_findings
-from silo.bom_sync import resolve
+from silo.bom_sync import assemblies, resolve, server_lines
 from silo.cli import common
 from silo.cli.common import Commands
 
@@ -48,6 +48,9 @@ def run(args: argparse.Namespace) -> int:
         with common.client_of(args) as client:
             common.reach(client, extraction)
             resolved = resolve(extraction, client)
+            broken = [one for one in assemblies(resolved) if any(e.missing for e in one.entries)]
+            compared = [(one, server_lines(one, client)) for one in broken]
+            resolved = common.suggest_by_identity(extraction, resolved, compared)
         known = {entry.key: entry for entry in resolved.unresolved}
         head = _whole(replace(resolved.assembly, children=resolved.entries), known)
         extraction = Extraction(resolved.assembly, head.children, resolved.findings)

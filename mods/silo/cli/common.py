@@ -6,7 +6,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -20,6 +20,7 @@ from silo.bom.roots import choose_assembly
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
+    from silo.bom_sync import Resolved
 
 Commands = Any  # argparse keeps the type of its sub-parsers to itself
 
@@ -84,6 +85,21 @@ def read_assembly(top: str, assembly: str | None = None, *, hardware: bool = Tru
         found = extract(choose_assembly(document, assembly), hardware=hardware)
         told = respelt_findings(library.notes, document.FileName)
     return with_suggestions(replace(found, findings=(*found.findings, *told)))
+
+
+def suggest_by_identity(
+    extraction: Extraction,
+    whole: Resolved,
+    compared: Iterable[tuple[Resolved, Iterable[Mapping[str, Any]]]],
+) -> Resolved:
+    """Missing files with the one that carries the identity which the server knows from the last sync."""
+    from silo.bom_sync import identities_before
+    from silo.fcstd.suggest import with_suggestions
+
+    if not any(entry.missing for entry in walk_entries(extraction.entries)):
+        return whole
+    known = replace(extraction, findings=whole.findings)
+    return replace(whole, findings=with_suggestions(known, identities_before(compared)).findings)
 
 
 def reach(client: SiloClient, extraction: Extraction) -> None:

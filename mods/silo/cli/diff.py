@@ -40,6 +40,7 @@ def run(args: argparse.Namespace) -> int:
         whole = resolve(extraction, client)
         chosen = list(assemblies(whole)) if args.recursive else [whole]
         lines = [server_lines(one, client) for one in chosen]
+        whole = common.suggest_by_identity(extraction, whole, zip(chosen, lines, strict=True))
     compared = [(one, one.diff(known)) for one, known in zip(chosen, lines, strict=True)]
     base = base_of(extraction)
     drifted = bool(whole.unresolved or whole.assembly.part_number is None) or any(

@@ -29,6 +29,7 @@ from silo.spelling import folded
 # A project has some hundreds of files; a home folder taken for one would have many more.
 _MOST_FILES = 2000
 _MOST_FOLDERS = 5000
+_DID_YOU_MEAN = " Did you mean"
 _CODES = (FindingCode.MISSING_FILE, FindingCode.MISSING_OBJECT)
 
 # (file, object) → the Silo UUID that it had in the last sync.
@@ -66,7 +67,7 @@ def _told(finding: Finding, meant: Mapping[str, tuple[str, str]], extraction: Ex
     file, why = meant[finding.file]
     top = os.path.basename(extraction.assembly.doc_path)
     message = (
-        f"{finding.message} Did you mean {file} ({why})? "
+        f"{finding.message.partition(_DID_YOU_MEAN)[0]}{_DID_YOU_MEAN} {file} ({why})? "
         f"`silo-mod relink {top} --from {finding.file} --to {file}` mends the links."
     )
     return replace(finding, message=message, did_you_mean=file)

@@ -3,23 +3,32 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import pytest
 from desk import Document, Office
 
-from silo.bom.errors import UnreachableError
+from silo.bom.errors import DocumentError, UnreachableError
+from silo.bom.findings import Finding, FindingCode, Severity
 from silo.workbench.commit.flow import CommitFlow
 from silo.workbench.preview.flow import PreviewFlow
 
 
+@pytest.fixture(name="shown")
+def _shown() -> list[tuple[str, tuple[str, ...]]]:
+    """What was selected in the 3D view."""
+    return []
+
+
 @pytest.fixture(name="flow")
-def _flow(office: Office) -> PreviewFlow:
+def _flow(office: Office, shown: list[tuple[str, tuple[str, ...]]]) -> PreviewFlow:
     commits = CommitFlow(office.session, office.preferences, office.desk, path=office.folder / "same.json")
     return PreviewFlow(
         office.session,
         commits,
         office.desk,
         register=lambda _path: None,
-        show=lambda _path, _names: None,
+        show=lambda path, names: shown.append((path, names)),
         view=lambda _url: None,
     )
 
@@ -77,3 +86,55 @@ def test_without_a_server_the_window_says_so(office: Office, flow: PreviewFlow, 
     flow.start(top)
     office.settle()
     assert office.desk.previews[0].failed == [error]
+
+
+@dataclass(frozen=True)
+class Account:
+    """What FreeCAD shows of one assembly."""
+
+    doc_path: str
+    agrees: bool
+    unexplained: tuple[str, ...] = ()
+
+    def sentence(self) -> str:
+        return "125 of 125" if self.agrees else "126 of 125"
+
+
+def test_the_view_is_compared_and_what_no_line_explains_is_selected(
+    office: Office, flow: PreviewFlow, top: Document, shown: list[tuple[str, tuple[str, ...]]]
+) -> None:
+    """The first assembly that differs, wherever it lies."""
+    flow.start(top)
+    office.settle()
+    (window,) = office.desk.previews
+    office.desk.witnessed = [Account(top.FileName, True), Account("/sub", True)]
+    window.wishes.verify(window.filled[0])
+    assert (window.seen, shown) == ([("125 of 125", True)], [])
+    office.desk.witnessed = [Account(top.FileName, True), Account("/sub", False, ("Loose",))]
+    window.wishes.verify(window.filled[0])
+    assert (window.seen[-1], shown) == (("126 of 125", False), [("/sub", ("Loose",))])
+    office.desk.refusal = DocumentError("/sub", "is gone")
+    window.wishes.verify(window.filled[0])
+    assert "is gone" in office.desk.warned[-1]
+
+
+def test_broken_links_are_mended_where_one_file_fits(
+    office: Office, flow: PreviewFlow, top: Document
+) -> None:
+    """And the comparison is made again; a refusal is shown."""
+    flow.start(top)
+    office.settle()
+    (window,) = office.desk.previews
+    broken = tuple(
+        Finding(FindingCode.MISSING_FILE, Severity.ERROR, "gone", did_you_mean=meant)
+        for meant in ("", "/new")
+    )
+    preview = replace(window.filled[0], broken=broken)
+    window.wishes.relink(preview)
+    office.settle()
+    assert (office.desk.relinked, len(window.filled)) == (["/new"], 2)
+    office.desk.refusal = DocumentError("/new", "holds no object")
+    window.wishes.relink(preview)
+    office.settle()
+    assert "holds no object" in office.desk.warned[-1]
+    assert len(window.filled) == 2

@@ -53,7 +53,19 @@ def write_identity(candidate: Candidate, identity: str) -> None:
     doc = saving.open_fully(entry.doc_path)
     if live.lost_assemblies(doc):
         raise DocumentError(entry.doc_path, "made by a newer FreeCAD; saving it here would destroy it")
-    saving.write_identity(doc, entry.object_name, identity, whole_document=not candidate.shares_file)
+    whole = not candidate.shares_file
+    for name in candidate.article.objects if candidate.article is not None else (entry.object_name,):
+        saving.write_identity(doc, name, identity, whole_document=whole)
+    saving.save(doc, mark_parents=True)
+
+
+def remove_identity(candidate: Candidate) -> None:
+    """Take the identity from what is modelled in an assembly's own file, and save it. GUI thread."""
+    doc = saving.open_fully(candidate.entry.doc_path)
+    if live.lost_assemblies(doc):
+        raise DocumentError(doc.FileName, "made by a newer FreeCAD; saving it here would destroy it")
+    for name in candidate.article.objects if candidate.article is not None else ():
+        saving.remove_identity(doc, name)
     saving.save(doc, mark_parents=True)
 
 

@@ -131,6 +131,16 @@ def canonical_paths() -> Callable[[str], str]:
 
 def stored_target(link: Any, name: str = "LinkedObject") -> tuple[str, str] | None:
     """File and object ``Name`` that a link has stored; ("", "") where it was never set, None where untold."""
+    found = _stored(link, name)
+    return None if found is None else (found.get("file", ""), found.get("name", ""))
+
+
+def stored_sub_name(link: Any) -> str:
+    """The sub-name that a link has stored beside its target."""
+    return (_stored(link, "LinkedObject") or {}).get("sub", "")
+
+
+def _stored(link: Any, name: str) -> dict[str, str] | None:
     try:
         packed = link.dumpPropertyContent(name, Compression=0)
         with zipfile.ZipFile(io.BytesIO(bytes(packed))) as content:
@@ -140,8 +150,7 @@ def stored_target(link: Any, name: str = "LinkedObject") -> tuple[str, str] | No
     element = _XLINK.search(text)
     if element is None:
         return None
-    found = {name: unescape(value, _ENTITIES) for name, value in _ATTRIBUTE.findall(element[1])}
-    return found.get("file", ""), found.get("name", "")
+    return {name: unescape(value, _ENTITIES) for name, value in _ATTRIBUTE.findall(element[1])}
 
 
 class LinkInspector:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from silo.open_in_freecad import open_in_any
 from silo.workbench.commit import snapshot
@@ -18,6 +18,11 @@ from silo.workbench.freecad import components, host, live, saving
 from silo.workbench.gui import qt
 from silo.workbench.preview import window as preview
 from silo.workbench.register import window as register
+
+if TYPE_CHECKING:
+    from silo.bom.findings import Finding
+    from silo.bom.model import Extraction
+    from silo.workbench.freecad.witness import Account
 
 
 class LiveDocuments:
@@ -68,8 +73,22 @@ class LiveDesk:
 
     look_at = staticmethod(components.look_at)
     write_identity = staticmethod(components.write_identity)
+    remove_identity = staticmethod(components.remove_identity)
     unedited = staticmethod(components.unedited)
     save_marked = staticmethod(components.save_marked)
+
+    def accounts(self, extraction: Extraction) -> list[Account]:
+        """The solids that FreeCAD shows, against those that the BOM explains."""
+        from silo.workbench.freecad import witness
+
+        with qt.wait_cursor():
+            return witness.accounts(extraction, hardware=self._count_hardware())
+
+    def relink(self, finding: Finding) -> list[str]:
+        """Set live links to the file that was meant; their labels."""
+        from silo.workbench.freecad import relinking
+
+        return relinking.relink(finding)
 
     def save_as(self, _doc: Any) -> None:
         """FreeCAD's own dialog, for the active document."""

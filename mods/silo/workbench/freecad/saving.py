@@ -217,6 +217,18 @@ def write_identity(doc: Any, name: str, identity: str, *, whole_document: bool) 
             _set_text(doc, "SiloUUID", identity)
 
 
+def remove_identity(doc: Any, name: str) -> None:
+    """Take the identity of one object out of every place; the document's own stays. The caller saves."""
+    from silo.bom.identity import meta_key
+
+    obj = doc.getObject(name)
+    with others_unmarked(doc):
+        for place in ("SiloItemId", "SiloUUID") if obj is not None else ():
+            if place in obj.PropertiesList and not obj.removeProperty(place):
+                _set_text(obj, place, "")
+        doc.Meta = {key: value for key, value in doc.Meta.items() if key != meta_key(name)}
+
+
 # FreeCAD's number for "a change of it asks for no recompute" (Prop_Output of App::PropertyType).
 _OUTPUT = 8
 

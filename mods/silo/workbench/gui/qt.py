@@ -9,7 +9,8 @@ in full.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from PySide import QtCore, QtGui
@@ -102,3 +103,13 @@ def ask_where_to_save(parent: Any, title: str, name: str) -> str:
 def copy(text: str) -> None:
     """Put text on the clipboard."""
     QtWidgets.QApplication.clipboard().setText(text)
+
+
+@contextmanager
+def wait_cursor() -> Iterator[None]:
+    """The cursor says that the window is busy."""
+    QtWidgets.QApplication.setOverrideCursor(QtCore.Qt.CursorShape.WaitCursor)
+    try:
+        yield
+    finally:
+        QtWidgets.QApplication.restoreOverrideCursor()

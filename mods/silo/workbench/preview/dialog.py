@@ -61,7 +61,9 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         self._problem = widgets.label("", Tone.ERROR)
         self._problem.hide()
         self.table = self._make_table()
-        for part in (self._title, self._summary, self._problem):
+        self._view_text = widgets.label("")
+        self._view_text.hide()
+        for part in (self._title, self._summary, self._problem, self._view_text):
             layout.addWidget(part)
         layout.addWidget(self.table, 1)
         self._make_options(layout)
@@ -115,16 +117,22 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         )
         self.show_button.setToolTip(translate("Silo", "Select the instances in the 3D view and the tree"))
         self.refresh_button = button(translate("Silo", "Compare again"), "refresh", self._wishes.refresh)
+        self.verify_button = button(translate("Silo", "Compare with 3D view"), "verify", self._verify)
+        self.verify_button.setToolTip(
+            translate("Silo", "Does the BOM explain each solid that FreeCAD shows? Selects what it does not")
+        )
+        self.relink_button = button(translate("Silo", "Mend links"), "relink", self._relink)
+        self.relink_button.hide()
         self.view_button = button(translate("Silo", "View in Silo →"), "view", self._view)
         self.register_button = button(translate("Silo", "Register Parts…"), "register", self._register)
         self.sync_button = button(translate("Silo", "Sync"), "sync", self._sync)
         self.sync_button.setDefault(True)
         close = button(translate("Silo", "Close"), "close", self.close)
         row = QtWidgets.QHBoxLayout()
-        for made in (self.show_button, self.refresh_button, self.view_button):
+        for made in (self.show_button, self.refresh_button, self.verify_button, self.view_button):
             row.addWidget(made)
         row.addStretch(1)
-        for made in (self.register_button, self.sync_button, close):
+        for made in (self.relink_button, self.register_button, self.sync_button, close):
             row.addWidget(made)
         return row
 
@@ -171,6 +179,13 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
             many = translate("Silo", "{n} broken links: the BOM is not synced until they are mended.")
             told.append(counted(len(preview.broken), one, many))
         return "\n".join(told)
+
+    def tell_view(self, text: str, *, agrees: bool) -> None:
+        """What a comparison with the 3D view found."""
+        self._view_text.setText(plain(text, 2000) if "\n" not in text else text)
+        tone = Tone.GOOD if agrees else Tone.ERROR
+        self._view_text.setStyleSheet(f"color: {widgets.colour(tone, self)}")
+        self._view_text.show()
 
     def _tell(self, text: str) -> None:
         self._problem.setText(plain(text, 500) if "\n" not in text else text)
@@ -262,6 +277,12 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         self.sync_button.setEnabled(ready and not held)
         self.view_button.setEnabled(ready)
         self.register_button.setEnabled(preview is not None and bool(preview.unregistered))
+        self.verify_button.setEnabled(preview is not None)
+        movable = preview.movable if preview is not None else ()
+        self.relink_button.setVisible(bool(movable))
+        self.relink_button.setToolTip(
+            tip("\n".join(f"{finding.file} → {finding.did_you_mean}" for finding in movable))
+        )
 
     # -- what is asked for ------------------------------------------------------------------------------
 
@@ -274,6 +295,14 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         if self._preview is not None:
             below = self.below.isVisible() and self.below.isChecked()
             self._wishes.sync(self._preview, below, self.missing.isChecked())
+
+    def _verify(self) -> None:
+        if self._preview is not None:
+            self._wishes.verify(self._preview)
+
+    def _relink(self) -> None:
+        if self._preview is not None:
+            self._wishes.relink(self._preview)
 
     def _register(self) -> None:
         if self._preview is not None:

@@ -15,6 +15,9 @@ from silo.workbench.preview.window import PreviewDesk, Window, Wishes
 from silo.workbench.session.session import Session
 from silo.workbench.words import translate
 
+# Of many sub-assemblies that differ, the first ones.
+_MOST_ACCOUNTS = 4
+
 
 class PreviewFlow:
     """Opens previews, one per document.
@@ -72,6 +75,8 @@ class PreviewFlow:
             register=lambda preview: self._register(preview.snapshot.path),
             show=self._show,
             view=lambda preview: self._view(preview.page),
+            verify=self._verify,
+            relink=self._relink,
             closed=lambda: self._open.pop(taken.path, None),
         )
         self._open[taken.path] = self._desk.preview_window(taken.label or name, wishes)
@@ -90,6 +95,36 @@ class PreviewFlow:
         # The window may have been closed while the server was thinking.
         if path in self._open:
             call(self._open[path])
+
+    def _verify(self, preview: Preview) -> None:
+        """Compare what FreeCAD shows with the BOM as it is now, and select what no line explains."""
+        path = preview.snapshot.path
+        doc = self._desk.find(path)
+        taken = self._take(doc) if doc is not None else None
+        if taken is None or taken.extraction is None:
+            return
+        try:
+            found = self._desk.accounts(taken.extraction)
+        except SiloError as error:
+            self._desk.warn(translate("Silo", "BOM in Silo"), str(error))
+            return
+        differing = [account for account in found if not account.agrees]
+        lines = [account.sentence() for account in (differing or found[:1])[:_MOST_ACCOUNTS]]
+        text = "\n".join(lines)
+        self._with_dialog(path, lambda dialog: dialog.tell_view(text, agrees=not differing))
+        unexplained = next((account for account in differing if account.unexplained), None)
+        if unexplained is not None:
+            self._show(unexplained.doc_path, unexplained.unexplained)
+
+    def _relink(self, preview: Preview) -> None:
+        """Lead broken links to the files that were meant, where one fits; then compare again."""
+        try:
+            mended = [label for finding in preview.movable for label in self._desk.relink(finding)]
+        except SiloError as error:
+            self._desk.warn(translate("Silo", "BOM in Silo"), str(error))
+            mended = []
+        if mended:
+            self.again(preview.snapshot.path)
 
     def _sync(self, preview: Preview, below: bool, allow_missing: bool) -> None:
         def failed(error: SiloError) -> None:

@@ -13,6 +13,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 from silo.bom.findings import Finding, FindingCode, Severity
+from silo.bom.identity import walk_entries
 from silo.bom.model import BomDiff, BomEntry, Extraction
 from silo.bom.naming import display_name
 from silo.bom.report import relative, shorten
@@ -112,6 +113,11 @@ class Preview:
         return self.top.resolved.unregistered
 
     @property
+    def movable(self) -> tuple[Finding, ...]:
+        """The broken links for which one file fits."""
+        return tuple(finding for finding in self.broken if finding.did_you_mean)
+
+    @property
     def to_send_below(self) -> int:
         """Sub-assemblies whose sync has something to send."""
         return sum(1 for one in self.compared[:-1] if one.to_send)
@@ -119,18 +125,22 @@ class Preview:
 
 def ask(snapshot: Snapshot, api: Any, control: Control) -> Preview:
     """Compare a snapshot with the server, sub-assemblies included. Worker."""
-    from silo.bom_sync import assemblies, blocking, names_of, resolve, server_lines
+    from silo.bom_sync import assemblies, blocking, identities_before, names_of, resolve, server_lines
     from silo.fcstd.suggest import with_suggestions
 
     extraction = snapshot.extraction or Extraction(BomEntry(snapshot.path, label=snapshot.label))
     extraction = with_suggestions(extraction)
     whole = resolve(extraction, api)
-    compared = []
+    lines = []
     for one in assemblies(whole):
         control.check()
         control.progress(one.assembly.part_number or one.assembly.label)
-        lines = server_lines(one, api)
-        compared.append(_compared(one, lines))
+        lines.append(server_lines(one, api))
+    if any(entry.missing for entry in walk_entries(extraction.entries)):
+        before = identities_before(zip(assemblies(whole), lines, strict=True))
+        told = with_suggestions(replace(extraction, findings=whole.findings), before)
+        whole = replace(whole, findings=told.findings)
+    compared = [_compared(one, known) for one, known in zip(assemblies(whole), lines, strict=True)]
     all_lines = [line for one in compared for line in one.lines]
     number = whole.assembly.part_number
     page = api.web_url(f"/items/{number}/bom") if number else ""

@@ -3,13 +3,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from silo.bom.errors import SiloError
+from silo.bom.findings import Finding
+from silo.bom.model import Extraction
 from silo.workbench.commit.desk import Desk
 from silo.workbench.preview.rows import Preview
+
+
+class Account(Protocol):
+    """One assembly's solids (:class:`silo.workbench.freecad.witness.Account`)."""
+
+    @property
+    def doc_path(self) -> str: ...
+
+    @property
+    def agrees(self) -> bool: ...
+
+    @property
+    def unexplained(self) -> tuple[str, ...]: ...
+
+    def sentence(self) -> str: ...
 
 
 @dataclass(frozen=True)
@@ -20,6 +37,10 @@ class Wishes:
         (preview, sub-assemblies too, although links are broken).
     show
         select instances: (document, objects).
+    verify
+        compare the BOM with what the 3D view shows.
+    relink
+        lead broken links to the files that were meant.
     closed
         the window is gone.
     """
@@ -29,6 +50,8 @@ class Wishes:
     register: Callable[[Preview], None]
     show: Callable[[str, tuple[str, ...]], None]
     view: Callable[[Preview], None]
+    verify: Callable[[Preview], None]
+    relink: Callable[[Preview], None]
     closed: Callable[[], object]
 
 
@@ -41,6 +64,8 @@ class Window(Protocol):
 
     def fail(self, error: SiloError, /) -> None: ...
 
+    def tell_view(self, text: str, /, *, agrees: bool) -> None: ...
+
     def show(self) -> None: ...
 
     def raise_(self) -> None: ...
@@ -50,3 +75,9 @@ class PreviewDesk(Desk, Protocol):
     """A desk that can open previews."""
 
     def preview_window(self, title: str, wishes: Wishes, /) -> Window: ...
+
+    def accounts(self, extraction: Extraction, /) -> Sequence[Account]:
+        """The solids that FreeCAD shows, for the assembly and each sub-assembly."""
+
+    def relink(self, finding: Finding, /) -> list[str]:
+        """Set the live links of a finding to the file that was meant; their labels."""

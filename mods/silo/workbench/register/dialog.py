@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from silo.bom.errors import SiloError
@@ -15,16 +15,19 @@ from silo.workbench.gui.qt import QtCore, QtGui, QtWidgets
 from silo.workbench.pane.activity import Tone
 from silo.workbench.register.registering import Offer, Order
 from silo.workbench.register.rows import (
+    APART,
     NEW,
     EditedRow,
     choose,
     group,
+    heading,
     number_texts,
     retype,
+    section_words,
     type_words,
 )
 from silo.workbench.register.window import Wishes
-from silo.workbench.words import counted, plain, tip, translate
+from silo.workbench.words import plain, tip, translate
 
 # Rows have buttons, and nobody decides on a thousand parts at once; the next ones come after these.
 MOST_ROWS = 400
@@ -44,6 +47,8 @@ class _Look:
     can_choose: bool
     can_register: bool
     can_keep: bool
+    can_undeclare: bool
+    declares: bool
 
 
 class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
@@ -58,6 +63,9 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self._types = type_words()
         self._categories: dict[str, str] = {}
         self._drawn: dict[int, _Look] = {}
+        # Where in the table each row stands, between the headings of the sections; and back.
+        self._places: list[int] = []
+        self._row_at: dict[int, int] = {}
         self._filling = False
         self.setObjectName("SiloRegister")
         self.setWindowTitle(translate("Silo", "Register Components"))
@@ -100,7 +108,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self._delegates = {
             TYPE: ChoiceDelegate(lambda row: self._types, table),
             CATEGORY: ChoiceDelegate(lambda row: self._categories, table),
-            NUMBER: ChoiceDelegate(lambda row: self._rows[row].choices(), table),
+            NUMBER: ChoiceDelegate(lambda place: self._rows[self._row_at[place]].choices(), table),
         }
         for column, delegate in self._delegates.items():
             table.setItemDelegateForColumn(column, delegate)
@@ -142,9 +150,9 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self._drawn.clear()
         self._rows = [EditedRow.of(candidate) for candidate in offer.candidates[:MOST_ROWS]]
         self._filling = True
-        self.table.setRowCount(len(self._rows))
+        self._lay_out()
         for number, row in enumerate(self._rows):
-            self._fill_row(number, row)
+            self._fill_row(self._places[number], row)
         self._filling = False
         self._refresh()
         for column, most in ((COMPONENT, 230), (NAME, 220), (TYPE, 110), (CATEGORY, 220), (NUMBER, 170)):
@@ -155,6 +163,29 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self.table.horizontalHeader().setSectionResizeMode(BUTTON, mode.ResizeToContents)
         self.table.resizeRowsToContents()
 
+    def _lay_out(self) -> None:
+        """A heading before each section; none where there is only the one of components."""
+        sections = [row.section for row in self._rows]
+        with_headings = bool(set(sections) - {""})
+        place, self._places, headings = 0, [], {}
+        for number, section in enumerate(sections):
+            if with_headings and (number == 0 or sections[number - 1] != section):
+                headings[place] = section_words()[section]
+                place += 1
+            self._places.append(place)
+            place += 1
+        self._row_at = {place: number for number, place in enumerate(self._places)}
+        self.table.clearSpans()
+        self.table.setRowCount(place)
+        for place, text in headings.items():
+            heading = QtWidgets.QTableWidgetItem(text)
+            font = heading.font()
+            font.setBold(True)
+            heading.setFont(font)
+            heading.setFlags(QtCore.Qt.ItemFlag.ItemIsEnabled)
+            self.table.setItem(place, 0, heading)
+            self.table.setSpan(place, 0, 1, self.table.columnCount())
+
     def _fill_row(self, number: int, row: EditedRow) -> None:
         for column in range(6):
             self.table.setItem(number, column, QtWidgets.QTableWidgetItem())
@@ -162,7 +193,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self.table.item(number, COMPONENT).setToolTip(tip(f"{entry.doc_path} · {entry.object_name}"))
         button = QtWidgets.QPushButton(translate("Silo", "Register"))
         button.setAutoDefault(False)
-        button.clicked.connect(lambda _checked=False: self._carry_out([row]))
+        button.clicked.connect(lambda _checked=False: self._press(row))
         self.table.setCellWidget(number, BUTTON, button)
 
     def fail(self, error: SiloError) -> None:
@@ -183,6 +214,15 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
                 row.checked = row.checked and result.error is not None
         self._refresh()
 
+    def undeclared(self, row: EditedRow) -> None:
+        """It is no component any more."""
+        if row in self._rows:
+            article = row.candidate.article
+            if article is not None:
+                entry = replace(article.entry, silo_uuid=None)
+                row.candidate = replace(row.candidate, article=replace(article, entry=entry))
+            self._refresh()
+
     def stopped(self) -> None:
         """Nothing is being registered any more."""
         for row in self._rows:
@@ -202,14 +242,15 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         for number, row in enumerate(self._rows):
             self._refresh_row(number, row, texts[number])
         self._filling = False
-        self._text.setText(self._heading())
+        more = len(self._offer.candidates) - len(self._rows)
+        self._text.setText(heading(self._rows, self._title, more))
         self._enable()
 
     def _refresh_row(self, number: int, row: EditedRow, number_text: str) -> None:
         look = self._look(row, number_text)
         if self._drawn.get(number) != look:
             self._drawn[number] = look
-            self._draw_row(number, look)
+            self._draw_row(self._places[number], look)
 
     def _look(self, row: EditedRow, number_text: str) -> _Look:
         note, tone = row.note()
@@ -226,6 +267,8 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
             can_choose=row.can_choose,
             can_register=row.can_register,
             can_keep=row.can_keep,
+            can_undeclare=row.can_undeclare,
+            declares=row.section == "modelled",
         )
 
     def _draw_row(self, number: int, look: _Look) -> None:
@@ -242,43 +285,8 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         shade = widgets.colour(look.tone, self.table)
         remark.setForeground(QtGui.QBrush(QtGui.QColor(shade)) if shade else QtGui.QBrush())
         button = self.table.cellWidget(number, BUTTON)
-        button.setText(translate("Silo", "Keep") if look.can_keep else translate("Silo", "Register"))
-        button.setEnabled(look.can_register or look.can_keep)
-
-    def _heading(self) -> str:
-        more = len(self._offer.candidates) - len(self._rows)
-        if not self._rows:
-            text = translate("Silo", "All components of {name} have their Silo part number.")
-            return text.replace("{name}", plain(self._title, 80))
-        left = [row for row in self._rows if not row.finished]
-        if not left:
-            return translate("Silo", "All of these have their part number now.")
-        copied = sum(1 for row in left if row.candidate.same_as)
-        told = [self._unregistered(len(left) - copied)] if len(left) > copied else []
-        if copied:
-            told.append(
-                translate(
-                    "Silo",
-                    "Where files carry one identity, choose in the column Part number: the same part, or a "
-                    "new one?",
-                )
-            )
-        if more > 0:
-            told.append(translate("Silo", "({n} more after these)").replace("{n}", str(more)))
-        return "\n".join(told)
-
-    def _unregistered(self, left: int) -> str:
-        one = translate(
-            "Silo",
-            "The following component has no Silo part number and will be excluded from the BOM until "
-            "registered:",
-        )
-        many = translate(
-            "Silo",
-            "The following components have no Silo part number and will be excluded from the BOM until "
-            "registered:",
-        )
-        return counted(left, one, many)
+        button.setText(_button_text(look))
+        button.setEnabled(look.can_register or look.can_keep or look.can_undeclare)
 
     def _enable(self) -> None:
         chosen = any(row.checked and (row.can_register or row.can_keep) for row in self._rows)
@@ -292,7 +300,9 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
     def _changed(self, item: Any) -> None:
         if self._filling:
             return
-        row, column = self._rows[item.row()], item.column()
+        if item.row() not in self._row_at:
+            return
+        row, column = self._rows[self._row_at[item.row()]], item.column()
         chosen = item.data(QtCore.Qt.ItemDataRole.UserRole)
         if column == COMPONENT:
             row.checked = item.checkState() == QtCore.Qt.CheckState.Checked
@@ -311,6 +321,12 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
     def _need_number(self, category: str) -> None:
         if category not in self._offer.numbers:
             self._wishes.number(category)
+
+    def _press(self, row: EditedRow) -> None:
+        if row.can_undeclare:
+            self._wishes.undeclare(row)
+        else:
+            self._carry_out([row])
 
     def _register_checked(self) -> None:
         self._carry_out([row for row in self._rows if row.checked])
@@ -332,10 +348,18 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self.tell("")
         for row in ready:
             row.running, row.result = True, None
-            if row.number != NEW and row.order().existing is None:
+            if row.number not in (NEW, APART) and row.order().existing is None:
                 row.number = NEW
         self._refresh()
         self._wishes.register([row.order() for row in ready])
+
+
+def _button_text(look: _Look) -> str:
+    if look.can_keep:
+        return translate("Silo", "Keep")
+    if look.can_undeclare:
+        return translate("Silo", "Undeclare")
+    return translate("Silo", "Declare") if look.declares else translate("Silo", "Register")
 
 
 def _flags(row: _Look, column: int) -> Any:

@@ -82,6 +82,7 @@ class RegisterFlow:
             same=self._same,
             number=lambda category: self._number(taken.path, category),
             ask_again=lambda on: self._preferences.set("AskRegister", on),
+            undeclare=lambda row: self._undeclare(taken.path, row),
             closed=lambda: self._open.pop(taken.path, None),
         )
         asks = self._preferences.flag("AskRegister")
@@ -99,6 +100,18 @@ class RegisterFlow:
             done=lambda number: self._with_dialog(path, lambda d: d.set_number(category, number)),
             failed=lambda _error: None,
         )
+
+    def _undeclare(self, path: str, row: EditedRow) -> None:
+        """Take the identity back from what is modelled in the assembly's file; its item stays."""
+        clean = self._desk.unedited()
+        try:
+            self._desk.remove_identity(row.candidate)
+        except SiloError as error:
+            message = str(error)
+            self._with_dialog(path, lambda dialog: dialog.tell(message))
+            return
+        self._with_dialog(path, lambda dialog: dialog.undeclared(row))
+        self._save_parents(clean, lambda: self._send(path, [row.candidate]))
 
     def _same(self, rows: Sequence[EditedRow]) -> None:
         """The person leaves these as they are: files that are one part on purpose."""

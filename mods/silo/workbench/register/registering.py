@@ -14,6 +14,7 @@ from enum import StrEnum
 from typing import Any
 
 from silo.api.revisions import other_name
+from silo.bom.declare import Modelled
 from silo.bom.errors import NotFoundError, SiloError
 from silo.bom.findings import FindingCode
 from silo.bom.identity import walk_entries
@@ -92,6 +93,8 @@ class Candidate:
         part number whose identity the file carries although another file has it too ("copied identity").
     twins
         labels of other rows whose files have the very same content.
+    article
+        what is modelled in the assembly's own file: counted once it has an identity.
     """
 
     proposal: Proposal
@@ -100,6 +103,12 @@ class Candidate:
     twins: tuple[str, ...] = ()
     same_as: str = ""
     sha256: str = field(default="", repr=False)
+    article: Modelled | None = None
+
+    @property
+    def declared(self) -> bool:
+        """True for what is modelled in the assembly's file and a component already."""
+        return self.article is not None and self.article.declared
 
     @property
     def entry(self) -> BomEntry:
@@ -113,7 +122,7 @@ class Candidate:
     def wanted(self) -> bool:
         """Checked to begin with? Not where a person has to look first."""
         fine = self.state.usable and self.state is not State.ELSEWHERE
-        if self.proposal.is_guess:
+        if self.proposal.is_guess or self.article is not None:
             return False
         return fine and not self.same_as and not any(s.same_file for s in self.similar)
 
@@ -160,6 +169,7 @@ def offer(
         one made is no look-alike of the component, it is its own.
     """
     from silo.bom_sync import resolve
+    from silo.workbench.register.modelled import modelled_candidates
 
     resolved = resolve(extraction, api)
     schema = api.find_schema(schema)
@@ -176,6 +186,8 @@ def offer(
         _candidate(p, seen, same_as=numbers[(p.entry.silo_uuid or "").lower()])
         for p in propose_all(copies, tree, categories)
     ]
+    candidates.sort(key=lambda candidate: candidate.entry.is_standard)
+    candidates += modelled_candidates(extraction, seen, categories)
     control.check()
     looked = _with_look_alikes(candidates, api, control, begun or {})
     return Offer(_with_twins(looked), categories, _next_numbers(looked, api, schema))
@@ -217,7 +229,8 @@ def _with_look_alikes(
     first, rest = candidates[:MOST_LOOKED_UP], candidates[MOST_LOOKED_UP:]
 
     def one(candidate: Candidate) -> Candidate:
-        if candidate.entry.is_standard:  # an item of this designation is joined, whoever made it
+        # An item of a standard part's designation is joined, whoever made it.
+        if candidate.entry.is_standard or candidate.declared:
             return candidate
         if control.cancelled.is_set():
             return candidate
@@ -293,6 +306,8 @@ class Order:
 
     existing
         item to join instead of making a new one.
+    apart
+        of equal copies that are modelled in the file, each gets an item of its own.
     """
 
     candidate: Candidate
@@ -300,6 +315,7 @@ class Order:
     item_type: str
     category: str
     existing: Similar | None = None
+    apart: bool = False
 
     @property
     def proposal(self) -> Proposal:
@@ -344,8 +360,12 @@ def carry_out(
 def _carry_out(
     order: Order, api: RegistrationApi, journal: Journal, write: Write, schema: str
 ) -> Registration:
+    from silo.workbench.register.modelled import declare_article
+
     if order.candidate.entry.is_standard:
         return register_standard(order.proposal, api, schema=schema)
+    if order.candidate.article is not None and order.existing is None:
+        return declare_article(order, order.candidate.article, api, journal, write, schema)
     if order.existing is not None:
         try:
             write(order.candidate, order.existing.item_id)
@@ -361,11 +381,11 @@ def _carry_out(
         lambda _entry, identity: write(order.candidate, identity),
         schema=schema,
         properties={"file_sha256": order.candidate.sha256} if order.candidate.sha256 else None,
-        ask=lambda proposal, found: _seen_before(order, proposal, found),
+        ask=lambda proposal, found: seen_before(order, proposal, found),
     )
 
 
-def _seen_before(order: Order, proposal: Proposal, found: Sequence[Mapping[str, Any]]) -> None:
+def seen_before(order: Order, proposal: Proposal, found: Sequence[Mapping[str, Any]]) -> None:
     """None (make a new item) where the person saw these items in the dialog and took none of them."""
     shown = {similar.item_id for similar in order.candidate.similar}
     if not all(str(item["id"]) in shown for item in found):

@@ -12,13 +12,24 @@ from silo.bom.categories import proposed_category
 from silo.registration import Registration
 from silo.workbench.pane.activity import Tone
 from silo.workbench.register.registering import Candidate, Order, Similar, State, state_words
-from silo.workbench.words import plain, translate
+from silo.workbench.words import counted, plain, translate
 
 TYPES = ("part", "assembly", "consumable", "tool")
 
 NEW = "new"
 SAME = "same"
 ASK = "ask"
+APART = "apart"
+
+
+def section_words() -> dict[str, str]:
+    """The sections of the dialog for people."""
+    return {
+        "": translate("Silo", "Components"),
+        "standard": translate("Silo", "Standard parts"),
+        "modelled": translate("Silo", "Modelled in this file, not counted"),
+        "declared": translate("Silo", "Modelled in this file, and counted"),
+    }
 
 
 def type_words() -> dict[str, str]:
@@ -65,6 +76,13 @@ class EditedRow:
         )
 
     @property
+    def section(self) -> str:
+        """The section that the row stands in, a key of :func:`section_words`."""
+        if self.candidate.article is not None:
+            return "declared" if self.candidate.declared else "modelled"
+        return "standard" if self.candidate.entry.is_standard else ""
+
+    @property
     def finished(self) -> bool:
         """True where it has its number."""
         return self.result is not None and self.result.error is None
@@ -72,7 +90,13 @@ class EditedRow:
     @property
     def editable(self) -> bool:
         """True while something can still be chosen."""
-        return self.candidate.state.usable and not self.finished and not self.running
+        usable = self.candidate.state.usable and not self.candidate.declared
+        return usable and not self.finished and not self.running
+
+    @property
+    def can_undeclare(self) -> bool:
+        """True where it is modelled in the file and its identity can be taken back."""
+        return self.candidate.declared and self.candidate.state.usable and not self.running
 
     @property
     def can_choose(self) -> bool:
@@ -97,7 +121,8 @@ class EditedRow:
     def order(self) -> Order:
         """The row as an order for the worker."""
         existing = next((s for s in self.candidate.similar if s.part_number == self.number), None)
-        return Order(self.candidate, self.name.strip(), self.item_type, self.category, existing)
+        apart = self.number == APART
+        return Order(self.candidate, self.name.strip(), self.item_type, self.category, existing, apart)
 
     @property
     def guesses(self) -> bool:
@@ -116,6 +141,10 @@ class EditedRow:
         entry = self.candidate.entry
         if entry.standard:
             return plain(translate("Silo", "Standard part: {name}").replace("{name}", entry.standard), 80)
+        if (article := self.candidate.article) is not None:
+            text = plain(entry.label, 60)
+            copies = translate("Silo", "{name} ({n} copies)").replace("{n}", str(len(article.objects)))
+            return copies.replace("{name}", text) if len(article.objects) > 1 else text
         file = os.path.basename(entry.doc_path)
         return plain(f"{file} · {entry.label}" if self.candidate.shares_file else file, 80)
 
@@ -128,6 +157,10 @@ class EditedRow:
             return text.replace("{number}", self.candidate.same_as)
         if self.number == ASK:
             return translate("Silo", "same or new part?")
+        if self.number == APART:
+            return translate("Silo", "one for each")
+        if self.candidate.declared:
+            return ""
         if self.number != NEW:
             return self.number
         if not self.candidate.state.usable:
@@ -148,6 +181,8 @@ class EditedRow:
             return found
         new = translate("Silo", "new part: a new number")
         found[NEW] = new if self.candidate.same_as else translate("Silo", "a new number")
+        if self.candidate.article is not None and len(self.candidate.article.objects) > 1:
+            found[APART] = translate("Silo", "different parts: a number for each copy")
         for similar in self.candidate.similar:
             found[similar.part_number] = f"{similar.part_number} {plain(similar.name, 60)}"
         return found
@@ -163,10 +198,28 @@ class EditedRow:
             return translate("Silo", "registering…"), Tone.QUIET
         if not self.candidate.state.usable and not self.candidate.same_as:
             return state_words()[self.candidate.state], Tone.WARNING
-        told = [*self._suspicions(), state_words()[self.candidate.state]]
+        told = [*self._suspicions(), *self._about_the_article(), state_words()[self.candidate.state]]
         text = "; ".join(filter(None, told))
         doubtful = bool(self._suspicions()) or self.candidate.state is State.ELSEWHERE
         return text, Tone.WARNING if doubtful else Tone.QUIET
+
+    def _about_the_article(self) -> list[str]:
+        article = self.candidate.article
+        if article is None:
+            return []
+        if article.declared:
+            text = translate("Silo", "counts {n} times")
+        else:
+            text = translate("Silo", "would count {n} times; check it if it is a part")
+        told = [text.replace("{n}", str(article.entry.quantity))]
+        if article.source:
+            source = translate("Silo", "imported from {file}").replace(
+                "{file}", os.path.basename(article.source)
+            )
+            told.append(source)
+        if article.alike == "label":
+            told.append(translate("Silo", "equal by their labels only"))
+        return told
 
     def _suspicions(self) -> list[str]:
         told = []
@@ -233,3 +286,40 @@ def number_texts(rows: list[EditedRow], numbers: Mapping[str, str]) -> list[str]
         if row.number == NEW and row.checked and not row.finished:
             taken[row.category] = taken.get(row.category, 0) + 1
     return texts
+
+
+def heading(rows: Sequence[EditedRow], title: str, more: int) -> str:
+    """What the dialog says above its rows; ``more`` of them do not fit in."""
+    components = [row for row in rows if row.candidate.article is None]
+    if not components:
+        text = translate("Silo", "All components of {name} have their Silo part number.")
+        return text.replace("{name}", plain(title, 80))
+    left = [row for row in components if not row.finished]
+    if not left:
+        return translate("Silo", "All of these have their part number now.")
+    copied = sum(1 for row in left if row.candidate.same_as)
+    told = [_unregistered(len(left) - copied)] if len(left) > copied else []
+    if copied:
+        told.append(
+            translate(
+                "Silo",
+                "Where files carry one identity, choose in the column Part number: the same part, or a "
+                "new one?",
+            )
+        )
+    if more > 0:
+        told.append(translate("Silo", "({n} more after these)").replace("{n}", str(more)))
+    return "\n".join(told)
+
+
+def _unregistered(left: int) -> str:
+    one = translate(
+        "Silo",
+        "The following component has no Silo part number and will be excluded from the BOM until registered:",
+    )
+    many = translate(
+        "Silo",
+        "The following components have no Silo part number and will be excluded from the BOM until "
+        "registered:",
+    )
+    return counted(left, one, many)

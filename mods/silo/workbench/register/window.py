@@ -22,6 +22,8 @@ class Wishes:
         the person says that these copied identities are one part.
     number
         tell the next number of this category.
+    undeclare
+        this is no component any more; what is modelled in the assembly's own file.
     closed
         the dialog is gone.
     """
@@ -30,6 +32,7 @@ class Wishes:
     same: Callable[[Sequence[EditedRow]], None]
     number: Callable[[str], None]
     ask_again: Callable[[bool], None]
+    undeclare: Callable[[EditedRow], None]
     closed: Callable[[], object]
 
 
@@ -43,6 +46,8 @@ class Window(Protocol):
     def set_number(self, category: str, number: str, /) -> None: ...
 
     def registered(self, order: Order, result: Registration, /) -> None: ...
+
+    def undeclared(self, row: EditedRow, /) -> None: ...
 
     def stopped(self) -> None: ...
 
@@ -61,6 +66,8 @@ class RegisterDesk(Desk, Protocol):
     def look_at(self, paths: Iterable[str], /) -> dict[str, Seen]: ...
 
     def write_identity(self, candidate: Candidate, identity: str, /) -> None: ...
+
+    def remove_identity(self, candidate: Candidate, /) -> None: ...
 
     def unedited(self) -> list[Any]:
         """The documents without unsaved edits, each after those that it links to."""

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Register Parts' sections, a moved part and the comparison with the view, in FreeCAD's window."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from freecad_cases.machines import WANTED
+from gui_cases.window import window
+
+pytestmark = [pytest.mark.freecad, pytest.mark.slow]
+
+
+@pytest.fixture(name="said", scope="module", params=WANTED)
+def _said(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[dict[str, Any]]:
+    with window(request.param, tmp_path_factory.mktemp("counting").resolve()) as freecad:
+        freecad.prepare()
+        yield freecad.run("counting.py")
+
+
+def test_what_is_modelled_in_the_file_is_declared_and_taken_back(said: dict[str, Any]) -> None:
+    """Sections with headings; no check mark; equal copies in one press; nothing is left behind."""
+    assert said["offered"] == [
+        *("Components", "Bolt.FCStd", "Top.FCStd", "Standard parts", "Standard part: ISO 4762 M4×16"),
+        *("Modelled in this file, not counted", "Motor (2 copies)", "Jig"),
+    ]
+    assert said["checked"] == ["Bolt.FCStd", "Top.FCStd", "Standard part: ISO 4762 M4×16"]
+    assert said["number"]
+    assert len(set(said["ids"])) == 1
+    assert said["again"] == [
+        *(
+            "Modelled in this file, not counted",
+            "Jig",
+            "Modelled in this file, and counted",
+            "Motor (2 copies)",
+        ),
+    ]
+    assert not said["left"]
+    assert not [key for key in said["meta"] if "Motor" in key]
+
+
+def test_a_moved_part_is_found_and_its_live_links_are_mended(said: dict[str, Any]) -> None:
+    assert said["can_mend"]
+    assert said["mended"] == "moved/Bolt.FCStd"
+
+
+def test_what_no_line_explains_is_selected_in_the_view(said: dict[str, Any]) -> None:
+    assert (said["agrees"].endswith("in the file itself."), said["selected"]) == (True, [])
+    assert "They differ" in said["differs"]
+    assert said["selection"] == ["First"]
