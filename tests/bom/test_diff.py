@@ -199,3 +199,30 @@ def test_one_unreferenced_item_is_one_item() -> None:
 def test_nothing_to_decide_is_not_told() -> None:
     """Additions and changes need nobody."""
     assert diff_findings(diff_bom(local(P=4, Q=1), [line("P", 1), line("M", 1, "manual")])) == ()
+
+
+def test_while_a_component_is_missing_no_line_of_unknown_origin_reads_as_removed() -> None:
+    """A server that does not keep what lines stand for; the missing component may be any of them."""
+    lines = [
+        {"child_part_number": "P-1", "quantity": 2},
+        {"child_part_number": "P-2", "quantity": 1},
+        {"child_part_number": "P-3", "quantity": 9, "source": "manual"},
+    ]
+    local = [{"child_part_number": "P-1", "quantity": 3}]
+    diff = diff_bom(local, lines, missing=[("parts/Lid.FCStd", "Body")])
+    assert [change.part_number for change in diff.kept] == ["P-2"]
+    assert diff.removed == ()
+    assert [change.part_number for change in diff.quantity_changed] == ["P-1"]
+    assert [change.part_number for change in diff_bom(local, lines).removed] == ["P-2"]
+
+
+def test_a_missing_component_whose_line_is_known_keeps_that_one_only() -> None:
+    """The other lines can be judged as ever."""
+    lid = {"file": "parts/Lid.FCStd", "object": "Body"}
+    lines = [
+        {"child_part_number": "P-1", "quantity": 2, "components": [lid]},
+        {"child_part_number": "P-2", "quantity": 1},
+    ]
+    diff = diff_bom([], lines, missing=[(lid["file"], lid["object"])])
+    assert [change.part_number for change in diff.kept] == ["P-1"]
+    assert [change.part_number for change in diff.removed] == ["P-2"]

@@ -16,7 +16,7 @@ The rules of this module:
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -113,7 +113,8 @@ def diff_bom(
         components whose file or object is missing now, as the last sync named them.
     """
     remote_entries = list(remote_entries)
-    gone = lines_of_missing(remote_entries, missing)
+    local_entries = list(local_entries)
+    gone = lines_of_missing(remote_entries, missing, local_quantities(local_entries))
     kept = [line for line in remote_entries if line["child_part_number"] in gone]
     remote_entries = [line for line in remote_entries if line["child_part_number"] not in gone]
     local = {pn: q for pn, q in local_quantities(local_entries).items() if pn not in gone}
@@ -133,16 +134,33 @@ def diff_bom(
     return replace(diff, kept=tuple(BomChange(number, quantity) for number, quantity in lines.items()))
 
 
-def lines_of_missing(lines: Iterable[Mapping[str, Any]], missing: Iterable[Component]) -> frozenset[str]:
-    """The part numbers of the lines that stood for one of the missing components in the last sync."""
+def lines_of_missing(
+    lines: Iterable[Mapping[str, Any]], missing: Iterable[Component], local: Container[str] = ()
+) -> frozenset[str]:
+    """The part numbers of the lines that stand for missing components.
+
+    Those that stood for one of them in the last sync. Where a missing component stood for no line (a server
+    that does not keep that, lines of an old version), any line that the assembly does not have now may be its
+    own, so all those stay whose components nobody knows.
+
+    local
+        the part numbers that the assembly has now.
+    """
     gone = {(file, name) for file, name in missing}
     if not gone:
         return frozenset()
-    return frozenset(
-        line["child_part_number"]
-        for line in lines
-        if any((one.get("file"), one.get("object")) in gone for one in line.get("components") or ())
-    )
+    known: dict[str, set[tuple[Any, Any]]] = {}
+    owned = set()
+    for line in lines:
+        number = line["child_part_number"]
+        parts = {(one.get("file"), one.get("object")) for one in line.get("components") or ()}
+        known.setdefault(number, set()).update(parts)
+        if not is_manual(line):
+            owned.add(number)
+    found = {number for number, components in known.items() if components & gone}
+    if gone.difference(*known.values()):
+        found |= {number for number in owned if not known[number] and number not in local}
+    return frozenset(found)
 
 
 def _compare(

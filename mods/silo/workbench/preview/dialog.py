@@ -96,7 +96,9 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         self.changes_only.toggled.connect(lambda _on: self._fill())
         self.below = QtWidgets.QCheckBox("")
         self.missing = QtWidgets.QCheckBox(
-            translate("Silo", "Sync although links are broken (what they stood for becomes unreferenced)")
+            translate(
+                "Silo", "Sync although links are broken (the lines that they stand for stay as they are)"
+            )
         )
         self.missing.toggled.connect(lambda _on: self._enable())
         for box in (self.changes_only, self.below, self.missing):

@@ -208,10 +208,11 @@ class EditedRow:
         if article is None:
             return []
         if article.declared:
-            text = translate("Silo", "counts {n} times")
+            one, many = translate("Silo", "counts once"), translate("Silo", "counts {n} times")
         else:
-            text = translate("Silo", "would count {n} times; check it if it is a part")
-        told = [text.replace("{n}", str(article.entry.quantity))]
+            one = translate("Silo", "would count once; check it if it is a part")
+            many = translate("Silo", "would count {n} times; check it if it is a part")
+        told = [counted(article.entry.quantity, one, many)]
         if article.source:
             source = translate("Silo", "imported from {file}").replace(
                 "{file}", os.path.basename(article.source)
