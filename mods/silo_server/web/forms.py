@@ -90,7 +90,7 @@ class Kept:
         """(field, text) of what a person typed or chose, in words."""
         told = [(name, value) for name, value in self.fields if value and not _MACHINE.fullmatch(name)]
         lines = [value for name, value in told if name == "chosen"]
-        shown = [(name.replace("_", " ").capitalize(), value) for name, value in told if name != "chosen"]
+        shown = [(_label(name), value) for name, value in told if name != "chosen"]
         return shown + ([("Chosen lines", str(len(lines)))] if lines else [])
 
     @property
@@ -100,6 +100,12 @@ class Kept:
         if len(text) > MOST_KEPT:
             return ""
         return base64.b64encode(zlib.compress(text.encode("utf-8", "surrogatepass"))).decode("ascii")
+
+
+def _label(name: str) -> str:
+    return {"child": "Part number", "why": "Reason for the change"}.get(
+        name, name.replace("_", " ").capitalize()
+    )
 
 
 def kept_form(path: str, form: FormData) -> Kept | None:

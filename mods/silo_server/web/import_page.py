@@ -19,6 +19,7 @@ from starlette.datastructures import FormData, UploadFile
 from starlette.responses import Response
 
 from silo.bom.errors import RejectedError, SiloError, VersionConflictError
+from silo.bom.headers import Role
 from silo.bom.numbers import Mark
 from silo_server.errors import TooLargeError
 from silo_server.routes.context import Server, ServerDep
@@ -152,6 +153,9 @@ def _show(
     )
 
 
+_LABELS = {Role.TYPE: "Type", Role.REVISION: "Revision"}
+
+
 def _reading(file: Upload, layout: Layout | None) -> dict[str, Any]:
     """How the file is read, for the form in which a person changes that."""
     known = layout or csv_file.guess_of(file.data) or Layout(csv_file.likely_delimiter(file.data), 0)
@@ -164,7 +168,7 @@ def _reading(file: Upload, layout: Layout | None) -> dict[str, Any]:
         "chosen": layout is not None,
         "lines": [" | ".join(cells)[:60] for cells in lines],
         "delimiters": csv_file.DELIMITERS,
-        "roles": [(role, role.replace("_", " ").capitalize()) for role in csv_file.ROLES],
+        "roles": [(role, _LABELS.get(role, role.replace("_", " ").capitalize())) for role in csv_file.ROLES],
         "columns": [_name_of(index, header, samples) for index in range(width)],
     }
 
