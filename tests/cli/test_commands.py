@@ -296,6 +296,23 @@ def test_resolve_shows_what_has_no_number_on_every_level(run: Any, silo: Any, ge
     assert all(row["part_number"] and row["name"] for row in flat)
 
 
+def test_relink_leaves_alone_what_freecad_has_open(
+    run: Any, gearbox: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Saving there would undo it; the message says how else."""
+    monkeypatch.setenv("FREECAD_USER_TEMP", str(tmp_path / "cache"))
+    (gearbox.parent / "hardware").mkdir()
+    (gearbox.parent / "parts" / "Gear.FCStd").rename(gearbox.parent / "hardware" / "Gear.FCStd")
+    order = ("relink", gearbox, "--from", "parts/Gear.FCStd", "--to", "hardware/Gear.FCStd")
+    (holder,) = run(*order, "--dry-run", "--json").json()["files"]
+    with opened(tmp_path / "cache", gearbox.parent / holder["file"]):
+        refused = run(*order)
+        assert refused.code == 2
+        assert "open in FreeCAD" in refused.err
+        assert "--even-if-open" in refused.err
+        assert run(*order, "--even-if-open").code == 0
+
+
 def test_a_moved_file_is_suggested_and_relinked(run: Any, gearbox: Path) -> None:
     """The finding names the file and the command; the command mends every file of the tree."""
     (gearbox.parent / "hardware").mkdir()

@@ -13,7 +13,7 @@ from fcstd_writer import Doc, Raw, locals_
 from silo.bom.errors import DocumentError, InputError
 from silo.bom.links import extract
 from silo.fcstd import open_document
-from silo.fcstd.relink import relink
+from silo.fcstd.relink import Relinked, read_back, relink
 
 
 @pytest.fixture
@@ -106,3 +106,32 @@ def test_a_file_does_not_link_to_itself(top: Path, tmp_path: Path) -> None:
 def test_files_without_such_links_are_not_touched(top: Path, tmp_path: Path) -> None:
     """They are not named either."""
     assert relink([tmp_path / "other.FCStd"], tmp_path / "old/part.FCStd", tmp_path / "new/part.FCStd") == []
+
+
+@pytest.mark.parametrize(("left", "before"), [(1, 0), (0, 1)])
+def test_a_copy_that_does_not_hold_the_links_is_never_written(tmp_path: Path, left: int, before: int) -> None:
+    """Links that still lead to the old file, or fewer new ones than were asked for."""
+    old, new = str(tmp_path / "old.FCStd"), str(tmp_path / "new.FCStd")
+    doc = Doc()
+    for number in range(2):
+        doc.link(f"L{number}", "old.FCStd" if number < left else "new.FCStd", "Box")
+    copy = str(doc.save(tmp_path / "copy.FCStd"))
+    mended = Relinked(str(tmp_path / "top.FCStd"), 2, ("Box",))
+    with pytest.raises(DocumentError, match="nothing was written"):
+        read_back(mended, copy, old, new, before)
+    if not left:
+        read_back(mended, copy, old, new, 0)
+
+
+def test_a_file_that_may_not_be_written_now_keeps_all_as_they_are(top: Path, tmp_path: Path) -> None:
+    """As one that FreeCAD has open; a dry run may look at it."""
+    before = top.read_bytes()
+
+    def refuse(path: str) -> None:
+        raise DocumentError(path, "is open")
+
+    order = ([top], tmp_path / "old/part.FCStd", tmp_path / "new/part.FCStd")
+    with pytest.raises(DocumentError, match="is open"):
+        relink(*order, check=refuse)
+    assert top.read_bytes() == before
+    assert relink(*order, dry_run=True, check=refuse)

@@ -6,11 +6,12 @@ from __future__ import annotations
 import argparse
 import os
 
-from silo.bom.errors import InputError, SiloError
+from silo.bom.errors import DocumentError, InputError, SiloError
 from silo.bom.identity import walk_entries
 from silo.bom.report import relative
 from silo.cli import common
 from silo.cli.common import Commands
+from silo.open_in_freecad import open_in_any
 
 
 def register(commands: Commands) -> None:
@@ -30,6 +31,11 @@ def register(commands: Commands) -> None:
         help="the file that the links record; relative to TOP's folder, as `silo-mod bom` prints it",
     )
     parser.add_argument("--to", dest="new", metavar="NEW", required=True, help="the file that is meant")
+    parser.add_argument(
+        "--even-if-open",
+        action="store_true",
+        help="also files that a running FreeCAD has open; whoever saves them there undoes this",
+    )
     parser.add_argument("--dry-run", action="store_true", help="show what would change and write nothing")
     common.add_json_option(parser)
     parser.set_defaults(run=run)
@@ -44,7 +50,13 @@ def run(args: argparse.Namespace) -> int:
     new = _either(folder, args.new)
     done: list[Relinked] = []
     for old in dict.fromkeys((os.path.join(folder, args.old), os.path.abspath(args.old))):
-        done = done or relink(paths, os.path.normpath(old), new, dry_run=args.dry_run)
+        done = done or relink(
+            paths,
+            os.path.normpath(old),
+            new,
+            dry_run=args.dry_run,
+            check=_any if args.even_if_open else _closed,
+        )
     if not done:
         raise InputError(f"no link of {args.top} and its sub-assemblies records {args.old}; nothing to mend")
     if args.json:
@@ -62,9 +74,20 @@ def run(args: argparse.Namespace) -> int:
         verb = "would lead" if args.dry_run else "now leads" if one.links == 1 else "now lead"
         text = f"✓ {relative(one.path, folder)}: {links} {verb} to {relative(new, folder)}"
         out.print(show.plain(text), markup=False)
-    if not args.dry_run:
-        out.print("Close and reopen these files where FreeCAD has them open.", style="dim")
     return 0
+
+
+def _any(_path: str) -> None:
+    return
+
+
+def _closed(path: str) -> None:
+    if open_in_any().has_file(path):
+        raise DocumentError(
+            path,
+            "it is open in FreeCAD, and saving it there would undo the change. Close it there, or mend the "
+            "links from there (BOM in Silo, Mend links); --even-if-open writes it all the same",
+        )
 
 
 def _documents(top: str) -> list[str]:

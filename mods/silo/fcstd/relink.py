@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -42,12 +42,20 @@ class _Record(NamedTuple):
 
 
 def relink(
-    paths: Iterable[Path | str], old: Path | str, new: Path | str, *, dry_run: bool = False
+    paths: Iterable[Path | str],
+    old: Path | str,
+    new: Path | str,
+    *,
+    dry_run: bool = False,
+    check: Callable[[str], None] = lambda _path: None,
 ) -> list[Relinked]:
     """Mend the links of these files that record ``old``, to lead to ``new``.
 
     Returns the files that hold such links. Raises InputError where ``new`` does not hold the objects that
     they want, DocumentError where a file cannot be read or written; both before anything is changed.
+
+    check
+        raises DocumentError for a file that must not be written now.
     """
     old, target = os.path.abspath(old), os.path.realpath(new)
     limits = Limits()
@@ -55,6 +63,8 @@ def relink(
     _check_target(found, old, target, limits)
     for one in found:
         check_writable(one.path)
+        if not dry_run:
+            check(one.path)
     if not dry_run:
         for one in found:
             _mend(one, old, target, limits)
@@ -123,14 +133,21 @@ def _mend(one: Relinked, old: str, target: str, limits: Limits) -> None:
         _, text = document_xml(container, limits)
     before = sum(1 for _ in _records(text, one.path, target, limits))
 
-    def check(copy: str) -> None:
-        with Library(limits=limits) as library:
-            library.open(copy)
-        with ContainerFile(copy, limits) as container:
-            _, text = document_xml(container, limits)
-        left = sum(1 for _ in _records(text, copy, old, limits))
-        now = sum(1 for _ in _records(text, copy, target, limits))
-        if left or now != before + one.links:
-            raise DocumentError(one.path, "the mended copy does not hold the new links; nothing was written")
+    replace_file(one.path, state, content, lambda copy: read_back(one, copy, old, target, before))
 
-    replace_file(one.path, state, content, check)
+
+def read_back(one: Relinked, copy: str, old: str, target: str, before: int) -> None:
+    """Raise DocumentError unless the mended copy can be read and holds the links as they are to be.
+
+    before
+        how many links led to the target already.
+    """
+    limits = Limits()
+    with Library(limits=limits) as library:
+        library.open(copy)
+    with ContainerFile(copy, limits) as container:
+        _, text = document_xml(container, limits)
+    left = sum(1 for _ in _records(text, copy, old, limits))
+    now = sum(1 for _ in _records(text, copy, target, limits))
+    if left or now != before + one.links:
+        raise DocumentError(one.path, "the mended copy does not hold the new links; nothing was written")
