@@ -69,7 +69,7 @@ def test_a_copy_is_complete_and_is_renewed(tmp_path: Path) -> None:
     (place(tmp_path).mod / "left over").touch()
     install_folder(place(tmp_path), copy=True)
     inside = {path.name for path in place(tmp_path).mod.iterdir()}
-    assert inside == {"Init.py", "InitGui.py", "package.xml", "LICENSE", "README.md", "mods"}
+    assert inside == {"Init.py", "InitGui.py", "package.xml", "LICENSE", "README.md", "mods", "docs"}
     assert (place(tmp_path).mod / "mods" / "silo" / "workbench" / "freecad" / "host.py").is_file()
 
 

@@ -120,6 +120,18 @@ def _has_pip(python: str) -> bool:
         return False
 
 
+def _any_python() -> str:
+    """A Python with pip. Inside FreeCAD, ``sys.executable`` is FreeCAD."""
+    found = (sys.executable, shutil.which("python3"), shutil.which("python"), shutil.which("py"))
+    for python in found:
+        if python and "freecad" not in os.path.basename(python).lower() and _has_pip(python):
+            return python
+    raise ConfigError(
+        "no Python with pip was found on this computer. Install pip (on Debian and Ubuntu: apt install "
+        "python3-pip), or Python from python.org, then try again"
+    )
+
+
 def install_folder(place: Place, source: Path = CHECKOUT, *, copy: bool = False) -> str:
     """Link (or copy) the add-on into ``Mod``; returns what was done. A stranger's folder is left alone."""
     if not (source / "package.xml").is_file():
@@ -143,6 +155,8 @@ def install_folder(place: Place, source: Path = CHECKOUT, *, copy: bool = False)
         shutil.copytree(
             source / "mods" / "silo", target / "mods" / "silo", ignore=shutil.ignore_patterns("__pycache__")
         )
+        if (source / "docs").is_dir():
+            shutil.copytree(source / "docs", target / "docs", ignore=shutil.ignore_patterns("decisions"))
         return f"copied to {target}"
     try:
         target.symlink_to(source, target_is_directory=True)
@@ -161,7 +175,7 @@ def install_packages(place: Place) -> str:
     if own is not None:  # FreeCAD's own knows which packages fit it, and which processor it is made for
         command = [own, "-m", "pip", *install]
     else:
-        command = [sys.executable, "-m", "pip", *install]
+        command = [_any_python(), "-m", "pip", *install]
         command += ["--python-version", version, "--only-binary=:all:"]
     run = _run(command, _PIP_SECONDS)
     if run.returncode:

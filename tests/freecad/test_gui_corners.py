@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import sys
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -68,7 +71,7 @@ def test_a_copied_identity_asks(corners: dict[str, Any]) -> None:
     """The box tells it and offers the decision."""
     box = corners["copied_box"]
     assert "2 files carry the same Silo identity" in box
-    assert "[Same or new part…]" in box
+    assert "[Same part] [New part…]" in box
     rows = {component: (number, checked) for component, number, checked in corners["copied_rows"]}
     assert rows == {"Bracket.FCStd": ("ask", False), "Bracket2.FCStd": ("ask", False)}
 
@@ -94,21 +97,111 @@ def test_a_forks_commit_is_hooked_and_not_replaced(version: str, tmp_path: Path)
 
 
 @pytest.mark.parametrize("version", WANTED)
-def test_missing_packages_are_one_plain_sentence(version: str, tmp_path: Path) -> None:
-    """FreeCAD starts as ever, no traceback."""
+def test_missing_packages_are_installed_by_one_button(version: str, tmp_path: Path) -> None:
+    """FreeCAD starts as ever, and the workbench is there; the first time pip finds nothing."""
     with window(version, tmp_path.resolve()) as freecad:
         freecad.prepare(dependencies=False)
         freecad.packages.mkdir(parents=True)
-        said = freecad.run("bare.py")
-    assert said["commands"] == []
+        wheels = tmp_path / "wheels"
+        wheels.mkdir()
+        for name, version_ in (("requests", "2.99"), ("sseclient_py", "1.99"), ("pydantic", "2.99")):
+            wheel(wheels, name, version_)
+        offline = {"PIP_NO_INDEX": "1", "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
+        failed = freecad.run("bare.py", env=offline)
+        said = freecad.run("bare.py", env={**offline, "PIP_FIND_LINKS": str(wheels)})
     (line,) = said["report"]
-    assert line.endswith(
+    by_hand = (
         "Silo needs the Python packages requests, pydantic, sseclient-py. Install them with silo-mod "
         f"install-addon, or with: python{freecad.freecad.python} -m pip install --target "
         f'"{freecad.packages}" requests pydantic sseclient-py – then start FreeCAD again.'
     )
+    assert line.endswith(by_hand)
     # And that is where this FreeCAD looks for them.
     assert said["on_path"]
+    assert said["buttons"] == ["Install What Silo Needs…"]
+    assert "requests, pydantic, sseclient-py" in said["before"][0]
+    assert said["during"] == [True, False]
+    assert "could not be installed: pip could not install" in failed["after"][0]
+    assert failed["after"][0].endswith(by_hand)
+    assert failed["button"]
+    assert said["after"] == [f"The packages are in {freecad.packages}. Start FreeCAD again to use Silo."]
+    assert not said["button"]
+    assert (freecad.packages / "requests" / "__init__.py").is_file()
+
+
+def wheel(folder: Path, name: str, version: str) -> None:
+    """An empty package as pip takes it."""
+    info = f"{name}-{version}.dist-info"
+    files = {
+        f"{name}/__init__.py": "",
+        f"{info}/METADATA": f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n",
+        f"{info}/WHEEL": "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n",
+    }
+    record = "".join(f"{path},,\n" for path in (*files, f"{info}/RECORD"))
+    with zipfile.ZipFile(folder / f"{name}-{version}-py3-none-any.whl", "w") as packed:
+        for path, text in {**files, f"{info}/RECORD": record}.items():
+            packed.writestr(path, text)
+
+
+BESIDE = """
+import FreeCADGui as Gui
+
+
+class Other:
+    def __init__(self, text):
+        self.text = text
+
+    def GetResources(self):
+        return {"MenuText": self.text}
+
+    def Activated(self):
+        pass
+
+
+class SiloWorkbench(Gui.Workbench):
+    MenuText = "Their Silo"
+
+    def Initialize(self):
+        self.appendMenu("Their Silo", ["Silo_BOM", "Silo_Settings", "Silo_Commit"])
+
+    def GetClassName(self):
+        return "Gui::PythonWorkbench"
+
+
+for name in ("Silo_BOM", "Silo_Settings", "Silo_Commit", "Origin_Commit"):
+    Gui.addCommand(name, Other("their " + name))
+Gui.addWorkbench(SiloWorkbench())
+"""
+
+
+@pytest.mark.parametrize("place", ["ARealSilo", "ZRealSilo"])
+@pytest.mark.parametrize("version", WANTED)
+def test_beside_the_real_silos_workbench(version: str, place: str, tmp_path: Path) -> None:
+    """Loaded before ours or after it: both menus have their own commands. Ours is the start-up workbench."""
+    with window(version, tmp_path.resolve()) as freecad:
+        freecad.prepare()
+        config = freecad.home / "user.cfg"
+        config.write_text(config.read_text().replace("NoneWorkbench", "SiloModWorkbench"))
+        other = freecad.home / "Mod" / place
+        other.mkdir()
+        (other / "InitGui.py").write_text(BESIDE)
+        said = freecad.run("beside.py")
+        log = (freecad.folder / "freecad.log").read_text(errors="replace")
+    assert "Unknown command" not in log + said["report"]
+    assert said["theirs"] == ["their Silo_BOM", "their Silo_Settings", "their Silo_Commit"]
+    assert said["ours"] == [
+        "Commit to Silo",
+        "Compare BOM with Silo…",
+        "Register Parts…",
+        "Mass of the Assembly…",
+        "Database Activity",
+        "Silo Settings…",
+        "Help on Silo",
+    ]
+    assert said["works"]
+    assert said["help"]
+    assert said["whats_this"]
+    assert said["shortcuts"]["Register Parts…"] == "Ctrl+Alt+R"
 
 
 @pytest.mark.parametrize("version", WANTED)

@@ -40,7 +40,7 @@ def test_freecad_reads_what_we_mean(read: dict[str, Any]) -> None:
     assert (told["name"], told["license"], told["freecad_min"]) == ("Silo", "LGPL-2.1-or-later", "0.20.0")
     assert told["supports"]
     name, classname, folder, icon = told["workbench"]
-    assert (name, classname, folder) == ("Silo", "SiloWorkbench", "./")
+    assert (name, classname, folder) == ("Silo", "SiloModWorkbench", "./")
     assert told["tags"] == ["BOM", "PDM", "PLM", "assembly"]
     for path in (told["icon"], icon):
         assert (REPOSITORY / path).is_file()

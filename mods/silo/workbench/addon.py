@@ -306,6 +306,12 @@ class AddOn:
         """Open the preferences."""
         host.show_preferences("Silo", 0)
 
+    def show_help(self) -> None:
+        """Show the add-on's page of the documentation."""
+        from silo.workbench.gui.help_window import HelpWindow
+
+        HelpWindow(host.main_window()).show()
+
     # -- the pane's buttons -----------------------------------------------------------------------------
 
     def act(self, action: Action) -> None:
@@ -331,10 +337,19 @@ class AddOn:
             self.session.cancel()
         elif action.do is Do.PREVIEW:
             self.preview_path(action.document)
+        elif action.do is Do.SAME:
+            self._same_part(action)
         elif action.do in (Do.REGISTER, Do.DECIDE):
             self.register_path(action.document)
         elif action.do is Do.SETTINGS:
             self.show_settings()
+
+    def _same_part(self, action: Action) -> None:
+        """These files are one part on purpose; the BOM is synced without the question."""
+        self.commits.decisions.accept(action.target, action.objects)
+        doc = host.find_document(action.document)
+        if doc is not None:
+            self.commits.sync_only(doc)
 
     def _save_copy(self, entry_id: int, name: str) -> None:
         """Ask where to, and write the file of something that waits."""

@@ -12,9 +12,13 @@ COMMIT = "Origin_Commit"
 # Where FreeCAD, or a fork of it, has an Origin_Commit of its own, it is left alone and hooked; ours for
 # committing by hand then has this name.
 OWN_COMMIT = "Silo_Commit"
+# The real Silo's workbench has a Silo_BOM and a Silo_Settings too. Where a name is taken, ours is this.
+FALLBACK = "SiloMod_{}"
 BOM = "Silo_BOM"
 REGISTER = "Silo_RegisterParts"
 MASS = "Silo_Mass"
+HELP = "Silo_Help"
+INSTALL = "Silo_InstallPackages"
 ACTIVITY = "Silo_Activity"
 SETTINGS = "Silo_Settings"
 
@@ -28,14 +32,24 @@ class Command:
         text: str,
         tip: str,
         icon: str,
+        keys: str = "",
+        help: str = "",
         run: Callable[[], None],
         active: Callable[[], bool] = lambda: True,
     ) -> None:
         self.text, self.tip, self.icon, self.run, self.active = text, tip, icon, run, active
+        self.keys, self.help = keys, help or tip
 
     def GetResources(self) -> dict[str, str]:
         """What FreeCAD shows."""
-        return {"MenuText": self.text, "ToolTip": self.tip, "Pixmap": self.icon}
+        told = {
+            "MenuText": self.text,
+            "ToolTip": self.tip,
+            "WhatsThis": self.help,
+            "StatusTip": self.tip,
+            "Pixmap": self.icon,
+        }
+        return {**told, "Accel": self.keys} if self.keys else told
 
     def Activated(self, _index: int = 0) -> None:
         """Chosen from a menu, a toolbar, or by ``Gui.runCommand``."""
@@ -57,6 +71,12 @@ def commands(addon: Any) -> dict[str, Command]:
                 "and bring the BOM to Silo",
             ),
             icon="silo-commit",
+            keys="Ctrl+Alt+S",
+            help=translate(
+                "Silo",
+                "Saves this document and the edited ones below it, uploads each as a new revision with your "
+                "comment, and brings the BOM to Silo. Nothing is ever deleted there.",
+            ),
             run=addon.commit,
             active=addon.has_document,
         ),
@@ -64,6 +84,7 @@ def commands(addon: Any) -> dict[str, Command]:
             text=translate("Silo", "Compare BOM with Silo…"),
             tip=translate("Silo", "Show how the BOM of this assembly differs from the one in Silo"),
             icon="silo-bom",
+            keys="Ctrl+Alt+B",
             run=addon.preview,
             active=addon.has_document,
         ),
@@ -71,6 +92,7 @@ def commands(addon: Any) -> dict[str, Command]:
             text=translate("Silo", "Register Parts…"),
             tip=translate("Silo", "Give part numbers to the components of this assembly that have none"),
             icon="silo-register",
+            keys="Ctrl+Alt+R",
             run=addon.register,
             active=addon.has_document,
         ),
@@ -80,6 +102,7 @@ def commands(addon: Any) -> dict[str, Command]:
                 "Silo", "Mass and centre of mass from the parts' shapes and materials, with what is missing"
             ),
             icon="silo-mass",
+            keys="Ctrl+Alt+M",
             run=addon.mass,
             active=addon.has_document,
         ),
@@ -87,6 +110,7 @@ def commands(addon: Any) -> dict[str, Command]:
             text=translate("Silo", "Database Activity"),
             tip=translate("Silo", "Show what happens in Silo, and what waits to be sent"),
             icon="silo-activity",
+            keys="Ctrl+Alt+A",
             run=addon.show_activity,
         ),
         SETTINGS: Command(
@@ -94,5 +118,11 @@ def commands(addon: Any) -> dict[str, Command]:
             tip=translate("Silo", "Server, token, and what a commit does"),
             icon="silo-settings",
             run=addon.show_settings,
+        ),
+        HELP: Command(
+            text=translate("Silo", "Help on Silo"),
+            tip=translate("Silo", "Open the page that explains the commands, the pane and the messages"),
+            icon="silo",
+            run=addon.show_help,
         ),
     }

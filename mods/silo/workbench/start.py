@@ -8,7 +8,7 @@ add-on may cost FreeCAD's start 50 ms.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,9 @@ from silo.workbench.commands import (
     ACTIVITY,
     BOM,
     COMMIT,
+    FALLBACK,
+    HELP,
+    INSTALL,
     MASS,
     OWN_COMMIT,
     REGISTER,
@@ -33,6 +36,9 @@ RESOURCES = Path(__file__).parent / "resources"
 PREFERENCE_GROUP = "Silo"
 LOADING_MS = 30
 
+TOOLBAR = (COMMIT, BOM, REGISTER, ACTIVITY)
+MENU = (COMMIT, BOM, REGISTER, MASS, ACTIVITY, SETTINGS, HELP)
+
 # Kept for FreeCAD's whole run: its C++ side holds no reference to what Python hands over.
 _kept: list[Any] = []
 
@@ -42,16 +48,44 @@ def start() -> None:
     words.use(host.translate)
     host.add_resources(str(RESOURCES / "icons"), str(RESOURCES / "translations"))
     if missing := dependencies.missing():
+        from silo.workbench.gui.installing import stub_commands
+
         host.error(dependencies.sentence(missing, host.packages_folder(), sys.version_info[:2]))
+        host.add_workbench(silo_workbench(Names(stub_commands(missing)), [INSTALL], [INSTALL]))
         return
     addon = AddOn()
-    known = commands(addon)
-    for name in (BOM, REGISTER, MASS, ACTIVITY, SETTINGS):
-        host.add_command(name, known[name])
-    host.add_workbench(silo_workbench())
+    names = Names(commands(addon))
+    host.add_workbench(silo_workbench(names, TOOLBAR, MENU))
     host.add_preference_page(addon.preference_page(), PREFERENCE_GROUP)
     _kept.append(addon)
-    qt.later(0, lambda: when_loaded(lambda: finish(addon, known)))
+    qt.later(0, lambda: when_loaded(lambda: finish(addon, names)))
+
+
+class Names:
+    """Our commands, and the names that they got.
+
+    They are added once all add-ons are loaded: where another one has a command of the same name, both are
+    there. FreeCAD 0.20 would replace the first of them, later ones would drop the second, both silently.
+    """
+
+    def __init__(self, known: dict[str, Command]) -> None:
+        self._known = known
+        self._got: dict[str, str] = {}
+        self.foreign: list[str] = []
+
+    def of(self, wanted: Sequence[str]) -> list[str]:
+        """The names of these commands; adds them all, the first time."""
+        if not self._got:
+            self._got = {name: self._add(name, command) for name, command in self._known.items()}
+        return [self._got[name] for name in wanted]
+
+    def _add(self, name: str, command: Command) -> str:
+        own: tuple[str, ...] = (OWN_COMMIT,) if name == COMMIT else ()
+        for candidate in (name, *own, FALLBACK.format(name.partition("_")[2])):
+            if host.add_command(candidate, command):
+                return candidate
+            self.foreign.append(candidate)
+        return name
 
 
 def when_loaded(call: Callable[[], None]) -> None:
@@ -62,34 +96,34 @@ def when_loaded(call: Callable[[], None]) -> None:
         qt.later(LOADING_MS, lambda: when_loaded(call))
 
 
-def finish(addon: AddOn, known: dict[str, Command]) -> None:
+def finish(addon: AddOn, names: Names) -> None:
     """The rest, once all add-ons are loaded: one of them may have brought an ``Origin_Commit`` of its own."""
-    if host.add_command(COMMIT, known[COMMIT]):
-        commit = COMMIT
-    else:
-        # FreeCAD, or a fork of it, commits by itself: its command stays, its end is hooked.
-        addon.hook_commit(COMMIT)
-        commit = OWN_COMMIT
-        if not host.add_command(OWN_COMMIT, known[COMMIT]):
-            addon.hook_commit(OWN_COMMIT)
-    _kept.append(place([commit, BOM], addon.shown_everywhere))
+    placed = names.of([COMMIT, BOM])
+    for name in names.foreign:
+        if name in (COMMIT, OWN_COMMIT):
+            # FreeCAD, or a fork of it, commits by itself: its command stays, its end is hooked.
+            addon.hook_commit(name)
+    _kept.append(place(placed, addon.shown_everywhere))
     host.reload_workbench()
     addon.begin()
 
 
-def silo_workbench() -> Any:
-    """The Silo workbench: a toolbar and a menu with all commands."""
+def silo_workbench(names: Names, toolbar: Sequence[str], menu: Sequence[str]) -> Any:
+    """The Silo workbench: a toolbar and a menu with all commands.
 
-    class SiloWorkbench(host.gui().Workbench):  # type: ignore[misc]  # FreeCAD has no types
+    FreeCAD knows it by the name of its class, and the real Silo's is called SiloWorkbench.
+    """
+
+    class SiloModWorkbench(host.gui().Workbench):  # type: ignore[misc]  # FreeCAD has no types
         MenuText = words.translate("Silo", "Silo")
         ToolTip = words.translate("Silo", "Keep the BOM of an assembly in step with Silo")
         Icon = str(RESOURCES / "icons" / "silo.svg")
 
         def Initialize(self) -> None:
-            self.appendToolbar("Silo", [COMMIT, BOM, REGISTER, ACTIVITY])
-            self.appendMenu("&Silo", [COMMIT, BOM, REGISTER, MASS, ACTIVITY, SETTINGS])
+            self.appendToolbar("Silo", names.of(toolbar))
+            self.appendMenu("&Silo", names.of(menu))
 
         def GetClassName(self) -> str:
             return "Gui::PythonWorkbench"
 
-    return SiloWorkbench()
+    return SiloModWorkbench()

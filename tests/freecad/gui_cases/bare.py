@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Inside a FreeCAD whose Python lacks what the add-on needs: it starts, and one sentence says so."""
+"""Inside a FreeCAD whose Python lacks what the add-on needs: a workbench with one button installs it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import sys
 
 sys.path.insert(0, os.environ["SILO_TEST_CASES"])
 
-from inside import Gui, QtCore, QtWidgets, tell
+from inside import Gui, QtCore, QtWidgets, labels, tell, wait
 
 
 def look() -> None:
@@ -17,11 +17,20 @@ def look() -> None:
     texts = [w.toPlainText() for w in Gui.getMainWindow().findChildren(QtWidgets.QTextEdit)]
     tell(
         on_path=host.packages_folder() in [os.path.normpath(entry) for entry in sys.path],
-        commands=[name for name in Gui.listCommands() if "Silo" in name or name == "Origin_Commit"],
         report=[
             line for text in texts for line in text.splitlines() if "Silo" in line or "Traceback" in line
         ],
     )
+    Gui.activateWorkbench("SiloModWorkbench")
+    bar = Gui.getMainWindow().findChild(QtWidgets.QToolBar, "Silo")
+    tell(buttons=[action.text() for action in bar.actions()])
+    Gui.runCommand("Silo_InstallPackages")
+    window = next(w for w in QtWidgets.QApplication.topLevelWidgets() if w.objectName() == "SiloInstall")
+    before = labels(window)
+    window.button.click()
+    during = [window.bar.isVisible(), window.button.isEnabled()]
+    wait(lambda: not window.bar.isVisible())
+    tell(before=before, during=during, after=labels(window), button=window.button.isVisible())
     os._exit(0)
 
 

@@ -184,6 +184,11 @@ def reopened(top: str) -> None:
     tell(reopened=states())
 
 
+def help_page(one: Any) -> None:
+    Gui.runCommand("Silo_Help")
+    wait(lambda: shown("SiloHelp")).close()
+
+
 RUNS: dict[str, Callable[[Any], None]] = {
     "Origin_Commit": commit,
     "Silo_BOM": preview,
@@ -191,6 +196,7 @@ RUNS: dict[str, Callable[[Any], None]] = {
     "Silo_Mass": mass,
     "Silo_Activity": activity,
     "Silo_Settings": settings,
+    "Silo_Help": help_page,
 }
 
 run(story)

@@ -25,7 +25,7 @@ def story() -> None:
     # Commit stands where people save, in every workbench.
     Gui.activateWorkbench("PartWorkbench")
     wait(lambda: "Commit to Silo" in menu_texts(window))
-    Gui.activateWorkbench("SiloWorkbench")
+    Gui.activateWorkbench("SiloModWorkbench")
     ours = sorted(name for name in Gui.listCommands() if name == "Origin_Commit" or name.startswith("Silo_"))
     bar = wait(lambda: window.findChild(QtWidgets.QToolBar, "Silo"))
     actions = {name: list(Gui.Command.get(name).getAction()) for name in ours}

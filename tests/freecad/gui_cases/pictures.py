@@ -76,7 +76,7 @@ def recompute() -> None:
 def arrange(one: Any) -> None:
     """A window of a size that can still be read in a page, the pane on its right."""
     window = Gui.getMainWindow()
-    Gui.activateWorkbench("SiloWorkbench")
+    Gui.activateWorkbench("SiloModWorkbench")
     still()
     window.showNormal()
     window.setGeometry(0, 0, WIDTH, HEIGHT)

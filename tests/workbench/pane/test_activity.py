@@ -11,11 +11,13 @@ from silo.workbench.pane.activity import (
     MOST_LINES,
     Action,
     Activity,
+    Batch,
     Do,
     Entry,
     Line,
     Tone,
     entry_text,
+    gathered,
 )
 
 
@@ -126,3 +128,38 @@ def test_always_sorted_unique_and_never_poorer(told: list[Entry]) -> None:
     assert sorted(keys(activity)) == sorted({one.key for one in told})
     for one in activity.entries:
         assert one.rank == max(other.rank for other in told if other.key == one.key)
+
+
+def news(number: int, when: float, part_of: Batch | None = Batch.CREATED, who: str = "ann") -> Entry:
+    return Entry(f"e{number}", f"New item: M01-{number:04}", when, who=who, part_of=part_of)
+
+
+def test_a_batch_is_one_box() -> None:
+    """54 registered parts bury nothing: the BOM that came between them stands by itself."""
+    bom = entry("bom", 20.5, "BOM Updated: A01-0001")
+    shown = gathered(Activity().extend([*(news(n, n) for n in range(54)), bom]).entries)
+    assert [one.title for one in shown] == ["54 new items", "BOM Updated: A01-0001"]
+    assert shown[0].when == 53
+    assert shown[0].lines[0].text.startswith("M01-0000, M01-0001, ")
+    assert shown[0].lines[0].text.endswith(", …")
+
+
+def test_two_are_no_batch_nor_is_what_lies_apart() -> None:
+    """Nor what two people did, nor what has something of its own to say."""
+    two = [news(1, 1), news(2, 2)]
+    apart = [news(1, 0), news(2, 100), news(3, 200)]
+    people = [news(n, n, who=who) for n, who in enumerate(("ann", "bob", "ann", "bob"))]
+    own = [news(n, n, None) for n in range(9)]
+    for entries in (two, apart, people, own):
+        listed = Activity().extend(entries).entries
+        assert gathered(listed) == listed
+
+
+@given(st.lists(st.tuples(st.integers(0, 500), st.sampled_from([None, *Batch]))))
+def test_gathering_loses_nothing(told: list[tuple[int, Batch | None]]) -> None:
+    """Newest first, and every box is shown or counted."""
+    entries = [news(n, when, part_of) for n, (when, part_of) in enumerate(told)]
+    shown = gathered(Activity(most=1000).extend(entries).entries)
+    assert [one.when for one in shown] == sorted((one.when for one in shown), reverse=True)
+    counts = [int(one.title.split()[0]) if one.key.startswith("batch:") else 1 for one in shown]
+    assert sum(counts) == len(entries)

@@ -28,6 +28,18 @@ class Tone(StrEnum):
     ERROR = "error"
 
 
+class Batch(StrEnum):
+    """What comes by the dozen."""
+
+    COMMITTED = "committed"
+    CREATED = "created"
+    REVISED = "revised"
+
+
+# Seconds between two of a batch; from so many on they are one box, which has so many names.
+PAUSE_S, FEWEST, MOST_NAMES = 60.0, 3, 6
+
+
 class Do(StrEnum):
     """What a button of the pane asks for."""
 
@@ -35,7 +47,8 @@ class Do(StrEnum):
     SHOW = "show"  # select the instances in the 3D view and the tree
     REGISTER = "register"  # open the Register Parts dialog
     PREVIEW = "preview"  # open the BOM preview
-    DECIDE = "decide"  # same part or new part?
+    SAME = "same"  # these files are the same part, on purpose
+    DECIDE = "decide"  # a new part: opens the Register Parts dialog
     RETRY = "retry"  # send what waits in the outbox
     SEND_HERE = "send here"  # send what waits for another address to the server in use
     SAVE_COPY = "save copy"  # write the file of what waits somewhere else
@@ -81,6 +94,9 @@ class Entry:
         name of one of the add-on's icons.
     badges
         the counts, each with its tone: ``+1 added``, ``~1 qty changed``, ``⚠1 unreferenced``.
+    part_of
+        what many of these boxes say together, for one box in their place (:func:`gathered`); "" where a box
+        has something of its own to say.
     """
 
     key: str
@@ -94,12 +110,58 @@ class Entry:
     rank: int = 0
     also: str = ""
     icon: str = ""
+    part_of: Batch | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "title", plain(self.title))
         object.__setattr__(self, "who", plain(self.who, 60))
         if len(self.lines) > MOST_LINES:
             object.__setattr__(self, "lines", shortened(self.lines))
+
+
+def gathered(entries: Iterable[Entry]) -> tuple[Entry, ...]:
+    """With one box for each batch: 54 registered parts are one piece of news, and bury nothing.
+
+    A batch is of one kind and one person, and has no pause of more than :data:`PAUSE_S` in it. Its box stands
+    where its newest one would.
+    """
+    made: list[list[Entry]] = []
+    last: dict[tuple[str, str], list[Entry]] = {}
+    for entry in entries:
+        group = last.get((entry.part_of, entry.who)) if entry.part_of else None
+        if group is not None and group[-1].when - entry.when <= PAUSE_S:
+            group.append(entry)
+            continue
+        group = [entry]
+        made.append(group)
+        if entry.part_of:
+            last[entry.part_of, entry.who] = group
+    told: list[Entry] = []
+    for group in made:
+        told += group if len(group) < FEWEST else [_together(group)]
+    return tuple(sorted(told, key=lambda entry: -entry.when))
+
+
+def _together(group: list[Entry]) -> Entry:
+    newest = group[0]
+    words = {
+        Batch.COMMITTED: translate("Silo", "{n} items committed"),
+        Batch.CREATED: translate("Silo", "{n} new items"),
+        Batch.REVISED: translate("Silo", "{n} new revisions"),
+    }
+    names = [entry.title.partition(": ")[2] or entry.title for entry in reversed(group)]
+    shown = ", ".join(names[:MOST_NAMES]) + (", …" if len(names) > MOST_NAMES else "")
+    comments = dict.fromkeys(line.text for entry in group for line in entry.lines if line.tone is Tone.PLAIN)
+    assert newest.part_of is not None
+    return Entry(
+        key=f"batch:{group[-1].key}",
+        title=words[newest.part_of].replace("{n}", str(len(group))),
+        when=newest.when,
+        who=newest.who,
+        tone=newest.tone,
+        lines=(Line(shown, Tone.QUIET), *(Line(text) for text in comments if len(comments) == 1)),
+        icon=newest.icon,
+    )
 
 
 def shortened(

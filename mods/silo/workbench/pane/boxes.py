@@ -159,8 +159,8 @@ class BusyWidget(QtWidgets.QWidget):  # type: ignore[misc]
 class WaitingWidget(QtWidgets.QFrame):  # type: ignore[misc]
     """What is not sent yet, and why, with what can be done about it."""
 
-    # Some hundred rows help nobody; all of them are sent all the same.
-    MOST = 20
+    # More of them would push the news out of sight; all of them are sent all the same.
+    MOST = 4
 
     def __init__(self, on_action: OnAction) -> None:
         super().__init__()

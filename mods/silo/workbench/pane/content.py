@@ -8,7 +8,7 @@ from typing import Any
 
 from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QtCore, QtWidgets
-from silo.workbench.pane.activity import Entry, Tone
+from silo.workbench.pane.activity import Entry, Tone, gathered
 from silo.workbench.pane.banner import banner
 from silo.workbench.pane.boxes import BannerWidget, Box, BusyWidget, OnAction, WaitingWidget
 from silo.workbench.session.session import Shown
@@ -76,7 +76,7 @@ class Pane(QtWidgets.QWidget):  # type: ignore[misc]
             if today != self._day:
                 self._drop(tuple(self._boxes))
             self._day = today
-            self._draw_entries(shown.activity.entries)
+            self._draw_entries(gathered(shown.activity.entries))
 
     def changeEvent(self, event: Any) -> None:
         """Another theme: what is coloured is made anew."""
@@ -116,4 +116,4 @@ class Pane(QtWidgets.QWidget):  # type: ignore[misc]
     def _show_older(self) -> None:
         self._most += MORE
         if self._shown is not None:
-            self._draw_entries(self._shown.activity.entries)
+            self._draw_entries(gathered(self._shown.activity.entries))

@@ -15,12 +15,13 @@ from silo.api.sse import MERGE, RESET, ServerEvent
 from silo.api.wire import MergeDiff, MergeEvent, MergeWarning
 from silo.bom.errors import SiloError
 from silo.bom.findings import Finding, FindingCode, Severity
+from silo.bom.identity import walk_entries
 from silo.bom.model import BomEntry
 from silo.bom.naming import display_name
 from silo.bom.report import shorten
 from silo.bom_sync import Resolved, Status
 from silo.outbox.send import Sent
-from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone, shortened
+from silo.workbench.pane.activity import Action, Batch, Do, Entry, Line, Tone, shortened
 from silo.workbench.session.session import Newer
 from silo.workbench.words import counted, plain, quantity, translate
 
@@ -44,7 +45,14 @@ def of_sent(sent: Sent, page: Page, now: float | None = None) -> Entry:
         actions=_view(url, page),
         rank=1,
         icon="silo-bom" if sent.status in (Status.MERGED, Status.BLOCKED) else "silo-commit",
+        part_of=_batch_of(sent, tone),
     )
+
+
+def _batch_of(sent: Sent, tone: Tone) -> Batch | None:
+    """A commit without anything that a person should see is one of many."""
+    quiet = tone not in (Tone.WARNING, Tone.ERROR)
+    return Batch.COMMITTED if quiet and sent.status not in (Status.MERGED, Status.BLOCKED) else None
 
 
 _JUST_NOW_S = 120.0
@@ -170,9 +178,20 @@ def finding_actions(finding: Finding, resolved: Resolved) -> tuple[Action, ...]:
     """What a person can do about a finding: see the objects, or decide about a copied identity."""
     top = resolved.assembly.doc_path
     if finding.code is FindingCode.COPIED_IDENTITY:
-        return (Action(Do.DECIDE, translate("Silo", "Same or new part…"), document=top),)
+        files = tuple(dict.fromkeys(place.doc_path for place in finding.where))
+        return (
+            Action(Do.SAME, translate("Silo", "Same part"), _identity_at(finding, resolved), top, files),
+            Action(Do.DECIDE, translate("Silo", "New part…"), document=top),
+        )
     names = tuple(place.obj for place in finding.where if place.doc_path == top and place.obj)
     return (Action(Do.SHOW, translate("Silo", "Show"), document=top, objects=names),) if names else ()
+
+
+def _identity_at(finding: Finding, resolved: Resolved) -> str:
+    """The identity that the files of a finding share."""
+    places = {(place.doc_path, place.obj) for place in finding.where}
+    entries = walk_entries((resolved.assembly, *resolved.entries))
+    return next((e.silo_uuid for e in entries if e.key in places and e.silo_uuid), "")
 
 
 def _conflict_lines(sent: Sent, resolved: Resolved) -> list[Line]:
@@ -243,6 +262,7 @@ def of_event(event: ServerEvent, page: Page, now: float | None = None) -> Entry 
         lines=tuple(Line(text) for text in (_text(data, "comment", "description", "name"),) if text),
         actions=_view(f"/items/{number}", page),
         icon="silo-commit" if event.type == "revision.created" else "silo-register",
+        part_of={"revision.created": Batch.REVISED, "item.created": Batch.CREATED}.get(event.type),
     )
 
 

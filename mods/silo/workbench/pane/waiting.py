@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from urllib.parse import urlsplit
 
 from silo.api.address import canonical
-from silo.outbox.entry import Entry, State
+from silo.outbox.entry import ASKED, Entry, State
 from silo.workbench.pane.activity import Action, Do
 from silo.workbench.words import plain, translate
 
@@ -73,7 +73,11 @@ def _actions(entry: Entry, here: str, *, away: bool) -> Iterable[Action]:
         text = translate("Silo", "Send to {host}").replace("{host}", host_of(here))
         yield Action(Do.SEND_HERE, text, target=target)
     elif entry.state is State.HELD and not entry.superseded:
-        yield Action(Do.RETRY, translate("Silo", "Retry"), target=target)
+        asked = entry.renamed == ASKED
+        text = translate("Silo", "Same part") if asked else translate("Silo", "Retry")
+        yield Action(Do.RETRY, text, target=target)
+        if asked:
+            yield Action(Do.DECIDE, translate("Silo", "New part…"), document=entry.path)
     if entry.file_left:
         name = os.path.basename(entry.path) or entry.file_name
         yield Action(Do.SAVE_COPY, translate("Silo", "Save a copy…"), target=target, document=name)

@@ -52,6 +52,11 @@
         </message>
         <message>
             <location filename="../../commands.py" />
+            <source>Saves this document and the edited ones below it, uploads each as a new revision with your comment, and brings the BOM to Silo. Nothing is ever deleted there.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
             <source>Compare BOM with Silo…</source>
             <translation type="unfinished" />
         </message>
@@ -102,6 +107,17 @@
         <message>
             <location filename="../../commands.py" />
             <source>Server, token, and what a commit does</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <location filename="../../gui/help_window.py" />
+            <source>Help on Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Open the page that explains the commands, the pane and the messages</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -399,6 +415,66 @@ Commits that are not copied by then may have to be committed again.</source>
             <translation type="unfinished" />
         </message>
         <message>
+            <location filename="../../gui/help_window.py" />
+            <source>The documentation is not there: {path}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/installing.py" />
+            <source>Install the Python packages that Silo needs: {names}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/installing.py" />
+            <source>Install What Silo Needs…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/installing.py" />
+            <source>Install what Silo needs</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/installing.py" />
+            <source>Silo needs these Python packages: {names}.
+They are installed in {folder}.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/installing.py" />
+            <source>Install</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/installing.py" />
+            <location filename="../../mass/dialog.py" />
+            <location filename="../../preview/dialog.py" />
+            <location filename="../../register/dialog.py" />
+            <source>Close</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/installing.py" />
+            <source>Installing. This takes a minute or two…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/installing.py" />
+            <source>The packages are in {folder}. Start FreeCAD again to use Silo.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/installing.py" />
+            <location filename="../../pane/banner.py" />
+            <source>Try again</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../gui/installing.py" />
+            <source>They could not be installed: {reason}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
             <location filename="../../mass/dialog.py" />
             <source>Mass of {name}</source>
             <translation type="unfinished" />
@@ -448,13 +524,6 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../mass/dialog.py" />
             <source>Copy the table, for a spreadsheet</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../mass/dialog.py" />
-            <location filename="../../preview/dialog.py" />
-            <location filename="../../register/dialog.py" />
-            <source>Close</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -524,6 +593,21 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../pane/activity.py" />
+            <source>{n} items committed</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <source>{n} new items</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
+            <source>{n} new revisions</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/activity.py" />
             <source>… and {n} more line</source>
             <translation type="unfinished" />
         </message>
@@ -535,11 +619,6 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../pane/banner.py" />
             <source>Settings…</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/banner.py" />
-            <source>Try again</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -684,7 +763,14 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../pane/entries.py" />
-            <source>Same or new part…</source>
+            <location filename="../../pane/waiting.py" />
+            <source>Same part</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/entries.py" />
+            <location filename="../../pane/waiting.py" />
+            <source>New part…</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -834,7 +920,7 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../preview/dialog.py" />
-            <source>Sync although links are broken (what they stood for becomes unreferenced)</source>
+            <source>Sync although links are broken (the lines that they stand for stay as they are)</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -845,6 +931,21 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../preview/dialog.py" />
             <source>Compare again</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <source>Compare with 3D view</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <source>Does the BOM explain each solid that FreeCAD shows? Selects what it does not</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../preview/dialog.py" />
+            <source>Mend links</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1030,37 +1131,22 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../register/dialog.py" />
+            <source>guess: {category}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/dialog.py" />
             <source>Keep</source>
             <translation type="unfinished" />
         </message>
         <message>
             <location filename="../../register/dialog.py" />
-            <source>All components of {name} have their Silo part number.</source>
+            <source>Undeclare</source>
             <translation type="unfinished" />
         </message>
         <message>
             <location filename="../../register/dialog.py" />
-            <source>All of these have their part number now.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/dialog.py" />
-            <source>Where files carry one identity, choose in the column Part number: the same part, or a new one?</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/dialog.py" />
-            <source>({n} more after these)</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/dialog.py" />
-            <source>The following component has no Silo part number and will be excluded from the BOM until registered:</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/dialog.py" />
-            <source>The following components have no Silo part number and will be excluded from the BOM until registered:</source>
+            <source>Declare</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1125,6 +1211,26 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../register/rows.py" />
+            <source>Components</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Standard parts</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Modelled in this file, not counted</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Modelled in this file, and counted</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
             <source>Consumable</source>
             <translation type="unfinished" />
         </message>
@@ -1140,12 +1246,22 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../register/rows.py" />
+            <source>{name} ({n} copies)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
             <source>{number} (kept)</source>
             <translation type="unfinished" />
         </message>
         <message>
             <location filename="../../register/rows.py" />
             <source>same or new part?</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>one for each</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1180,6 +1296,11 @@ Commits that are not copied by then may have to be committed again.</source>
         </message>
         <message>
             <location filename="../../register/rows.py" />
+            <source>different parts: a number for each copy</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
             <source>stays as it is</source>
             <translation type="unfinished" />
         </message>
@@ -1191,6 +1312,36 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../register/rows.py" />
             <source>registering…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>counts once</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>counts {n} times</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>would count once; check it if it is a part</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>would count {n} times; check it if it is a part</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>imported from {file}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>equal by their labels only</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1211,6 +1362,36 @@ Commits that are not copied by then may have to be committed again.</source>
         <message>
             <location filename="../../register/rows.py" />
             <source>Silo has {number} with the same name</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>All components of {name} have their Silo part number.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>All of these have their part number now.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>Where files carry one identity, choose in the column Part number: the same part, or a new one?</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>({n} more after these)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>The following component has no Silo part number and will be excluded from the BOM until registered:</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>The following components have no Silo part number and will be excluded from the BOM until registered:</source>
             <translation type="unfinished" />
         </message>
         <message>

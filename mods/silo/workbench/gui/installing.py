@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Where FreeCAD's Python lacks packages, the add-on is a workbench with one button that installs them."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from silo.workbench import dependencies
+from silo.workbench.commands import INSTALL, Command
+from silo.workbench.freecad import host
+from silo.workbench.gui.qt import QtCore, QtWidgets, Relay
+from silo.workbench.words import translate, visible
+
+# The one window; FreeCAD holds no reference to it.
+_open: list[Any] = []
+
+
+def stub_commands(missing: Sequence[str]) -> dict[str, Command]:
+    """The one command that works without packages."""
+
+    def run() -> None:
+        window = InstallWindow(missing, host.main_window(), install)
+        _open[:] = [window]
+        window.show()
+
+    tip = translate("Silo", "Install the Python packages that Silo needs: {names}")
+    return {
+        INSTALL: Command(
+            text=translate("Silo", "Install What Silo Needs…"),
+            tip=tip.replace("{names}", ", ".join(missing)),
+            icon="silo",
+            run=run,
+        )
+    }
+
+
+def install() -> str:
+    """Install the packages for this FreeCAD; where they are now. SiloError. Worker."""
+    from silo.addon_install import Place, install_packages
+    from silo.platform import python_beside
+
+    return install_packages(
+        Place(
+            Path(host.user_data_folder()),
+            host.version(),
+            (sys.version_info[0], sys.version_info[1]),
+            tuple(python_beside(sys.base_exec_prefix)),
+        )
+    )
+
+
+class InstallWindow(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
+    """Says what is missing, installs it, and says how that went.
+
+    install
+        does the work in a thread of its own; returns the folder, raises with the reason.
+    """
+
+    def __init__(self, missing: Sequence[str], parent: Any, install: Callable[[], str]) -> None:
+        super().__init__(parent)
+        self._install = install
+        self._relay = Relay()
+        self.setObjectName("SiloInstall")
+        self.setWindowTitle(translate("Silo", "Install what Silo needs"))
+        self.setMinimumWidth(460)
+        text = translate(
+            "Silo", "Silo needs these Python packages: {names}.\nThey are installed in {folder}."
+        )
+        text = text.replace("{names}", ", ".join(missing)).replace("{folder}", host.packages_folder())
+        self.text = QtWidgets.QLabel(text)
+        self.text.setWordWrap(True)
+        self.text.setTextInteractionFlags(QtCore.Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.bar = QtWidgets.QProgressBar()
+        self.bar.setRange(0, 0)
+        self.bar.hide()
+        self.button = QtWidgets.QPushButton(translate("Silo", "Install"))
+        self.button.setObjectName("install")
+        self.button.setDefault(True)
+        self.button.clicked.connect(lambda _checked=False: self.begin())
+        close = QtWidgets.QPushButton(translate("Silo", "Close"))
+        close.clicked.connect(lambda _checked=False: self.close())
+        buttons = QtWidgets.QHBoxLayout()
+        buttons.addStretch(1)
+        buttons.addWidget(self.button)
+        buttons.addWidget(close)
+        layout = QtWidgets.QVBoxLayout(self)
+        layout.addWidget(self.text)
+        layout.addWidget(self.bar)
+        layout.addLayout(buttons)
+
+    def begin(self) -> None:
+        """Install, in a thread; the window goes on living, and may be closed."""
+        self.button.setEnabled(False)
+        self.bar.show()
+        self.text.setText(translate("Silo", "Installing. This takes a minute or two…"))
+        threading.Thread(target=self._work, name="silo-install", daemon=True).start()
+
+    def _work(self) -> None:
+        try:
+            text, done = self._install(), True
+        except Exception as error:  # noqa: BLE001  # a person wants to read it, whatever it is
+            text, done = str(error) or type(error).__name__, False
+        self._relay.post(lambda: self._ended(text, done=done))
+
+    def _ended(self, text: str, *, done: bool) -> None:
+        self.bar.hide()
+        if done:
+            told = translate("Silo", "The packages are in {folder}. Start FreeCAD again to use Silo.")
+            self.text.setText(told.replace("{folder}", text))
+            self.button.hide()
+            return
+        self.button.setEnabled(True)
+        self.button.setText(translate("Silo", "Try again"))
+        failed = translate("Silo", "They could not be installed: {reason}")
+        by_hand = dependencies.sentence(dependencies.missing(), host.packages_folder(), sys.version_info[:2])
+        self.text.setText(visible(failed.replace("{reason}", text), 1500) + "\n\n" + by_hand)

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Inside a FreeCAD that has another Silo's workbench as well, and starts with ours."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import Any
+
+sys.path.insert(0, os.environ["SILO_TEST_CASES"])
+
+from inside import App, Gui, QtWidgets, addon, assembly, part, run, tell, wait
+
+
+def story() -> None:
+    wait(lambda: addon().session.shown.connection == "online")
+    texts = [w.toPlainText() for w in Gui.getMainWindow().findChildren(QtWidgets.QTextEdit)]
+    actions = menu("&Silo")
+    tell(
+        report="\n".join(texts),
+        ours=[action.text().replace("&", "") for action in actions],
+        shortcuts={action.text(): action.shortcut().toString() for action in actions},
+        whats_this=all(action.whatsThis() for action in actions),
+    )
+    help_entry(actions[-1])
+    # A fallback does its work: the window of ours opens.
+    doc = assembly("Top", ("P", part("Plate"), 0)).Document
+    App.setActiveDocument(doc.Name)
+    # FreeCAD looks now and then at what a command can do.
+    wait(actions[1].isEnabled)
+    actions[1].trigger()
+    tell(works=bool(wait(lambda: addon().previews._open)))
+    Gui.activateWorkbench("SiloWorkbench")
+    tell(theirs=[action.text().replace("&", "") for action in menu("Their Silo")])
+
+
+def menu(title: str) -> list[Any]:
+    menus = Gui.getMainWindow().menuBar().actions()
+    found = next(one for one in menus if one.text() == title)
+    return [action for action in found.menu().actions() if not action.isSeparator()]
+
+
+def help_entry(action: Any) -> None:
+    action.trigger()
+    window = wait(
+        lambda: next(
+            (w for w in QtWidgets.QApplication.topLevelWidgets() if w.objectName() == "SiloHelp"), None
+        )
+    )
+    tell(help="Your first commit" in window.page.toPlainText())
+    window.close()
+
+
+run(story)
