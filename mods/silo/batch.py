@@ -1,22 +1,22 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Many files in one run, each on its own: what the command line and the headless add-on share.
+"""What became of each file of a sync: what the command line and the add-on without a window share.
 
-One failure does not stop the rest; every file ends in a :class:`TopResult`, which becomes JSON here and
-Markdown in :mod:`silo.batch_report`.
+One failure does not stop the rest; every file ends in a :class:`TopResult`, which becomes JSON here, and a
+report in :mod:`silo.batch_report`. Files that FreeCAD reads come one by one (:func:`sync_top`); those that we
+read ourselves are one plan (:mod:`silo.vault.job`).
 """
 
 from __future__ import annotations
 
 import os
 import uuid
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import chain
 from typing import Any
 
 from silo.api.wire import SourceDocument
 from silo.bom.diff import diff_findings
-from silo.bom.errors import RemoteError, SiloError
+from silo.bom.errors import SiloError
 from silo.bom.findings import Finding
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.report import base_of, diff_json, entry_json, finding_json, project_folder, relative
@@ -58,29 +58,25 @@ class TopResult:
     skipped: str = ""
 
     @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Everything worth a report, each once: of the walk, and of each comparison with the server."""
+        found: dict[Finding, None] = dict.fromkeys(self.whole.findings if self.whole is not None else ())
+        for outcome in self.outcomes:
+            found.update(dict.fromkeys(outcome.resolved.findings))
+        for outcome in self.outcomes:
+            if outcome.plan is not None:
+                found.update(dict.fromkeys(diff_findings(outcome.plan.diff, outcome.assembly)))
+        return tuple(found)
+
+    @property
+    def unregistered(self) -> tuple[BomEntry, ...]:
+        """The components without an item, each once; of assemblies their outcome says it."""
+        several = [self.whole] if self.whole is not None else [outcome.resolved for outcome in self.outcomes]
+        return tuple({entry.key: entry for one in several for entry in one.unresolved}.values())
+
+    @property
     def fine(self) -> bool:
         return self.error is None and all(outcome.status in _FINE for outcome in self.outcomes)
-
-
-def exit_code(results: Sequence[TopResult]) -> int:
-    """0 where all is in order, 1 where something was left undone, 3 where only the server is to blame."""
-    left = [result for result in results if not result.fine]
-    causes = [
-        cause for result in left for cause in (result.error, *(o.error for o in result.outcomes)) if cause
-    ]
-    if left and len(causes) >= len(left) and all(isinstance(cause, RemoteError) for cause in causes):
-        return 3
-    return 1 if left else 0
-
-
-def findings_of(result: TopResult) -> tuple[Finding, ...]:
-    """Everything worth telling of one file: of the walk, and of each comparison with the server."""
-    compared = (
-        diff_findings(outcome.plan.diff, outcome.assembly)
-        for outcome in result.outcomes
-        if outcome.plan is not None
-    )
-    return (*(result.whole.findings if result.whole is not None else ()), *chain.from_iterable(compared))
 
 
 def sync_top(top: str, found: Extraction | SiloError, api: SyncApi, options: Options) -> TopResult:
@@ -150,9 +146,9 @@ def result_json(result: TopResult) -> dict[str, Any]:
     if result.skipped:
         data["skipped"] = result.skipped
     data["assemblies"] = [outcome_json(outcome, result.base) for outcome in result.outcomes]
-    if result.whole is not None:
-        data["unregistered"] = [entry_json(entry, result.base) for entry in result.whole.unresolved]
-        data["findings"] = [finding_json(finding, result.base) for finding in findings_of(result)]
+    if result.outcomes:
+        data["unregistered"] = [entry_json(entry, result.base) for entry in result.unregistered]
+        data["findings"] = [finding_json(finding, result.base) for finding in result.findings]
     return data
 
 

@@ -40,6 +40,7 @@ from silo.bom.model import BomDiff, BomEntry, Extraction
 from silo.bom.report import relative
 from silo.bom.resolve import (
     ItemLookup,
+    Known,
     consolidation_findings,
     look_up,
     numbered_findings,
@@ -166,10 +167,19 @@ class Outcome:
 
 def resolve(extraction: Extraction, api: ItemLookup) -> Resolved:
     """Give the assembly and all its components their part numbers, in one look-up for the whole tree."""
-    head = extraction.assembly
-    uuids = [e.silo_uuid for e in walk_entries((head, *extraction.entries)) if e.silo_uuid]
+    uuids = [e.silo_uuid for e in walk_entries((extraction.assembly, *extraction.entries)) if e.silo_uuid]
+    return resolve_known(extraction, known_items(uuids, extraction.entries, api))
+
+
+def known_items(uuids: Iterable[str], entries: Iterable[BomEntry], api: ItemLookup) -> Known:
+    """The server's items of these identities, and those of the standard parts among the entries."""
     known = look_up(uuids, api)
-    known = {**known, **find_items(extraction.entries, known, api)}
+    return {**known, **find_items(entries, known, api)}
+
+
+def resolve_known(extraction: Extraction, known: Known) -> Resolved:
+    """:func:`resolve` against items fetched before; pure."""
+    head = extraction.assembly
     entries, unresolved = resolve_with(extraction.entries, known)
     item = known.get(head.silo_uuid) if head.silo_uuid else None
     if item is not None:
@@ -197,7 +207,12 @@ def server_lines(resolved: Resolved, api: SyncApi) -> tuple[Mapping[str, Any], .
     number = resolved.assembly.part_number
     if number is None:
         return ()
-    return tuple(line if isinstance(line, Mapping) else line.model_dump() for line in api.get_bom(number))
+    return plain_lines(api.get_bom(number))
+
+
+def plain_lines(lines: Iterable[Any]) -> tuple[Mapping[str, Any], ...]:
+    """Lines as mappings, whatever the client made of them."""
+    return tuple(line if isinstance(line, Mapping) else line.model_dump() for line in lines)
 
 
 def identities_before(
@@ -258,6 +273,8 @@ def sync(
     allow_missing: bool = False,
     dry_run: bool = False,
     document: SourceDocument | None = None,
+    describe: Callable[[], SourceDocument | None] | None = None,
+    lines: Sequence[Mapping[str, Any]] | None = None,
 ) -> Outcome:
     """Bring one assembly's direct children to the server.
 
@@ -265,14 +282,20 @@ def sync(
         names this attempt; the same id sent again gives the same answer and changes nothing twice.
     dry_run
         compare, and send nothing.
+    document, describe
+        the file of the BOM, or what finds it where there is something to send.
+    lines
+        the server's lines of the assembly; None asks for them.
     """
     number = resolved.assembly.part_number
     try:
-        outcome = decide(resolved, server_lines(resolved, api), allow_missing=allow_missing)
+        lines = server_lines(resolved, api) if lines is None else lines
+        outcome = decide(resolved, lines, allow_missing=allow_missing)
         if dry_run and outcome.status in (Status.MERGED, Status.UNCHANGED):
             return replace(outcome, status=Status.DRY_RUN)
         if outcome.status is not Status.MERGED or number is None:
             return outcome
+        document = describe() if describe is not None else document
         return replace(outcome, result=api.merge_bom(number, merge_request(resolved, sync_id, document)))
     except SiloError as error:
         return Outcome(Status.FAILED, resolved, error=error)

@@ -217,19 +217,22 @@ def test_dry_run_sends_nothing(run: Any, silo: Any, gearbox: Path) -> None:
 def test_a_folder_is_synced_file_by_file_and_one_bad_file_does_not_stop_it(
     run: Any, silo: Any, gearbox: Path, tmp_path: Path
 ) -> None:
-    """Parts are passed over, the damaged file is told, assemblies are merged, a report is written."""
+    """Parts are passed over and counted, the damaged file is reported, assemblies are merged."""
     run("register", gearbox, "--yes")
     (gearbox.parent / "parts" / "Broken.FCStd").write_bytes(b"no zip at all")
     report = tmp_path / "report.md"
     ran = run("sync", gearbox.parent, "--recursive", "--json", "--report", report)
     assert ran.code == 1
     results = {Path(r["top"]).name: r for r in ran.json()["results"]}
+    assert set(results) == {"Broken.FCStd", "TopAssembly.FCStd", "Gearbox.FCStd"}
     assert "error" in results["Broken.FCStd"]
     assert results["TopAssembly.FCStd"]["ok"]
-    assert results["Housing.FCStd"]["skipped"]
+    summary = ran.json()["summary"]
+    assert (summary["files"], summary["in_order"], summary["parts"]) == (10, 9, 7)
     text = report.read_text(encoding="utf-8")
     assert "Broken.FCStd" in text
-    assert "| merged |" in text
+    assert "| added |" in text
+    assert text.index("TopAssembly.FCStd") < text.index("## Errors") < text.index("Broken.FCStd")
 
 
 def test_labels_cannot_steer_the_terminal(run: Any, gearbox: Path) -> None:

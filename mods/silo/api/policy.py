@@ -157,6 +157,7 @@ class Backoff:
 class Retries:
     """How often one request is tried in all, the first pause and the longest one (seconds).
 
+    ``busy_tries``: the same for a server that puts us off (429, 503 with Retry-After); None: ``tries``.
     ``chance`` gives numbers in [0, 1) that spread many clients out; ``sleep`` waits.
     """
 
@@ -165,11 +166,13 @@ class Retries:
     longest: float = 10.0
     chance: Callable[[], float] = random.random
     sleep: Callable[[float], object] = time.sleep
+    busy_tries: int | None = None
 
     def pause(self, attempt: int, error: SiloError, *, harmless: bool) -> float | None:
         """Seconds to wait after failed attempt ``attempt`` (from 1); None: give up and report the error."""
         told = getattr(error, "retry_after", None)
-        if attempt >= self.tries or not may_repeat(error, harmless=harmless):
+        tries = self.busy_tries if self.busy_tries and isinstance(error, BusyError) else self.tries
+        if attempt >= tries or not may_repeat(error, harmless=harmless):
             return None
         if told is not None:
             return float(told) if told <= self.longest else None

@@ -43,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
     """Print the BOM; 1 where an error says that it is not the whole one."""
     if args.verify:
         return _verify(args)
-    extraction = common.read_assembly(args.top, args.assembly, hardware=not args.no_hardware)
+    extraction = common.read_top(args)
     if args.resolve:
         with common.client_of(args) as client:
             common.reach(client, extraction)

@@ -4,23 +4,31 @@
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
+import os
+import platform
 import sys
+import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from silo.bom.errors import NotFoundError
+from silo.bom.errors import InputError, NotFoundError, SiloError
 from silo.bom.findings import respelt_findings
 from silo.bom.identity import walk_entries
 from silo.bom.links import extract
 from silo.bom.model import Extraction
 from silo.bom.roots import choose_assembly
+from silo.folders import cache_folder
+from silo.platform import hold_lock
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
     from silo.bom_sync import Resolved
+    from silo.vault.reading import Reading
 
 Commands = Any  # argparse keeps the type of its sub-parsers to itself
 
@@ -49,6 +57,7 @@ def add_assembly_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("top", metavar="TOP.FCStd", help="the assembly's file")
     parser.add_argument("--assembly", metavar="NAME", help="the assembly to read, where a file holds several")
     add_hardware_option(parser)
+    add_reading_options(parser, jobs=False)
 
 
 def add_hardware_option(parser: argparse.ArgumentParser) -> None:
@@ -63,15 +72,84 @@ def add_json_option(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print JSON for machines")
 
 
+def add_reading_options(parser: argparse.ArgumentParser, *, jobs: bool = True) -> None:
+    """``--index``, ``--no-index``, and for many files ``--jobs`` and ``--dask``."""
+    group = parser.add_argument_group("reading")
+    group.add_argument(
+        "--index", metavar="FILE", type=Path, help="where to remember what files hold (else the user's cache)"
+    )
+    group.add_argument("--no-index", action="store_true", help="read every file, and remember nothing")
+    if jobs:
+        group.add_argument(
+            "--jobs", type=_jobs, metavar="N", help="processes that read (default: the processors)"
+        )
+        group.add_argument(
+            "--dask", metavar="ADDRESS", help="read on a Dask cluster that sees the same files (extra: dask)"
+        )
+
+
+def _jobs(text: str) -> int:
+    if not text.isascii() or not text.isdigit() or not 1 <= int(text) <= 512:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number from 1 to 512")
+    return int(text)
+
+
 @contextmanager
-def client_of(args: argparse.Namespace) -> Iterator[SiloClient]:
-    """A client for the server that the options, the environment or the configuration name."""
+def reading_of(args: argparse.Namespace) -> Iterator[Reading]:
+    """What reads files, as the options say."""
+    from silo.vault.index import Index, default_path
+    from silo.vault.reading import Reading, pool_of
+
+    given = getattr(args, "index", None)
+    path = None if getattr(args, "no_index", False) else given or default_path()
+    jobs = getattr(args, "jobs", 1) or _processors()  # a command without the option reads one tree
+    with Index(path, given=given is not None) as index, pool_of(jobs, getattr(args, "dask", None)) as pool:
+        yield Reading(index, pool)
+
+
+def _processors() -> int:
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+@contextmanager
+def only_job(folder: str) -> Iterator[None]:
+    """Keep a second job of this user away from a folder. InputError names the first one."""
+    real = os.path.realpath(folder)
+    name = hashlib.sha256(real.encode("utf-8", "surrogateescape")).hexdigest()[:32]
+    path = cache_folder() / "jobs" / f"{name}.lock"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    held = hold_lock(path)
+    if held is None:
+        who = path.read_text(encoding="utf-8", errors="replace").strip() or "another process"
+        raise InputError(f"{folder} is being synced by {who}. Wait for it, or stop it.")
+    with held:
+        held.truncate(0)
+        since = time.strftime("%Y-%m-%d %H:%M:%S")
+        held.write(f"process {os.getpid()} on {platform.node()} since {since}\n".encode())
+        held.flush()
+        yield
+
+
+@contextmanager
+def client_of(
+    args: argparse.Namespace, *, busy_tries: int | None = None, longest: float = 10.0
+) -> Iterator[SiloClient]:
+    """A client for the server that the options, the environment or the configuration name.
+
+    busy_tries, longest
+        for jobs that may wait: how often a server that puts us off is asked, and the longest pause (seconds).
+    """
     from silo.api.abilities import default_path
     from silo.api.client import SiloClient
     from silo.api.config import resolve_server
+    from silo.api.policy import Retries
 
     where = resolve_server(getattr(args, "server", None), getattr(args, "token", None))
-    with SiloClient(where.url, where.token, verify=where.verify, memory=default_path()) as client:
+    retries = Retries(busy_tries=busy_tries, longest=longest)
+    memory = default_path()
+    with SiloClient(where.url, where.token, verify=where.verify, memory=memory, retries=retries) as client:
         yield client
 
 
@@ -102,9 +180,22 @@ def suggest_by_identity(
     return replace(whole, findings=with_suggestions(known, identities_before(compared)).findings)
 
 
-def reach(client: SiloClient, extraction: Extraction) -> None:
-    """Tell a wrong address or token also where no component has an identity to ask the server about."""
-    if any(entry.silo_uuid for entry in walk_entries((extraction.assembly, *extraction.entries))):
+def read_top(args: argparse.Namespace) -> Extraction:
+    """The BOM of the file that the options name, from the index where it is known. Raises SiloError."""
+    from silo.fcstd.suggest import with_suggestions
+    from silo.vault.reading import Question
+
+    with reading_of(args) as reading:
+        found = reading.ask(Question(args.top, args.assembly, not args.no_hardware, below=True)).found
+    if isinstance(found, SiloError):
+        raise found
+    return with_suggestions(found)
+
+
+def reach(client: SiloClient, extraction: Extraction | None = None) -> None:
+    """Report a wrong address or token also where no component has an identity to ask the server about."""
+    entries = () if extraction is None else walk_entries((extraction.assembly, *extraction.entries))
+    if any(entry.silo_uuid for entry in entries):
         return
     with suppress(NotFoundError):  # a server that does not tell who we are has answered all the same
         client.whoami()

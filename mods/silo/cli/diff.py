@@ -34,7 +34,7 @@ def register(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the comparison; with ``--check`` 1 on drift, on broken links and on unregistered components."""
-    extraction = common.read_assembly(args.top, args.assembly, hardware=not args.no_hardware)
+    extraction = common.read_top(args)
     with common.client_of(args) as client:
         common.reach(client, extraction)
         whole = resolve(extraction, client)

@@ -82,7 +82,7 @@ def _push(args: argparse.Namespace, report: InertiaReport) -> int:
     from silo.bom.report import base_of, relative
     from silo.bom_sync import resolve
 
-    extraction = common.read_assembly(args.top, args.assembly, hardware=not args.no_hardware)
+    extraction = common.read_top(args)
     base = base_of(extraction)
     with common.client_of(args) as client:
         resolved = resolve(extraction, client)

@@ -90,7 +90,7 @@ def run(args: argparse.Namespace) -> int:
         return _undeclare(args)
     if args.declare:
         return _declare(args)
-    extraction = common.read_assembly(args.top, args.assembly, hardware=not args.no_hardware)
+    extraction = common.read_top(args)
     articles = [one for one in modelled(args.top, args.assembly) if not one.declared]
     with common.client_of(args) as client:
         schema = client.find_schema(args.schema)

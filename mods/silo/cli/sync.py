@@ -1,20 +1,30 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""``silo-mod sync``: bring BOMs to the server; one file or a whole vault."""
+"""``silo-mod sync``: bring BOMs to the server; of one file, or of a whole vault every night."""
 
 from __future__ import annotations
 
 import argparse
+import os
+import signal
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from silo.batch import Options, TopResult, exit_code, result_json, stopped_by, sync_top
+from silo.batch import Options, TopResult, result_json, stopped_by, sync_top
 from silo.bom.errors import InputError, SiloError
-from silo.bom.model import Extraction
-from silo.bom_sync import Status
 from silo.cli import common
 from silo.cli.common import Commands
 from silo.files import check_writable, documents_in
+
+if TYPE_CHECKING:
+    from silo.api.client import SiloClient
+    from silo.batch_report import Summary
+
+# A job at night waits for a server that is busy.
+_BUSY_TRIES, _LONGEST_S = 12, 120.0
 
 
 def register(commands: Commands) -> None:
@@ -23,9 +33,11 @@ def register(commands: Commands) -> None:
         commands,
         "sync",
         "merge BOMs into the server; nothing is ever deleted, manual lines are never touched",
-        "silo-mod sync TopAssembly.FCStd --recursive",
+        "silo-mod sync vault/ --report night.md --report night.xml",
     )
-    parser.add_argument("tops", metavar="TOP.FCStd", nargs="+", help="assembly files, or folders of them")
+    parser.add_argument(
+        "tops", metavar="TOP", nargs="+", help="assembly files, or folders: all assemblies below them"
+    )
     parser.add_argument("--assembly", metavar="NAME", help="the assembly to read, where a file holds several")
     common.add_hardware_option(parser)
     parser.add_argument(
@@ -43,81 +55,230 @@ def register(commands: Commands) -> None:
         default="files",
         help="read the files directly (default), or let freecadcmd open them",
     )
-    parser.add_argument("--report", metavar="OUT.md", help="write a Markdown report to this file")
+    parser.add_argument(
+        "--report",
+        metavar="FILE",
+        action="append",
+        default=[],
+        help="write a report: Markdown (.md), JSON (.json) or JUnit XML (.xml); may be given several times",
+    )
     common.add_json_option(parser)
+    common.add_reading_options(parser)
     common.add_server_options(parser)
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Sync each file; one failure does not stop the rest. 1 or 3 where anything was left undone."""
+    from silo.batch_report import Report, Summary, form_of
+
     tops = documents_in(args.tops)
     if not tops:
         raise InputError(f"no FreeCAD files (*.FCStd) in {', '.join(args.tops)}")
-    check_writable(args.report)
+    check_writable(*args.report)
+    for path in args.report:
+        form_of(path)
+    folders = [top for top in args.tops if Path(top).is_dir()]
+    base = os.path.realpath(folders[0]) if len(folders) == len(args.tops) == 1 else ""
     options = Options(
-        recursive=args.recursive,
+        recursive=args.recursive or bool(folders),
         allow_missing=args.allow_missing,
         dry_run=args.dry_run,
-        skip_parts=any(Path(top).is_dir() for top in args.tops),
+        skip_parts=bool(folders),
     )
-    results: list[TopResult] = []
-    stopped: SiloError | None = None
-    with common.client_of(args) as client:
-        extractions = _extractions(args, tops)
-        for number, top in enumerate(tops, start=1):
-            # Before the file is read: a person wants to know which one takes so long.
-            if (len(tops) > 1 or args.via == "freecad") and sys.stderr.isatty():
-                print(f"[{number}/{len(tops)}] {top}", file=sys.stderr)
-            if stopped is not None:
-                results.append(TopResult(top, error=stopped))
-            else:
-                _, found = next(extractions)
-                if number == 1 and isinstance(found, Extraction):
-                    common.reach(client, found)
-                results.append(sync_top(top, found, client, options))
-                stopped = stopped_by(results[-1], client)
-            if not args.json:
-                _show(results[-1])
-    if args.report:
-        from silo.batch_report import markdown
-
-        Path(args.report).write_text(markdown(results), encoding="utf-8")
-    if args.json:
-        common.print_json({"results": [result_json(result) for result in results]})
-    elif len(results) > 1:
-        fine = sum(result.fine for result in results)
-        print(f"{fine} of {len(results)} files in order.")
-    return exit_code(results)
-
-
-def _extractions(args: argparse.Namespace, tops: list[str]) -> Iterator[tuple[str, Extraction | SiloError]]:
-    if args.via == "freecad":
-        from silo.freecadcmd.run import run_freecad
-
-        yield from run_freecad(tops, args.assembly, hardware=not args.no_hardware)
-        return
-    for top in tops:
+    summary = Summary(base)
+    with ExitStack() as stack:
+        stack.enter_context(_terminated())
+        for folder in folders:
+            stack.enter_context(common.only_job(folder))
+        client = stack.enter_context(common.client_of(args, busy_tries=_BUSY_TRIES, longest=_LONGEST_S))
+        reports = [Report(path) for path in args.report]
+        shown = _Shown(args, summary, many=len(tops) > 1)
+        ended = None
         try:
-            yield top, common.read_assembly(top, args.assembly, hardware=not args.no_hardware)
-        except SiloError as error:
-            yield top, error
+            for result in _results(args, tops, options, client, summary):
+                summary.add(result)
+                shown.add(result)
+                for report in reports:
+                    report.add(result)
+            ended = summary
+        finally:
+            for report in reports:
+                report.close(ended)
+            shown.close(ended)
+    for trouble in filter(None, (report.trouble for report in reports)):
+        print(f"silo-mod: {trouble}", file=sys.stderr)
+    return summary.exit_code or int(any(report.trouble for report in reports))
 
 
-def _show(result: TopResult) -> None:
+@contextmanager
+def _terminated() -> Iterator[None]:
+    """SIGTERM, by which services are stopped, ends the run as Ctrl-C does: with its report."""
+
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    try:
+        before = signal.signal(signal.SIGTERM, stop)
+    except ValueError:  # not in the main thread; whoever runs us there stops us in another way
+        yield
+        return
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _results(
+    args: argparse.Namespace, tops: Sequence[str], options: Options, client: SiloClient, summary: Summary
+) -> Iterator[TopResult]:
+    if args.via == "freecad":
+        yield from _by_freecad(args, tops, options, client)
+        return
+    from silo.vault.job import Job
+    from silo.vault.plan import make_plan
+
+    begin = time.monotonic()
+    told = _Progress(len(tops))
+    with common.reading_of(args) as reading:
+        plan = make_plan(
+            tops,
+            reading,
+            assembly=args.assembly,
+            hardware=not args.no_hardware,
+            recursive=options.recursive,
+            skip_parts=options.skip_parts,
+            progress=told.begin,
+        )
+        summary.parts, summary.files, summary.fine = plan.parts, plan.parts, plan.parts
+        reading.index.save()
+        summary.seconds["reading"] = time.monotonic() - begin
+        if not plan.uuids and plan.nodes:
+            common.reach(client)
+        begin = time.monotonic()
+        yield from Job(plan, reading, client, options, summary.base).results()
+        summary.seconds["server"] = time.monotonic() - begin
+        summary.add_findings(plan.shared)
+        summary.notes += filter(None, [reading.index.trouble])
+        if summary.base:
+            summary.moved += moved(reading.index.places(summary.base), plan.places, summary.base)
+            reading.index.keep_places(summary.base, plan.places)
+            reading.index.forget(summary.base, {os.path.realpath(top) for top in tops})
+
+
+def _by_freecad(
+    args: argparse.Namespace, tops: Sequence[str], options: Options, client: SiloClient
+) -> Iterator[TopResult]:
+    """Files that FreeCAD opens, one by one."""
+    from silo.freecadcmd.run import run_freecad
+
+    stopped: SiloError | None = None
+    found = run_freecad(tops, args.assembly, hardware=not args.no_hardware)
+    told = _Progress(len(tops), always=True)
+    for number, top in enumerate(tops):
+        told.begin(top)
+        if stopped is not None:
+            yield TopResult(top, error=stopped)
+            continue
+        _, extraction = next(found)
+        if number == 0 and not isinstance(extraction, SiloError):
+            common.reach(client, extraction)
+        result = sync_top(top, extraction, client, options)
+        stopped = stopped_by(result, client)
+        yield result
+
+
+class _Progress:
+    """Names each file when it is begun, on a terminal: a person wants to know which one takes so long."""
+
+    def __init__(self, count: int, *, always: bool = False) -> None:
+        self._count, self._number = count, 0
+        self._shows = (count > 1 or always) and sys.stderr.isatty()
+
+    def begin(self, top: str) -> None:
+        self._number += 1
+        if self._shows:
+            print(f"[{self._number}/{self._count}] {top}", file=sys.stderr)
+
+
+class _Shown:
+    """What standard output gets: JSON as the run goes, or what changed, and errors last."""
+
+    def __init__(self, args: argparse.Namespace, summary: Summary, *, many: bool) -> None:
+        self._json, self._many, self._summary = args.json, many, summary
+        self._count = 0
+        if args.json:
+            print('{"results": [', end="")
+
+    def add(self, result: TopResult) -> None:
+        if self._json:
+            print("," if self._count else "", common.json_text(result_json(result)), sep="\n", end="")
+            self._count += 1
+        else:
+            _show(result, whole=not self._many)
+
+    def close(self, summary: Summary | None) -> None:
+        if self._json:
+            from silo.batch_report import Json
+
+            print(Json().end(summary), end="")
+        elif summary is not None and self._many:
+            _show_summary(summary)
+
+
+def _show(result: TopResult, *, whole: bool) -> None:
+    """``whole``: everything about the one file; of many only what changed, for the summary says the rest."""
+    from silo.batch_report import is_news
+    from silo.bom_sync import Status
     from silo.cli import show
 
     out = show.console()
     if result.error is not None:
         out.print(f"✗ {show.plain(result.top)}: {show.plain(str(result.error))}", style="red", markup=False)
         return
-    if result.skipped:
-        out.print(f"· {show.plain(result.top)}: {result.skipped}", style="dim", markup=False)
-        return
-    assert result.whole is not None  # neither an error nor skipped
     for outcome in result.outcomes:
+        if not whole and not is_news(outcome):
+            continue
         out.print(show.outcome_text(outcome))
-        if outcome.plan is not None and outcome.status is not Status.UNCHANGED:
+        if outcome.plan is not None and outcome.status in (Status.MERGED, Status.DRY_RUN):
             out.print(show.diff_table(outcome.plan.diff, outcome.names))
-    if result.whole.findings:
-        out.print(show.findings_text(result.whole.findings, result.base))
+    if whole and result.findings:
+        out.print(show.findings_text(result.findings, result.base))
+
+
+def _show_summary(summary: Summary) -> None:
+    from silo.cli import show
+
+    out = show.console()
+    sections: list[tuple[str, str, Sequence[str]]] = [
+        ("Moved", "cyan", [f"{name}: {old} → {new}" for name, old, new in summary.moved]),
+        ("Without a part number (silo-mod register)", "yellow", list(summary.unregistered.values())),
+        ("Warnings", "yellow", list(summary.warnings)),
+        ("Errors", "bold red", list(summary.errors)),
+    ]
+    for title, style, lines in sections:
+        if lines:
+            out.print(f"\n{title}", style=style)
+        for line in lines:
+            out.print(f"  {show.plain(line)}", markup=False)
+    for note in summary.notes:
+        out.print(show.plain(note), style="yellow", markup=False)
+    out.print(f"\n{summary.sentence()}", markup=False)
+
+
+def moved(before: dict[str, set[str]], now: set[tuple[str, str]], base: str) -> list[tuple[str, str, str]]:
+    """Files that carry on the identity of one that is gone: (name, before, now)."""
+    from silo.bom.report import relative
+
+    here: dict[str, set[str]] = {}
+    for uuid, path in now:
+        here.setdefault(uuid, set()).add(path)
+    found = []
+    for uuid, paths in sorted(before.items()):
+        gone = {path for path in paths - here.get(uuid, set()) if not os.path.lexists(path)}
+        new = here.get(uuid, set()) - paths
+        if len(gone) == len(new) == 1:
+            (old_path,), (new_path,) = gone, new
+            name = os.path.splitext(os.path.basename(new_path))[0]
+            found.append((name, relative(old_path, base), relative(new_path, base)))
+    return found

@@ -6,7 +6,7 @@ from __future__ import annotations
 import os
 import time
 from collections import OrderedDict
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -55,11 +55,20 @@ class Contents:
 
     instead
         real path → a file that is read in its place, such as another revision of it.
+    clock
+        nanoseconds.
     """
 
-    def __init__(self, limits: Limits | None = None, *, instead: Mapping[str, str] | None = None) -> None:
+    def __init__(
+        self,
+        limits: Limits | None = None,
+        *,
+        instead: Mapping[str, str] | None = None,
+        clock: Callable[[], int] = time.time_ns,
+    ) -> None:
         self.limits = limits or Limits()
         self._instead = dict(instead or {})
+        self._clock = clock
         self.shared = Shared(self.limits.resident)
         self.reads = 0
         self._known: OrderedDict[str, Content] = OrderedDict()
@@ -70,8 +79,8 @@ class Contents:
         if (known := self._known.get(path)) is not None:
             self._known.move_to_end(path)
             return known
-        self.reads += 1
         found = self._read(path)
+        self.reads += 1
         self._known[path] = found
         self._size += found.size
         while self._size > self.limits.resident and len(self._known) > 1:
@@ -80,7 +89,7 @@ class Contents:
         return found
 
     def _read(self, path: str) -> Content:
-        read_ns = time.time_ns()
+        read_ns = self._clock()
         with ContainerFile(self._instead.get(path, path), self.limits) as container:
             entry = container.entry(DOCUMENT_XML)
             if entry is None:
@@ -139,6 +148,8 @@ class Library:
         """The document in a file, read to its end and checked. Raises DocumentError."""
         opened = os.path.abspath(path)
         real = self._locator.real(opened)
+        if opened != real:  # a symlink may lead elsewhere tomorrow
+            self.lookups[(os.path.dirname(opened),), os.path.basename(opened)] = Found(opened, real)
         if not self._locator.inside(real):
             raise FcstdError(
                 real,

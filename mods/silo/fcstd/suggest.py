@@ -65,7 +65,8 @@ def _told(finding: Finding, meant: Mapping[str, tuple[str, str]], extraction: Ex
     if finding.code not in _CODES or finding.file not in meant:
         return finding
     file, why = meant[finding.file]
-    top = os.path.basename(extraction.assembly.doc_path)
+    holder = finding.where[0].doc_path if finding.where else extraction.assembly.doc_path
+    top = os.path.basename(holder)
     message = (
         f"{finding.message.partition(_DID_YOU_MEAN)[0]}{_DID_YOU_MEAN} {file} ({why})? "
         f"`silo-mod relink {top} --from {finding.file} --to {file}` mends the links."

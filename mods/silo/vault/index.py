@@ -101,6 +101,15 @@ class Seen(NamedTuple):
             content.read_ns,
         )
 
+    @classmethod
+    def unread(cls, error: FcstdError) -> Seen | None:
+        """What could not be read: known by its state, so that any change of it counts. None without one."""
+        state = error.state
+        if not isinstance(state, FileState):
+            return None
+        content = f"!{state.inode}:{state.size}:{state.modified_ns}:{error.reason}"
+        return cls(content, state.inode, state.size, state.modified_ns, 0, 0)
+
     def still(self, status: os.stat_result) -> bool:
         """True where the file certainly is what it was then."""
         then = (self.inode, self.size, self.modified_ns, self.changed_ns)
@@ -134,8 +143,8 @@ class Known(NamedTuple):
         for path, document in library.documents.items():
             if not isinstance(document, FcstdError):
                 seen[path] = Seen.of(document.content)
-            elif isinstance(document.state, FileState):
-                seen[path] = Seen(_unread(document, document.state), 0, 0, 0, 0, 0)
+            elif (unread := Seen.unread(document)) is not None:
+                seen[path] = unread
             else:
                 lasting = False
         led: dict[tuple[str, ...], dict[str, str]] = {}
@@ -150,11 +159,6 @@ class Known(NamedTuple):
         files, lookups = json.loads(self.trail)
         found = (_target(to) for _, led in lookups for to in led.values())
         return frozenset(filter(None, found)) - {next(iter(files), "")}
-
-
-def _unread(error: FcstdError, state: FileState) -> str:
-    # Not the content, which could not be read, but the state; so any change of it counts.
-    return f"!{state.inode}:{state.size}:{state.modified_ns}:{error.reason}"
 
 
 def _led_to(found: Found | NotFound) -> str:
@@ -183,15 +187,19 @@ class Index:
 
     path
         the database, which several processes may use; None keeps nothing beyond this object's life.
+    contents
+        reads the files whose state says too little.
     given
         the user named this path: a file that is no index of ours is not touched (InputError).
     """
 
-    def __init__(self, path: Path | None = None, *, given: bool = False) -> None:
+    def __init__(
+        self, path: Path | None = None, *, given: bool = False, contents: Contents | None = None
+    ) -> None:
         self.path = path
         self.trouble = ""
-        self.contents = Contents()
-        self._now: dict[str, str | None] = {}
+        self.contents = contents or Contents()
+        self._now: dict[str, Seen | None] = {}
         self._led: dict[tuple[tuple[str, ...], str], str] = {}
         self._locator = Locator()
         self._unsaved: dict[tuple[str, str], Known] = {}
@@ -247,40 +255,52 @@ class Index:
         if not known.lasting:
             return
         for file, seen in known.seen.items():
-            if self._now.get(file) != seen.content:
-                self._now[file] = seen.content
-                self._files[file] = seen
+            before = self._now.get(file)
+            if before is None or before.content != seen.content:
+                self._now[file] = seen
+                if not seen.content.startswith("!"):
+                    self._files[file] = seen
         self._unsaved[path, question] = Known(known.answer, known.trail)
         if len(self._unsaved) >= _SAVED_EACH:
             self.save()
 
     def content(self, path: str) -> str | None:
         """What a file holds now, as the trails name it; None where nobody can say."""
-        if path in self._now:
-            return self._now[path]
-        self._now[path] = content = self._content(path)
-        return content
+        if path not in self._now:
+            self._now[path] = self._look(path)
+        seen = self._now[path]
+        return seen.content if seen is not None else None
 
-    def _content(self, path: str) -> str | None:
+    def _look(self, path: str) -> Seen | None:
         try:
             status = os.stat(path)
         except (OSError, ValueError):
             return None
         known = self._known_file(path)
         if known is not None and known.still(status):
-            return known.content
+            return known
         try:
             seen = Seen.of(self.contents.read(path))
         except FcstdError as error:
-            return _unread(error, error.state) if isinstance(error.state, FileState) else None
+            return Seen.unread(error)
         self._files[path] = seen
-        return seen.content
+        return seen
 
     def _leads(self, folders: tuple[str, ...], recorded: str) -> str:
         key = (folders, recorded)
         if (known := self._led.get(key)) is None:
             known = self._led[key] = _led_to(self._locator.find(recorded, folders))
         return known
+
+    def untouched(self, path: str) -> bool:
+        """True where a file is still in the state in which this run found it. From any thread."""
+        seen = self._now.get(path)
+        try:
+            status = os.stat(path)
+        except OSError:
+            return False
+        now = (status.st_ino, status.st_size, status.st_mtime_ns)
+        return seen is not None and now == (seen.inode, seen.size, seen.modified_ns)
 
     # --- where items were -------------------------------------------------------------------------------
 

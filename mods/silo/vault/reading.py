@@ -48,6 +48,8 @@ class Question:
 
     assembly
         name or label of the one meant, where the file holds several; None for the likeliest.
+    name_only
+        ``assembly`` is the internal name of any object that may hold components.
     below
         the whole tree, or the one assembly alone (:func:`silo.bom.links.extract`).
     """
@@ -56,12 +58,18 @@ class Question:
     assembly: str | None = None
     hardware: bool = True
     below: bool = False
+    name_only: bool = False
+
+    def __post_init__(self) -> None:
+        # Another process, and another day, have other current folders.
+        object.__setattr__(self, "path", os.path.abspath(self.path))
 
     @property
     def name(self) -> str:
         """For the index."""
         words = ("bom" if self.below else "level") + ("" if self.hardware else " without hardware")
-        return f"{engine()} {words} {self.assembly if self.assembly is not None else '-'}"
+        mark = "#" if self.name_only else "="
+        return f"{engine()} {words} {'' if self.assembly is None else mark + self.assembly}"
 
 
 @dataclass(frozen=True)
@@ -103,7 +111,8 @@ class Session:
         plain: dict[str, Any]
         try:
             document = library.open(question.path)
-            top = choose_assembly(document, question.assembly)
+            top = document.getObject(question.assembly or "") if question.name_only else None
+            top = choose_assembly(document, question.assembly) if top is None else top
             found = extract(top, hardware=question.hardware, below=question.below)
             told = respelt_findings(library.notes, document.FileName)
             plain = to_plain(replace(found, findings=(*found.findings, *told)))

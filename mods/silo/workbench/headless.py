@@ -19,9 +19,8 @@ from __future__ import annotations
 import json
 import os
 import sys
-import time
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -171,7 +170,8 @@ def _sync(job: Job) -> int:
         client = _client()
     except ImportError as error:
         return _without_server(job, error)
-    from silo.batch import Options, TopResult, exit_code, stopped_by, sync_top
+    from silo.batch import Options, TopResult, stopped_by, sync_top
+    from silo.batch_report import Json, Markdown, Report, Summary
     from silo.workbench.freecad import host
 
     tops = documents_in(job.tops)
@@ -181,19 +181,31 @@ def _sync(job: Job) -> int:
         dry_run=job.dry_run,
         skip_parts=any(os.path.isdir(top) for top in job.tops),
     )
-    reports = Reports(job)
+    summary = Summary()
+    reports = [Report(job.json, Json())] if job.json is not None else []
+    reports += [Report(job.report, Markdown())] if job.report is not None else []
+
+    def take(result: TopResult) -> None:
+        summary.add(result)
+        for report in reports:
+            report.add(result)
+
     with client:
         for number, (top, found) in enumerate(_each(tops, job), start=1):
-            reports.add(sync_top(top, found, client, options))
-            host.message(f"Silo: [{number}/{len(tops)}] {_in_words(reports.results[-1])}")
-            if (stopped := stopped_by(reports.results[-1], client)) is not None:
+            result = sync_top(top, found, client, options)
+            take(result)
+            host.message(f"Silo: [{number}/{len(tops)}] {_in_words(result)}")
+            if (stopped := stopped_by(result, client)) is not None:
                 for left in tops[number:]:
-                    reports.results.append(TopResult(left, error=stopped))
+                    take(TopResult(left, error=stopped))
                 if tops[number:]:
                     host.message(f"Silo: {len(tops) - number} more not tried: {stopped}")
                 break
-    reports.write()
-    return exit_code(reports.results)
+    for report in reports:
+        report.close(summary)
+        if report.trouble:
+            host.error(f"Silo: {report.trouble}")
+    return summary.exit_code or (UNDONE if any(report.trouble for report in reports) else OK)
 
 
 def _each(tops: list[str], job: Job) -> Iterator[tuple[str, Extraction | SiloError]]:
@@ -213,35 +225,6 @@ def _each(tops: list[str], job: Job) -> Iterator[tuple[str, Extraction | SiloErr
             yield top, result
     except ConfigError:
         yield from _extractions(tops[done:], job)
-
-
-@dataclass
-class Reports:
-    """The reports of a run, written while it goes: what is done is in them, whatever comes after."""
-
-    job: Job
-    results: list[TopResult] = field(default_factory=list)
-    _next: float = 0.0
-
-    def add(self, result: TopResult) -> None:
-        """One more file is done."""
-        self.results.append(result)
-        begin = time.monotonic()
-        if begin >= self._next:
-            self.write()
-            # A long run has long reports: they take a tenth of its time at most.
-            took = time.monotonic() - begin
-            self._next = begin + 10 * took
-
-    def write(self) -> None:
-        """All that is done so far."""
-        from silo.batch import result_json
-        from silo.batch_report import markdown
-
-        if self.job.json is not None:
-            _write_json(self.job.json, {"results": [result_json(result) for result in self.results]})
-        if self.job.report is not None:
-            _write_text(self.job.report, markdown(self.results))
 
 
 def _client() -> Any:

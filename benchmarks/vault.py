@@ -1,0 +1,355 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""A vault in a night: reading, the index, processes, requests, kills; all ratios in one run.
+
+    python benchmarks/vault.py [--documents 2000] [--kills 50] [--dask] [--keep FOLDER]
+
+Data: a generated vault, four parts in five, the rest assemblies in five levels that share parts and
+sub-assemblies. A part is a body with 60 features, some 90 kB of XML: the median of real files.
+
+null        unpack every Document.xml with zipfile, let expat parse it without a handler; one process
+first       the plan of the whole vault with an empty index
+second      the same again, nothing changed;  five: after five files were changed
+requests    what one sync of the vault asks of a server on loopback, first and second time
+kills       the same sync, killed with SIGKILL at random moments until it has ended, against a server;
+            then every BOM, every revision count and the history against those of an undisturbed sync
+
+Times are processor times of the process and its workers, which other work on the machine disturbs least;
+``wall`` is the clock's.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT / "mods"), str(ROOT / "tests" / "support")]
+
+from fcstd_writer import Doc, Raw, XLink, locals_  # noqa: E402
+
+LEVELS = (0.6, 0.25, 0.1, 0.04, 0.01)
+
+NULL = """
+import json, os, sys, time, zipfile
+from xml.parsers import expat
+begin, size, count = time.process_time(), 0, 0
+for folder, _, names in os.walk(sys.argv[1]):
+    for name in names:
+        with zipfile.ZipFile(os.path.join(folder, name)) as container:
+            text = container.read("Document.xml")
+        expat.ParserCreate().Parse(text, True)
+        size, count = size + len(text), count + 1
+print(json.dumps({"cpu": time.process_time() - begin, "bytes": size, "documents": count}))
+"""
+
+PLAN = """
+import hashlib, json, os, resource, sys, time
+sys.path.insert(0, sys.argv[5])
+from pathlib import Path
+from silo.files import documents_in
+from silo.vault.index import Index
+from silo.vault.plan import make_plan
+from silo.vault.reading import Question, Reading, pool_of
+
+def main():
+    folder, index, jobs, dask = sys.argv[1], sys.argv[2], int(sys.argv[3]), sys.argv[4] or None
+    wall, cpu = time.perf_counter(), time.process_time()
+    tops = documents_in([folder])
+    with Index(Path(index)) as memory, pool_of(jobs, dask) as pool:
+        memory.expect(os.path.realpath(folder))
+        reading = Reading(memory, pool)
+        plan = make_plan(tops, reading)
+        memory.save()
+        reads = reading.reads
+        done = [time.perf_counter() - wall, time.process_time() - cpu]
+        rows = hashlib.sha256()
+        for layer in plan.layers:
+            for node in layer:
+                rows.update(repr(plan.extraction(node, reading)).encode())
+    workers = resource.getrusage(resource.RUSAGE_CHILDREN)
+    own = resource.getrusage(resource.RUSAGE_SELF)
+    print(json.dumps({
+        "wall": done[0], "cpu": done[1] + workers.ru_utime + workers.ru_stime, "parent": done[1],
+        "reads": reads, "assemblies": len(plan.nodes), "errors": len(plan.errors), "rss_mb": own.ru_maxrss / 1024,
+        "workers_mb": workers.ru_maxrss / 1024, "digest": rows.hexdigest(),
+    }))
+
+if __name__ == "__main__":
+    main()
+"""
+
+
+def uuid_of(kind: int, number: int) -> str:
+    """An identity."""
+    return f"00000000-0000-4000-{kind:04x}-{number:012d}"
+
+
+def build(folder: Path, documents: int, features: int = 60) -> None:
+    """Write the vault."""
+    chance = random.Random(1)
+    parts = documents * 4 // 5
+    place = Raw(
+        "App::PropertyPlacement", '<PropertyPlacement Px="0.0000000000000000" Py="0.0" Pz="0.0" Q3="1.0"/>'
+    )
+    names = [f"Box{number}" for number in range(features)]
+    for number in range(parts):
+        doc = Doc(f"part{number}")
+        for name in names:
+            doc.add(
+                "PartDesign::AdditiveBox", name, Length=10.0 + number, Width=3.0, Placement=place, Refine=True
+            )
+        doc.add("PartDesign::Body", "Body", Group=locals_(*names), SiloItemId=uuid_of(0x8000, number))
+        doc.save(folder / f"parts/{number // 500:03d}/part{number:06d}.FCStd")
+    below: list[str] = []
+    count = 0
+    for level, share in enumerate(LEVELS):
+        here = []
+        for _ in range(max(1, int((documents - parts) * share))):
+            doc = Doc(f"asm{count}")
+            used = [chance.randrange(parts) for _ in range(8)]
+            links = [(f"../../parts/{n // 500:03d}/part{n:06d}.FCStd", "Body") for n in dict.fromkeys(used)]
+            links += [(path, "Assembly") for path in chance.sample(below, min(4, len(below)))]
+            for number, (path, name) in enumerate(links):
+                doc.add("App::Link", f"L{number}", LinkedObject=XLink(path, name))
+            members = locals_(*(f"L{number}" for number in range(len(links))))
+            doc.add("Assembly::AssemblyObject", "Assembly", Group=members, SiloItemId=uuid_of(0x9000, count))
+            name = f"{level}/asm{count:06d}.FCStd"
+            doc.save(folder / "asm" / name)
+            here.append(f"../{name}")
+            count += 1
+        below = here
+
+
+def child(code: str, *words: object) -> dict[str, Any]:
+    """One measurement in a fresh interpreter."""
+    with tempfile.NamedTemporaryFile("w", suffix=".py") as file:
+        file.write(code)
+        file.flush()
+        command = [sys.executable, file.name, *map(str, words)]
+        done = subprocess.run(command, check=True, capture_output=True, text=True)
+    data: dict[str, Any] = json.loads(done.stdout)
+    return data
+
+
+def plan(folder: Path, index: Path, jobs: int = 1, dask: str = "") -> dict[str, Any]:
+    """The plan of the vault."""
+    return child(PLAN, folder, index, jobs, dask, ROOT / "mods")
+
+
+def reading(folder: Path, scratch: Path, use_dask: bool) -> None:
+    """Must shows 1 and 2."""
+    null = child(NULL, folder)
+    count = null["documents"]
+    print(f"{count} documents, {null['bytes'] / count / 1000:.0f} kB of XML each; null {null['cpu']:.2f} s")
+    first = plan(folder, scratch / "one")
+    two = plan(folder, scratch / "two", 2)
+    time.sleep(3)  # files that were written just now are compared by content
+    child_settle = plan(folder, scratch / "one")
+    second = plan(folder, scratch / "one")
+    chosen = sorted(folder.rglob("*.FCStd"))[:: max(1, count // 5)][:5]
+    for path in chosen:
+        content = path.read_bytes()
+        path.write_bytes(content[:-2] + bytes([content[-2] ^ 1, content[-1]]))
+    five = plan(folder, scratch / "one")
+    runs = {"first": first, "jobs 2": two, "settled": child_settle, "second": second, "five": five}
+    for name, run in runs.items():
+        print(
+            f"{name:8} cpu {run['cpu']:7.2f} s  wall {run['wall']:7.2f} s  {run['cpu'] / count * 1e6:6.0f} µs each  "
+            f"reads {run['reads']:6}  parent {run['rss_mb']:.0f} MB  assemblies {run['assemblies']}"
+        )
+    print(f"first : null = {first['cpu'] / null['cpu']:.2f}")
+    print(
+        f"first : second = {first['cpu'] / second['cpu']:.1f},  first : five = {first['cpu'] / five['cpu']:.1f}"
+    )
+    print(
+        f"jobs 1 : jobs 2 = {first['wall'] / two['wall']:.2f} by the clock; same answers: {first['digest'] == two['digest']}"
+    )
+    if use_dask:
+        from dask.distributed import LocalCluster
+
+        with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+            run = plan(folder, scratch / "dask", 1, cluster.scheduler_address)
+        print(
+            f"dask: wall {run['wall']:.2f} s, same answers: {run['digest'] == five['digest'] or run['digest'] == first['digest']}"
+        )
+
+
+def serve(scratch: Path, documents: int) -> tuple[Any, Any]:
+    """A server with an item for each document."""
+    from silo_server.run import running_server
+
+    scratch.mkdir(parents=True)
+    context = running_server(f"sqlite:///{scratch / 'silo.db'}", token="silo_" + "b" * 40)
+    server = context.__enter__()
+    from silo.api.client import SiloClient
+
+    parts = documents * 4 // 5
+    assemblies = sum(max(1, int((documents - parts) * share)) for share in LEVELS)
+    with SiloClient(server.base_url, server.token) as client:
+        for kind, number, category in [
+            *((0x8000, n, "M01") for n in range(parts)),
+            *((0x9000, n, "A01") for n in range(assemblies)),
+        ]:
+            client.create_item(
+                "kindred-rd",
+                category,
+                f"{kind:x} {number}",
+                item_type="assembly" if kind == 0x9000 else "part",
+                idempotency_key=uuid_of(kind, number),
+            )
+    return context, server
+
+
+def sync_command(folder: Path, index: Path, report: Path, jobs: int = 1) -> list[str]:
+    """The job as a user starts it."""
+    words = ["sync", folder, "--index", index, "--report", report, "--jobs", jobs]
+    return [sys.executable, "-m", "silo.cli.main", *map(str, words)]
+
+
+def environment(server: Any, home: Path) -> dict[str, str]:
+    """Of the job: this server, and folders of its own."""
+    return {
+        **os.environ,
+        "PYTHONPATH": str(ROOT / "mods"),
+        "SILO_HOME": str(home),
+        "SILO_API_URL": server.base_url,
+        "SILO_API_TOKEN": server.token,
+    }
+
+
+def state(server: Any) -> dict[str, Any]:
+    """Every BOM, and how often each was changed."""
+    from silo.api.client import SiloClient
+
+    with SiloClient(server.base_url, server.token) as client:
+        names, offset = {}, 0
+        while page := client.search_items(limit=500, offset=offset):
+            names.update({item.part_number: item.id for item in page})
+            offset += len(page)
+        boms = client.get_boms([number for number in names])
+        versions = {names[n]: client.get_bom_version(n) for n, lines in boms.items() if lines}
+        return {
+            "boms": {
+                names[number]: sorted((names[line.child_part_number], line.quantity) for line in lines)
+                for number, lines in boms.items()
+                if lines
+            },
+            "versions": versions,
+        }
+
+
+def kills(folder: Path, scratch: Path, documents: int, count: int, seed: int) -> None:
+    """Must shows 3 and 4."""
+    chance = random.Random(seed)
+    calm, server = serve(scratch / "calm", documents)
+    env = environment(server, scratch / "calm-home")
+    begin = time.perf_counter()
+    counted = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            COUNTED,
+            *sync_command(folder, scratch / "calm.idx", scratch / "calm.json")[3:],
+        ],
+        env=env,
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    whole = time.perf_counter() - begin
+    again = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            COUNTED,
+            *sync_command(folder, scratch / "calm.idx", scratch / "calm.json")[3:],
+        ],
+        env=env,
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    print(f"requests, first: {counted.stderr.splitlines()[-1]}; second: {again.stderr.splitlines()[-1]}")
+    wanted = state(server)
+    calm.__exit__(None, None, None)
+
+    wild, server = serve(scratch / "wild", documents)
+    env = environment(server, scratch / "wild-home")
+    killed = ended = 0
+    while killed < count:
+        command = sync_command(folder, scratch / "wild.idx", scratch / "wild.json", 2)
+        process = subprocess.Popen(command, env=env, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        try:
+            process.wait(chance.uniform(0.3, max(1.0, whole * 0.8)))
+            ended += 1
+            # All was done: forget the index, so that the next one has something to do.
+            for path in scratch.glob("wild.idx*"):
+                path.unlink()
+        except subprocess.TimeoutExpired:
+            process.send_signal(signal.SIGKILL)
+            process.wait()
+            killed += 1
+    last = subprocess.run(
+        sync_command(folder, scratch / "wild.idx", scratch / "wild.json", 2), env=env, capture_output=True
+    )
+    found = state(server)
+    wild.__exit__(None, None, None)
+    print(
+        f"{killed} kills, {ended} runs that ended, last exit code {last.returncode}; "
+        f"BOMs equal: {found['boms'] == wanted['boms']} ({len(wanted['boms'])}), "
+        f"BOM versions equal: {found['versions'] == wanted['versions']}"
+    )
+
+
+COUNTED = """
+import collections, sys
+from silo.api import transport
+count = collections.Counter()
+inner = transport.Transport._attempt
+def attempt(self, call):
+    count["merges" if call.url.endswith("/merge") else "questions"] += 1
+    return inner(self, call)
+transport.Transport._attempt = attempt
+from silo.cli.main import main
+if __name__ == "__main__":
+    code = main(sys.argv[1:])
+    print(dict(count), file=sys.stderr)
+    sys.exit(code)
+"""
+
+
+def main() -> None:
+    """Measure, and print."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--documents", type=int, default=2000)
+    parser.add_argument("--kills", type=int, default=0)
+    parser.add_argument("--kill-documents", type=int, default=300)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--dask", action="store_true")
+    args = parser.parse_args()
+    scratch = Path(tempfile.mkdtemp(prefix="silo-vault-"))
+    try:
+        if args.documents:
+            build(scratch / "vault", args.documents)
+            reading(scratch / "vault", scratch, args.dask)
+        if args.kills:
+            build(scratch / "small", args.kill_documents, features=5)
+            kills(scratch / "small", scratch / "servers", args.kill_documents, args.kills, args.seed)
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
+
+
+if __name__ == "__main__":
+    main()

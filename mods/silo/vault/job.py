@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""A plan carried out: look everything up at once, compare, and merge what is news, children before parents.
+
+Requests depend on the number of identities and of changes, not on that of assemblies: identities and BOMs are
+asked for by the thousand. Assemblies that do not depend on each other are merged side by side. Whatever ends
+the job, the next one continues: what was merged agrees then, and is not sent again.
+"""
+
+from __future__ import annotations
+
+import os
+import uuid
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import islice
+from typing import Any
+
+from silo.api.policy import ends_run
+from silo.api.wire import SourceDocument
+from silo.batch import Options, TopResult, source_document
+from silo.bom.errors import DocumentError, SiloError
+from silo.bom.findings import FindingCode
+from silo.bom.resolve import Known
+from silo.bom_sync import (
+    Outcome,
+    Resolved,
+    Status,
+    SyncApi,
+    known_items,
+    plain_lines,
+    resolve_known,
+    sync,
+)
+from silo.vault.plan import Node, Plan
+from silo.vault.reading import Reading
+
+_AT_ONCE = 500  # assemblies whose BOMs are in memory at one time
+_SENDERS = 4
+Lines = Mapping[str, Sequence[Mapping[str, Any]]]
+_KEPT = ("id", "part_number", "name", "description", "last_sync")
+
+
+@dataclass
+class Job:
+    """One run of a plan.
+
+    base
+        the folder that paths in the results are relative to; "" for that of each file.
+    senders
+        merges that are under way at one time.
+    """
+
+    plan: Plan
+    reading: Reading
+    api: SyncApi
+    options: Options
+    base: str
+    senders: int = _SENDERS
+
+    def __post_init__(self) -> None:
+        self.stopped: SiloError | None = None
+
+    def results(self) -> Iterator[TopResult]:
+        """The result of each file, as soon as it is known; files that could not be read first."""
+        for top, error in self.plan.errors.items():
+            yield TopResult(top, self._base(top), error=error)
+        try:
+            known = self._known()
+        except SiloError as error:
+            self.stopped = error
+            for top in dict.fromkeys(node.top for node in self.plan.nodes.values()):
+                yield TopResult(top, self._base(top), error=error)
+            return
+        left = Counter(node.top for node in self.plan.nodes.values())
+        done: dict[str, list[Outcome]] = {}
+        for layer in self.plan.layers:
+            for nodes in _pieces(layer, _AT_ONCE):
+                for node, outcome in zip(nodes, self._outcomes(nodes, known), strict=True):
+                    done.setdefault(node.top, []).append(outcome)
+                    left[node.top] -= 1
+                    if not left[node.top]:
+                        yield TopResult(node.top, self._base(node.top), outcomes=tuple(done.pop(node.top)))
+
+    def _base(self, top: str) -> str:
+        return self.base or os.path.dirname(os.path.realpath(top))
+
+    def _known(self) -> Known:
+        """What the server knows of everything in the plan, as far as it is needed."""
+        found = known_items(self.plan.uuids, self.plan.standards.values(), self.api)
+        return {
+            key: {name: item.get(name) for name in _KEPT} for key, item in found.items() if item is not None
+        }
+
+    def _outcomes(self, nodes: Sequence[Node], known: Known) -> list[Outcome]:
+        """Of assemblies that do not depend on each other."""
+        several = [resolve_known(self.plan.extraction(node, self.reading), known) for node in nodes]
+        numbers = [one.assembly.part_number for one in several]
+        lines = self._lines([number for number in numbers if number is not None])
+        # Copies of one file are one item: one after the other, so that the second finds no news.
+        twice = {number for number, count in Counter(numbers).items() if number is not None and count > 1}
+        with ThreadPoolExecutor(self.senders, "silo-merge") as pool:
+            asked = [
+                pool.submit(self._sync, one, lines) if one.assembly.part_number not in twice else None
+                for one in several
+            ]
+            return [
+                future.result() if future is not None else self._sync(one, {})
+                for one, future in zip(several, asked, strict=True)
+            ]
+
+    def _lines(self, numbers: Sequence[str]) -> Lines:
+        many = getattr(self.api, "get_boms", None)
+        if self.stopped is not None or many is None or not numbers:
+            return {}
+        try:
+            return {number: plain_lines(found) for number, found in many(numbers).items()}
+        except SiloError as error:
+            self._stop_for(error)
+            return {}
+
+    def _sync(self, one: Resolved, lines: Lines) -> Outcome:
+        if self.stopped is not None:
+            return Outcome(Status.FAILED, one, error=self.stopped)
+        try:
+            outcome = sync(
+                one,
+                self.api,
+                sync_id=str(uuid.uuid4()),
+                allow_missing=self.options.allow_missing and not _endless(one),
+                dry_run=self.options.dry_run,
+                describe=lambda: self._source(one),
+                lines=lines.get(one.assembly.part_number or ""),
+            )
+        except SiloError as error:
+            outcome = Outcome(Status.FAILED, one, error=error)
+        if outcome.error is not None:
+            self._stop_for(outcome.error)
+        return outcome
+
+    def _source(self, one: Resolved) -> SourceDocument:
+        """The file of a BOM that is about to be sent; it must still be the one that was read."""
+        if not self.reading.index.untouched(one.assembly.doc_path):
+            raise DocumentError(
+                one.assembly.doc_path, "it was changed while the job ran; the next run takes it"
+            )
+        return source_document(one.assembly)
+
+    def _stop_for(self, error: SiloError) -> None:
+        """What concerns every request ends the job; the others have it as their error."""
+        if self.stopped is None and ends_run(error, self.api):
+            self.stopped = error
+
+
+def _endless(one: Resolved) -> bool:
+    """Nobody can allow an assembly that contains itself."""
+    return any(finding.code in (FindingCode.CYCLE, FindingCode.TOO_DEEP) for finding in one.findings)
+
+
+def _pieces(nodes: Iterable[Node], size: int) -> Iterator[list[Node]]:
+    left = iter(nodes)
+    while piece := list(islice(left, size)):
+        yield piece

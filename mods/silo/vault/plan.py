@@ -1,0 +1,328 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""One plan for many files: which assemblies there are, each once, and in which order they are synced.
+
+Every file is asked for its assembly, then for the sub-assemblies that others use and nobody has asked for.
+The plan keeps how the assemblies hang together, not what they hold; that is asked for again, from the index,
+when an assembly's turn comes. So memory grows with the number of files, and little.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from hashlib import blake2b
+from typing import Any
+
+from silo.bom.errors import SiloError
+from silo.bom.findings import Finding, FindingCode, Place, Severity
+from silo.bom.links import MAX_LEVELS
+from silo.bom.model import BomEntry, Extraction
+from silo.bom.walk.rings import Rings
+from silo.bom.walk.standard import standard_uuid
+from silo.fcstd.suggest import with_suggestions
+from silo.vault.reading import Answer, Question, Reading
+
+Key = tuple[str, str]
+
+
+@dataclass(slots=True)
+class Node:
+    """One assembly of the plan.
+
+    top
+        the file, as the caller named it, whose result it is part of.
+    below
+        its sub-assemblies.
+    content
+        a digest of its lines by identity: two copies of one file have the same.
+    broken
+        it misses files.
+    """
+
+    key: Key
+    top: str
+    question: Question
+    uuid: str | None
+    below: list[Key]
+    content: bytes
+    is_assembly: bool
+    broken: bool
+
+
+@dataclass
+class Plan:
+    """What is to be synced.
+
+    layers
+        children before parents; those of one layer do not depend on each other.
+    errors
+        file → why it could not be read.
+    parts
+        how many files hold no components of others.
+    uuids, standards
+        all that is to be looked up: identities, and the standard parts by theirs.
+    places
+        (identity, file) of every component.
+    findings, shared
+        what only the whole plan shows: of one assembly, and of none.
+    """
+
+    tops: list[str] = field(default_factory=list)
+    nodes: dict[Key, Node] = field(default_factory=dict)
+    layers: list[list[Node]] = field(default_factory=list)
+    errors: dict[str, SiloError] = field(default_factory=dict)
+    parts: int = 0
+    uuids: dict[str, None] = field(default_factory=dict)
+    standards: dict[str, BomEntry] = field(default_factory=dict)
+    places: set[tuple[str, str]] = field(default_factory=set)
+    findings: dict[Key, list[Finding]] = field(default_factory=dict)
+    shared: list[Finding] = field(default_factory=list)
+    _assemblies: dict[Key, bool] = field(default_factory=dict)
+    _meant: dict[str, Finding] = field(default_factory=dict)
+    _files: dict[str, str] = field(default_factory=dict)
+
+    def extraction(self, node: Node, reading: Reading) -> Extraction:
+        """What an assembly holds, with all that the whole plan knows of it. Raises SiloError."""
+        found = reading.ask(node.question).found
+        if isinstance(found, SiloError):
+            raise found
+        entries = tuple(
+            replace(entry, is_assembly=self._assemblies.get(entry.key, entry.is_assembly))
+            for entry in found.entries
+        )
+        told = dict.fromkeys(self._meant.get(finding.message, finding) for finding in found.findings)
+        for key in (node.key, *(entry.key for entry in entries)):
+            told.update(dict.fromkeys(self.findings.get(key, ())))
+        return replace(found, entries=entries, findings=tuple(told))
+
+
+def make_plan(
+    tops: Sequence[str],
+    reading: Reading,
+    *,
+    assembly: str | None = None,
+    hardware: bool = True,
+    recursive: bool = True,
+    skip_parts: bool = True,
+    progress: Callable[[str], None] = lambda _top: None,
+) -> Plan:
+    """Read all files and put their assemblies in order.
+
+    recursive
+        with the sub-assemblies, also where no file of ``tops`` has them.
+    skip_parts
+        files without components of other files, and unregistered libraries of parts, are left alone.
+    """
+    plan = Plan(list(tops))
+    wanted: dict[Key, str] = {}
+    asked_for = _announced(tops, progress)
+    answers = reading.ask_many(Question(top, assembly, hardware) for top in asked_for)
+    for top, answer in zip(tops, answers, strict=True):
+        if isinstance(error := _error(answer), SiloError):
+            plan.errors[top] = error
+            continue
+        node = _node(answer, top)
+        plan._files.setdefault(node.key[0], top)
+        if skip_parts and _is_part(answer.plain):
+            plan.parts += 1
+            plan._assemblies.setdefault(node.key, node.is_assembly)
+        else:
+            _add(plan, node, answer, wanted)
+    while recursive and (asked := {key: top for key, top in wanted.items() if key not in plan._assemblies}):
+        wanted.clear()
+        questions = [Question(path, name, hardware, name_only=True) for path, name in asked]
+        for (key, top), answer in zip(asked.items(), reading.ask_many(questions), strict=True):
+            plan._assemblies[key] = False
+            if _error(answer) is None and (node := _node(answer, top)).is_assembly:
+                _add(plan, node, answer, wanted)
+                plan._assemblies[key] = True  # the name that the link has for it
+    _add_used_parts(plan, reading, hardware, recursive)
+    for node in plan.nodes.values():
+        node.below = [key for key in dict.fromkeys(node.below) if key in plan.nodes]
+    _put_in_order(plan)
+    _find_copies(plan)
+    _find_meant(plan, reading)
+    return plan
+
+
+def _announced(tops: Iterable[str], progress: Callable[[str], None]) -> Iterator[str]:
+    for top in tops:
+        progress(top)
+        yield top
+
+
+def _error(answer: Answer) -> SiloError | None:
+    if "table" in answer.plain:
+        return None
+    found = answer.found
+    assert isinstance(found, SiloError)  # the only other thing that an answer may be
+    return found
+
+
+def _rows(plain: Mapping[str, Any]) -> tuple[Mapping[str, Any], list[Mapping[str, Any]]]:
+    table = plain["table"]
+    return table[plain["assembly"]], [table[number] for number in plain["entries"]]
+
+
+def _is_part(plain: Mapping[str, Any]) -> bool:
+    """No assembly: nothing in it, or an unregistered file of screws or parts for others to link."""
+    head, entries = _rows(plain)
+    if any(finding["severity"] == Severity.ERROR for finding in plain["findings"]):
+        return False
+    own = all(entry["doc_path"] == head["doc_path"] for entry in entries)
+    return not entries or (own and head["silo_uuid"] is None)
+
+
+def _is_article(row: Mapping[str, Any]) -> bool:
+    standard = row["standard"]
+    return standard is not None and row["silo_uuid"] == standard_uuid(standard)
+
+
+def _node(answer: Answer, top: str) -> Node:
+    head, entries = _rows(answer.plain)
+    content = sorted(
+        (str(e["silo_uuid"] or (e["doc_path"], e["object_name"])), e["quantity"]) for e in entries
+    )
+    return Node(
+        (head["doc_path"], head["object_name"]),
+        top,
+        answer.question,
+        head["silo_uuid"],
+        [(e["doc_path"], e["object_name"]) for e in entries if e["is_assembly"] and not e["missing"]],
+        blake2b(repr(content).encode("utf-8", "surrogateescape"), digest_size=8).digest(),
+        head["is_assembly"],
+        any(e["missing"] for e in entries),
+    )
+
+
+def _add(plan: Plan, node: Node, answer: Answer, wanted: dict[Key, str]) -> None:
+    plan.nodes.setdefault(node.key, node)
+    plan._assemblies[node.key] = True
+    head, entries = _rows(answer.plain)
+    for row in (head, *entries):
+        if (uuid := row["silo_uuid"]) is None:
+            continue
+        plan.uuids[uuid] = None
+        if _is_article(row):
+            plan.standards.setdefault(uuid, _entry(row))
+        elif not row["missing"]:
+            plan.places.add((uuid.lower(), row["doc_path"]))
+    for key in node.below:
+        wanted.setdefault(key, node.top)
+
+
+def _entry(row: Mapping[str, Any]) -> BomEntry:
+    names = ("doc_path", "silo_uuid", "object_name", "standard", "label")
+    return BomEntry(**{name: row[name] for name in names})
+
+
+def _add_used_parts(plan: Plan, reading: Reading, hardware: bool, recursive: bool) -> None:
+    """Named assemblies without components are left alone, except where another assembly uses them."""
+    if not recursive:
+        return
+    used = {key: node.top for node in plan.nodes.values() for key in node.below}
+    empty = {key: top for key, top in used.items() if key not in plan.nodes and plan._assemblies.get(key)}
+    questions = [Question(path, name, hardware, name_only=True) for path, name in empty]
+    for top, answer in zip(empty.values(), reading.ask_many(questions), strict=True):
+        if _error(answer) is None:
+            _add(plan, _node(answer, top), answer, {})
+
+
+# --- order ----------------------------------------------------------------------------------------------
+
+
+def _put_in_order(plan: Plan) -> None:
+    for node in plan.nodes.values():  # a file of its own has a result of its own
+        node.top = plan._files.get(node.key[0], node.top)
+    waits = {key: len(node.below) for key, node in plan.nodes.items()}
+    above: dict[Key, list[Key]] = {}
+    for key, node in plan.nodes.items():
+        for child in node.below:
+            above.setdefault(child, []).append(key)
+    layer = [key for key, count in waits.items() if not count]
+    while layer:
+        plan.layers.append([plan.nodes[key] for key in layer])
+        further = []
+        for key in layer:
+            del waits[key]
+            for parent in above.get(key, ()):
+                waits[parent] -= 1
+                if not waits[parent]:
+                    further.append(parent)
+        layer = further
+    if waits:
+        _report_rings(plan, list(waits))
+        plan.layers.append([plan.nodes[key] for key in waits])
+    for deep in plan.layers[MAX_LEVELS:]:
+        for node in deep:
+            message = f"The assembly is nested more than {MAX_LEVELS} levels deep, so it is not synced."
+            _tell(plan, node.key, FindingCode.TOO_DEEP, Severity.ERROR, message, [node.key])
+
+
+def _report_rings(plan: Plan, keys: Sequence[Key]) -> None:
+    """Assemblies that contain themselves, and those above them: nobody knows how many pieces that makes."""
+    rings = Rings({key: plan.nodes[key].below for key in plan.nodes})
+    for key in keys:
+        members = [key] if rings.same_ring(key, key) else [k for k in keys if rings.same_ring(k, k)]
+        ring = rings.example(members[0])
+        path = " → ".join(str(Place(*one)) for one in (*ring, ring[0]))
+        _tell(
+            plan, key, FindingCode.CYCLE, Severity.ERROR, f"An assembly contains itself: {path}", [*ring, key]
+        )
+
+
+def _find_copies(plan: Plan) -> None:
+    """Files that claim to be one item: fine where they hold the same, else no BOM of that item is right."""
+    users: dict[str, list[Node]] = {}
+    for node in plan.nodes.values():
+        if node.uuid:
+            users.setdefault(node.uuid.lower(), []).append(node)
+    for uuid, nodes in users.items():
+        if len({node.content for node in nodes}) > 1:
+            keys = [node.key for node in nodes]
+            files = ", ".join(sorted(str(Place(*key)) for key in keys))
+            message = (
+                f"{len(nodes)} assemblies carry the same Silo identity {uuid}: {files}. They hold different "
+                "components, so none of them is synced. Give the new one a number of its own."
+            )
+            for key in keys:
+                _tell(plan, key, FindingCode.COPIED_IDENTITY, Severity.ERROR, message, keys)
+    paths: dict[str, set[str]] = {}
+    for uuid, path in plan.places:
+        paths.setdefault(uuid, set()).add(path)
+    for uuid, several in paths.items():
+        if len(several) > 1 and uuid not in users:
+            files = ", ".join(sorted(several))
+            message = (
+                f"{len(several)} files carry the same Silo identity {uuid}: {files}. "
+                "Is it the same part, or is one of them a new part that needs its own number?"
+            )
+            plan.shared.append(
+                Finding(
+                    FindingCode.COPIED_IDENTITY, Severity.WARNING, message, tuple(map(Place, sorted(several)))
+                )
+            )
+
+
+def _tell(
+    plan: Plan, key: Key, code: FindingCode, severity: Severity, message: str, where: Iterable[Key]
+) -> None:
+    places = tuple(sorted({Place(*one) for one in where}))
+    plan.findings.setdefault(key, []).append(Finding(code, severity, message, places))
+
+
+def _find_meant(plan: Plan, reading: Reading) -> None:
+    """Which files were meant where some are missing; the project's files are read once for all of it."""
+    broken = [node for node in plan.nodes.values() if node.broken]
+    if not broken:
+        return
+    found = [
+        one for one in (reading.ask(node.question).found for node in broken) if isinstance(one, Extraction)
+    ]
+    heads = [replace(one.assembly, children=one.entries) for one in found]
+    findings = [finding for one in found for finding in one.findings]
+    used = [BomEntry(path) for path in sorted({path for _, path in plan.places})]
+    whole = Extraction(replace(heads[0], children=()), (*heads, *used), tuple(findings))
+    for before, after in zip(findings, with_suggestions(whole).findings, strict=True):
+        if after is not before:
+            plan._meant[before.message] = after

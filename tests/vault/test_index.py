@@ -1,0 +1,315 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The index never changes an answer: whatever happens to the files and to the index itself.
+
+The oracle is the same question asked of the files alone, by a session that knows nothing.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import sqlite3
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import mkdtemp
+from typing import Any
+
+import pytest
+from fcstd_writer import Doc, locals_, part
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
+
+from silo.bom.errors import InputError
+from silo.fcstd.library import Contents
+from silo.vault.index import Index
+from silo.vault.reading import Question, Reading, Session
+
+HOUR_NS = 3600 * 10**9
+NAMES = tuple(f"{folder}{name}.FCStd" for folder in ("", "sub/") for name in ("a", "b", "c", "d"))
+
+
+def later() -> int:
+    """A clock after every change: the state of each file counts as settled."""
+    return time.time_ns() + HOUR_NS
+
+
+def assembly(label: str, links: dict[str, int], uuid: str | None = None) -> Doc:
+    """An assembly that links these files so often."""
+    doc = Doc(label, meta={} if uuid is None else {"SiloUUID": uuid})
+    names = []
+    for number, (file, count) in enumerate(links.items()):
+        doc.link(
+            f"L{number}",
+            file,
+            "Box" if file.endswith(("a.FCStd", "b.FCStd")) else "Assembly",
+            ElementCount=count,
+        )
+        names.append(f"L{number}")
+    return doc.add("Assembly::AssemblyObject", "Assembly", Group=locals_(*names))
+
+
+def questions(folder: Path) -> list[Question]:
+    """Both kinds of question, of every file there may be."""
+    return [
+        Question(str(folder / name), below=below)
+        for name in (*NAMES, "link.FCStd")
+        for below in (True, False)
+    ]
+
+
+def truth(folder: Path) -> list[Any]:
+    """What the files say, asked one by one without any memory."""
+    return [json.loads(Session().ask(question).answer) for question in questions(folder)]
+
+
+def indexed(folder: Path, index: Path, contents: Contents | None = None) -> tuple[list[Any], int]:
+    """The same through the index; and how many files were read."""
+    with Index(index, contents=contents or Contents(clock=later)) as memory:
+        reading = Reading(memory)
+        return [answer.plain for answer in reading.ask_many(questions(folder))], reading.reads
+
+
+class Vault(RuleBasedStateMachine):
+    """Somebody works in the vault between two runs, and something happens to the index."""
+
+    @initialize()
+    def begin(self) -> None:
+        self.home = Path(mkdtemp(prefix="silo-index-"))
+        self.folder, self.index = self.home / "vault", self.home / "index.sqlite3"
+        (self.folder / "sub").mkdir(parents=True)
+
+    def teardown(self) -> None:
+        shutil.rmtree(self.home, ignore_errors=True)
+
+    def _write(self, name: str, content: bytes) -> None:
+        """In place, and not within the tick of the file system's clock in which the last change was."""
+        path = self.folder / name
+        before = path.stat().st_ctime_ns if path.exists() else 0
+        while not path.exists() or path.stat().st_ctime_ns == before:
+            path.write_bytes(content)
+
+    @rule(name=st.sampled_from(NAMES), label=st.sampled_from("xyz"), uuid=st.sampled_from([None, "u1", "u2"]))
+    def write_part(self, name: str, label: str, uuid: str | None) -> None:
+        self._write(name, part(label, uuid=uuid).bytes())
+
+    @rule(
+        name=st.sampled_from(NAMES),
+        links=st.dictionaries(
+            st.sampled_from([*NAMES, "../a.FCStd", "../b.FCStd", "B.fcstd"]), st.integers(1, 9), max_size=3
+        ),
+        uuid=st.sampled_from([None, "u1"]),
+    )
+    def write_assembly(self, name: str, links: dict[str, int], uuid: str | None) -> None:
+        self._write(name, assembly(Path(name).stem, links, uuid).bytes())
+
+    @rule(name=st.sampled_from(NAMES), digit=st.integers(1, 9), how=st.sampled_from(["in place", "replaced"]))
+    def edit_in_secret(self, name: str, digit: int, how: str) -> None:
+        """Same size, same time of modification."""
+        path = self.folder / name
+        if not path.exists():
+            return
+        status = path.stat()
+        content = Doc("same", meta={"SiloUUID": f"u{digit}"}).add("Part::Box", "Box").bytes()
+        content = content.ljust(max(status.st_size, len(content)), b"\0")
+        if how == "in place":
+            self._write(name, content)
+        else:
+            fresh = path.with_suffix(".new")
+            fresh.write_bytes(content)
+            os.replace(fresh, path)
+        os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
+
+    @rule(name=st.sampled_from(NAMES))
+    def delete(self, name: str) -> None:
+        (self.folder / name).unlink(missing_ok=True)
+
+    @rule(name=st.sampled_from(NAMES), to=st.sampled_from(NAMES))
+    def move(self, name: str, to: str) -> None:
+        if (self.folder / name).exists():
+            os.replace(self.folder / name, self.folder / to)
+
+    @rule(name=st.sampled_from(NAMES), to=st.sampled_from(NAMES))
+    def copy(self, name: str, to: str) -> None:
+        if (self.folder / name).exists() and name != to:
+            self._write(to, (self.folder / name).read_bytes())
+
+    @rule(name=st.sampled_from(NAMES))
+    def symlink(self, name: str) -> None:
+        (self.folder / "link.FCStd").unlink(missing_ok=True)
+        os.symlink(self.folder / name, self.folder / "link.FCStd")
+
+    @rule(name=st.sampled_from(NAMES), at=st.floats(0, 1), how=st.sampled_from(["cut", "flip", "empty"]))
+    def damage(self, name: str, at: float, how: str) -> None:
+        path = self.folder / name
+        if path.exists():
+            self._write(name, damaged(path.read_bytes(), at, how))
+
+    @rule(at=st.floats(0, 1), how=st.sampled_from(["cut", "flip", "empty", "text", "gone"]))
+    def damage_the_index(self, at: float, how: str) -> None:
+        if not self.index.exists():
+            return
+        if how == "gone":
+            self.index.unlink()
+        elif how == "text":
+            self.index.write_text("this is no database")
+        else:
+            self.index.write_bytes(damaged(self.index.read_bytes(), at, how))
+
+    @rule(version=st.sampled_from([0, 99]))
+    def make_the_index_foreign(self, version: int) -> None:
+        if self.index.exists():
+            database = sqlite3.connect(self.index)
+            try:
+                database.execute(f"PRAGMA user_version = {version}")
+            except sqlite3.DatabaseError:
+                pass  # damaged before
+            database.close()
+
+    @invariant()
+    def the_answers_are_those_of_the_files(self) -> None:
+        if hasattr(self, "folder"):
+            wanted = truth(self.folder)
+            assert indexed(self.folder, self.index)[0] == wanted
+            assert indexed(self.folder, self.index)[0] == wanted
+
+
+def damaged(content: bytes, at: float, how: str) -> bytes:
+    """Cut short, one byte changed, or nothing left."""
+    place = int(at * max(0, len(content) - 1))
+    if how == "empty" or not content:
+        return b""
+    return (
+        content[:place]
+        if how == "cut"
+        else content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :]
+    )
+
+
+Vault.TestCase.settings = settings(max_examples=12, stateful_step_count=12, deadline=None)
+TestVault = Vault.TestCase
+
+
+class LongVault(Vault):
+    """The same hunt, for longer."""
+
+
+LongVault.TestCase.settings = settings(max_examples=400, stateful_step_count=25, deadline=None)
+TestLongVault = pytest.mark.slow(LongVault.TestCase)
+if not os.environ.get("SILO_LONG"):
+    del TestLongVault
+
+
+@pytest.fixture
+def vault(tmp_path: Path) -> Path:
+    folder = tmp_path / "vault"
+    part("a", uuid="ua").save(folder / "a.FCStd")
+    part("b").save(folder / "b.FCStd")
+    assembly("c", {"a.FCStd": 2, "b.FCStd": 1}).save(folder / "c.FCStd")
+    assembly("d", {"c.FCStd": 3, "a.FCStd": 4}).save(folder / "d.FCStd")
+    return folder
+
+
+def test_a_second_run_reads_nothing_and_a_change_reads_what_uses_it(vault: Path, tmp_path: Path) -> None:
+    """A part's change asks those again that hold it directly; the answers are those of the files."""
+    index = tmp_path / "index"
+    _, reads = indexed(vault, index)
+    assert reads == 4, "each once, however many use it"
+    assert indexed(vault, index)[1] == 0
+    part("b", uuid="new").save(vault / "b.FCStd")
+    found, reads = indexed(vault, index)
+    assert (found, reads) == (truth(vault), 4)
+    assert indexed(vault, index)[1] == 0
+
+
+def test_an_edit_within_one_tick_of_the_clock_is_seen(vault: Path, tmp_path: Path) -> None:
+    """Right after a save, size and times say nothing: the content is compared until the file has settled."""
+    path, index = vault / "a.FCStd", tmp_path / "index"
+    indexed(vault, index, Contents())
+    status = path.stat()
+    path.write_bytes(part("a", uuid="ux").bytes())
+    os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
+    assert path.stat().st_size == status.st_size
+    assert indexed(vault, index, Contents())[0] == truth(vault)
+
+
+def test_a_file_that_was_only_touched_is_known_by_its_content(vault: Path, tmp_path: Path) -> None:
+    """A copy from a backup, a check-out: other times and another inode, the same answers without a walk."""
+    index = tmp_path / "index"
+    indexed(vault, index)
+    shutil.copytree(vault, tmp_path / "copy")
+    shutil.rmtree(vault)
+    (tmp_path / "copy").rename(vault)
+    with Index(index) as memory:
+        reading = Reading(memory)
+        list(reading.ask_many(questions(vault)))
+        assert reading.asked == len(questions(vault)) - 8, "only the files that are not there"
+
+
+def test_another_current_folder_is_another_file(
+    vault: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A name without a folder means nothing to the index."""
+    other = tmp_path / "other"
+    part("a", uuid="elsewhere").save(other / "a.FCStd")
+    answers = []
+    for folder in (vault, other):
+        monkeypatch.chdir(folder)
+        with Index(tmp_path / "index", contents=Contents(clock=later)) as memory:
+            answers.append(Reading(memory).ask(Question("a.FCStd")).plain["table"][0]["silo_uuid"])
+    assert answers == ["ua", "elsewhere"]
+
+
+def test_a_file_that_the_user_named_and_that_is_no_index_stays(vault: Path) -> None:
+    """A slip of the hand (--index top.FCStd) must not cost a drawing."""
+    before = (vault / "d.FCStd").read_bytes()
+    with pytest.raises(InputError, match="no index"):
+        Index(vault / "d.FCStd", given=True)
+    assert (vault / "d.FCStd").read_bytes() == before
+
+
+def test_an_index_that_cannot_be_written_costs_time_only(vault: Path, tmp_path: Path) -> None:
+    """A full disk, a folder in its place."""
+    (tmp_path / "folder").mkdir()
+    with Index(tmp_path / "folder", contents=Contents(clock=later)) as memory:
+        assert "cannot be used" in memory.trouble
+        assert [answer.plain for answer in Reading(memory).ask_many(questions(vault))] == truth(vault)
+    if Path("/dev/full").exists():
+        small = tmp_path / "small"
+        with Index(small, contents=Contents(clock=later)) as memory:
+            memory._database.execute("PRAGMA max_page_count = 1")
+            found = [answer.plain for answer in Reading(memory).ask_many(questions(vault))]
+            memory.save()
+            assert "full" in memory.trouble
+            assert found == truth(vault)
+            assert [answer.plain for answer in Reading(memory).ask_many(questions(vault))] == found
+
+
+def _processes(folder: Path, index: Path, count: int) -> Iterator[subprocess.Popen[bytes]]:
+    code = (
+        "import sys; from pathlib import Path; sys.path[:0] = sys.argv[3:]; import test_index as t\n"
+        "for _ in range(25): t.indexed(Path(sys.argv[1]), Path(sys.argv[2]))"
+    )
+    here = Path(__file__).parent
+    paths = [str(here), str(here.parent / "support"), str(here.parents[1] / "mods")]
+    for _ in range(count):
+        yield subprocess.Popen([sys.executable, "-c", code, str(folder), str(index), *paths])
+
+
+def test_two_processes_at_once_and_somebody_who_works(vault: Path, tmp_path: Path) -> None:
+    """Both end well, and the index tells the truth afterwards."""
+    index = tmp_path / "index"
+    running = list(_processes(vault, index, 2))
+    number = 0
+    while any(process.poll() is None for process in running):
+        number += 1
+        part("a", uuid=f"u{number}").save(vault / "a.FCStd")
+        assembly("c", {"a.FCStd": number % 7 + 1, "b.FCStd": 1}).save(vault / "c.FCStd")
+        if number == 20:
+            index.unlink(missing_ok=True)
+    assert [process.wait() for process in running] == [0, 0]
+    assert indexed(vault, index)[0] == truth(vault)
