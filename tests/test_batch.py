@@ -24,6 +24,25 @@ def test_a_file_named_twice_is_read_once(tmp_path: Path, monkeypatch: pytest.Mon
     assert documents_in(["x.FCStd", "./x.FCStd", str(path), "."]) == ["x.FCStd"]
 
 
+def test_a_folder_is_its_documents_without_backups_and_what_is_ignored(tmp_path: Path) -> None:
+    """In the syntax of .gitignore: folders, patterns, exceptions, comments."""
+    names = ["a.FCStd", "b.fcstd", "a.FCStd1", "a.20260101-101010.FCBak", "old/c.FCStd", "x/old/d.FCStd"]
+    names += ["x/trial e.FCStd", "x/keep trial.FCStd", ".git/f.FCStd", "deep/er/g.FCStd"]
+    for name in names:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).touch()
+    (tmp_path / "folder.FCStd").mkdir()
+
+    def found() -> list[str]:
+        return [str(Path(one).relative_to(tmp_path)) for one in documents_in([str(tmp_path)])]
+
+    everything = ["a.FCStd", "b.fcstd", "deep/er/g.FCStd", "old/c.FCStd"]
+    everything += ["x/keep trial.FCStd", "x/old/d.FCStd", "x/trial e.FCStd"]
+    assert found() == everything
+    (tmp_path / ".siloignore").write_text("# what nobody orders\n/old/\n*trial*\n!keep*\ndeep/**\n")
+    assert found() == ["a.FCStd", "b.fcstd", "x/keep trial.FCStd", "x/old/d.FCStd"]
+
+
 def extraction(silo: FakeSilo, folder: Path, *, gone: str = "") -> Extraction:
     """A top with a sub-assembly with a part; the file named ``gone`` is not there any more."""
     entries: dict[str, BomEntry] = {}

@@ -6,29 +6,61 @@ from __future__ import annotations
 import glob
 import hashlib
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import chain
 from pathlib import Path
 
-from silo.bom.errors import DocumentError, InputError
+from silo.bom.errors import ConfigError, DocumentError, InputError
+
+IGNORE_FILE = ".siloignore"
 
 
 def documents_in(tops: Iterable[str]) -> list[str]:
     """The files that are meant, each once: a folder stands for all FCStd files below it, backups left out.
 
+    What the folder's ``.siloignore`` names (in the syntax of ``.gitignore``) is left out. Raises SiloError.
     A pattern (``*.FCStd``) stands for what fits it: the shells of Windows hand patterns over as they are.
     """
     found: list[str] = []
     for top in chain.from_iterable(map(_meant, tops)):
         path = Path(top)
         if path.is_dir():
-            found += sorted(str(p) for p in path.rglob("*") if p.suffix.lower() == ".fcstd" and p.is_file())
+            found += sorted(_below(top))
         else:
             found.append(top)
     once: dict[str, str] = {}
     for path_given in found:
         once.setdefault(os.path.normcase(os.path.abspath(path_given)), path_given)
     return list(once.values())
+
+
+def _below(folder: str) -> Iterator[str]:
+    ignored = _ignored(os.path.join(folder, IGNORE_FILE))
+    for here, folders, names in os.walk(folder):
+        inner = os.path.relpath(here, folder)
+        inner = "" if inner == os.curdir else inner.replace(os.sep, "/") + "/"
+        folders[:] = sorted(name for name in folders if name != ".git" and not ignored(f"{inner}{name}/"))
+        for name in names:
+            path = os.path.join(here, name)
+            if name.lower().endswith(".fcstd") and not ignored(inner + name) and os.path.isfile(path):
+                yield path
+
+
+def _ignored(path: str) -> Callable[[str], bool]:
+    """What a file of patterns leaves out."""
+    if not os.path.isfile(path):
+        return lambda _name: False
+    try:
+        from pathspec import GitIgnoreSpec
+    except ImportError as error:  # inside FreeCAD
+        raise ConfigError(
+            f"{path} is there, but the Python package pathspec, which reads it, is not"
+        ) from error
+    try:
+        lines = Path(path).read_text(encoding="utf-8").splitlines()
+        return GitIgnoreSpec.from_lines(lines).match_file
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path} cannot be read: {error}") from error
 
 
 def _meant(top: str) -> list[str]:

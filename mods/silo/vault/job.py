@@ -12,8 +12,8 @@ import os
 import uuid
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Any
 
@@ -28,6 +28,7 @@ from silo.bom_sync import (
     Resolved,
     Status,
     SyncApi,
+    blocking,
     known_items,
     plain_lines,
     resolve_known,
@@ -61,6 +62,7 @@ class Job:
 
     def __post_init__(self) -> None:
         self.stopped: SiloError | None = None
+        self._sent: dict[str, Future[Outcome]] = {}
 
     def results(self) -> Iterator[TopResult]:
         """The result of each file, as soon as it is known; files that could not be read first."""
@@ -98,17 +100,22 @@ class Job:
         several = [resolve_known(self.plan.extraction(node, self.reading), known) for node in nodes]
         numbers = [one.assembly.part_number for one in several]
         lines = self._lines([number for number in numbers if number is not None])
-        # Copies of one file are one item: one after the other, so that the second finds no news.
-        twice = {number for number, count in Counter(numbers).items() if number is not None and count > 1}
         with ThreadPoolExecutor(self.senders, "silo-merge") as pool:
-            asked = [
-                pool.submit(self._sync, one, lines) if one.assembly.part_number not in twice else None
-                for one in several
-            ]
-            return [
-                future.result() if future is not None else self._sync(one, {})
-                for one, future in zip(several, asked, strict=True)
-            ]
+            asked = []
+            for one in several:
+                number = one.assembly.part_number
+                first = self._sent.get(number or "")
+                # Copies of one file are one item, and one merge.
+                if first is None or blocking(one):
+                    first = pool.submit(self._sync, one, lines)
+                    if number is not None and not blocking(one):
+                        self._sent[number] = first
+                asked.append(first)
+            found = [future.result() for future in asked]
+        return [
+            outcome if outcome.resolved is one else _as_the_first(one, outcome)
+            for one, outcome in zip(several, found, strict=True)
+        ]
 
     def _lines(self, numbers: Sequence[str]) -> Lines:
         many = getattr(self.api, "get_boms", None)
@@ -151,6 +158,12 @@ class Job:
         """What concerns every request ends the job; the others have it as their error."""
         if self.stopped is None and ends_run(error, self.api):
             self.stopped = error
+
+
+def _as_the_first(one: Resolved, first: Outcome) -> Outcome:
+    """What became of a copy: what became of the file that was sent for both."""
+    status = Status.UNCHANGED if first.status is Status.MERGED else first.status
+    return replace(first, resolved=one, status=status, result=None)
 
 
 def _endless(one: Resolved) -> bool:

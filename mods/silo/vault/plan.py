@@ -78,7 +78,7 @@ class Plan:
     findings: dict[Key, list[Finding]] = field(default_factory=dict)
     shared: list[Finding] = field(default_factory=list)
     _assemblies: dict[Key, bool] = field(default_factory=dict)
-    _meant: dict[str, Finding] = field(default_factory=dict)
+    _meant: dict[Finding, Finding] = field(default_factory=dict)
     _files: dict[str, str] = field(default_factory=dict)
 
     def extraction(self, node: Node, reading: Reading) -> Extraction:
@@ -90,7 +90,7 @@ class Plan:
             replace(entry, is_assembly=self._assemblies.get(entry.key, entry.is_assembly))
             for entry in found.entries
         )
-        told = dict.fromkeys(self._meant.get(finding.message, finding) for finding in found.findings)
+        told = dict.fromkeys(self._meant.get(finding, finding) for finding in found.findings)
         for key in (node.key, *(entry.key for entry in entries)):
             told.update(dict.fromkeys(self.findings.get(key, ())))
         return replace(found, entries=entries, findings=tuple(told))
@@ -325,4 +325,4 @@ def _find_meant(plan: Plan, reading: Reading) -> None:
     whole = Extraction(replace(heads[0], children=()), (*heads, *used), tuple(findings))
     for before, after in zip(findings, with_suggestions(whole).findings, strict=True):
         if after is not before:
-            plan._meant[before.message] = after
+            plan._meant[before] = after
