@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+import json
 import os
 import zipfile
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import pytest
 from running_freecad import opened
@@ -337,3 +339,53 @@ def test_a_moved_file_is_suggested_and_relinked(run: Any, gearbox: Path) -> None
     assert again.code == 2
     assert "nothing to mend" in again.err
     assert moved.exists()
+
+
+def test_where_used_answers_without_a_server(run: Any, gearbox: Path) -> None:
+    """The files that link to it, and the tops above them; also of a file that is gone."""
+    bolt = next(path for path in (gearbox.parent / "parts").iterdir() if "Gear" in path.name)
+    ran = run("where-used", bolt, gearbox.parent, "--json")
+    assert ran.code == 0
+    assert ran.json()["tops"] == ["TopAssembly.FCStd"]
+    before = ran.json()
+    assert run("where-used", bolt, gearbox.parent, "--json", "--no-index").json() == before
+    bolt.unlink()
+    assert run("where-used", bolt, gearbox.parent, "--json").json() == before
+    assert "No file" in run("where-used", gearbox, gearbox.parent).out
+    assert run("where-used", bolt, gearbox.parent / "nowhere").code == 2
+
+
+def test_a_second_job_on_one_folder_says_who_holds_it(run: Any, silo: Any, gearbox: Path) -> None:
+    """It changes nothing; the lock ends with the first job."""
+    from silo.cli.common import only_job
+
+    with only_job(str(gearbox.parent)):
+        ran = run("sync", gearbox.parent)
+        assert ran.code == 2
+        assert f"process {os.getpid()}" in ran.err
+    assert run("sync", gearbox.parent).code == 1, "nothing is registered yet"
+
+
+def test_a_vault_report_names_what_changed_and_what_moved(
+    run: Any, silo: Any, gearbox: Path, tmp_path: Path
+) -> None:
+    """In each form; a renamed part is the same part, and its BOM does not change."""
+    run("register", gearbox, "--yes")
+    reports = [tmp_path / f"night.{ending}" for ending in ("md", "json", "xml")]
+    words = [word for report in reports for word in ("--report", report)]
+    assert run("sync", gearbox.parent, *words).code == 0
+    markdown, data, junit = (report.read_text(encoding="utf-8") for report in reports)
+    assert "| added |" in markdown
+    assert "Cover" in markdown
+    assert json.loads(data)["ended"] is True
+    suite = ElementTree.fromstring(junit).find("testsuite")  # noqa: S314
+    assert suite is not None
+    assert (int(suite.get("tests", "")), int(suite.get("failures", ""))) == (2, 0)
+    cover = gearbox.parent / "parts" / "Cover.FCStd"
+    cover.rename(cover.with_name("Lid.FCStd"))
+    assert run("relink", gearbox, "--from", cover, "--to", cover.with_name("Lid.FCStd")).code == 0
+    ran = run("sync", gearbox.parent, "--json")
+    assert ran.code == 0
+    assert ran.json()["summary"]["lines_changed"] == 0
+    moved = ran.json()["summary"]["moved"]
+    assert moved == [{"name": "Lid", "from": "parts/Cover.FCStd", "to": "parts/Lid.FCStd"}]

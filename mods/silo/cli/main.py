@@ -27,6 +27,7 @@ _COMMANDS = (
     "bom",
     "diff",
     "bom_diff",
+    "where_used",
     "sync",
     "register",
     "pull",

@@ -50,8 +50,6 @@ def run(args: argparse.Namespace) -> int:
                 unread.append(top)
             for used in answer.known.links:
                 users.setdefault(used, set()).add(top)
-            for lost in answer.missing:
-                users.setdefault(lost, set()).add(top)
     direct = sorted(users.get(part, ()))
     above = _above(part, users)
     roots = sorted(top for top in above if not users.get(top))

@@ -155,10 +155,14 @@ class Known(NamedTuple):
 
     @property
     def links(self) -> frozenset[str]:
-        """The files that links lead to, counted or not."""
+        """The files that links lead to, counted or not; of those that are not there what is recorded."""
         files, lookups = json.loads(self.trail)
-        found = (_target(to) for _, led in lookups for to in led.values())
-        return frozenset(filter(None, found)) - {next(iter(files), "")}
+        found = {
+            _target(to) or os.path.normpath(os.path.join(folders[-1], recorded))
+            for folders, led in lookups
+            for recorded, to in led.items()
+        }
+        return frozenset(found) - {next(iter(files), "")}
 
 
 def _led_to(found: Found | NotFound) -> str:
