@@ -29,6 +29,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -80,7 +81,8 @@ def main():
     own = resource.getrusage(resource.RUSAGE_SELF)
     print(json.dumps({
         "wall": done[0], "cpu": done[1] + workers.ru_utime + workers.ru_stime, "parent": done[1],
-        "reads": reads, "assemblies": len(plan.nodes), "errors": len(plan.errors), "rss_mb": own.ru_maxrss / 1024,
+        "reads": reads, "assemblies": len(plan.nodes), "errors": len(plan.errors),
+        "rss_mb": own.ru_maxrss / 1024,
         "workers_mb": workers.ru_maxrss / 1024, "digest": rows.hexdigest(),
     }))
 
@@ -98,9 +100,7 @@ def build(folder: Path, documents: int, features: int = 60) -> None:
     """Write the vault."""
     chance = random.Random(1)
     parts = documents * 4 // 5
-    place = Raw(
-        "App::PropertyPlacement", '<PropertyPlacement Px="0.0000000000000000" Py="0.0" Pz="0.0" Q3="1.0"/>'
-    )
+    place = Raw("App::PropertyPlacement", '<PropertyPlacement Px="0.0000000000000000" Q3="1.0"/>')
     names = [f"Box{number}" for number in range(features)]
     for number in range(parts):
         doc = Doc(f"part{number}")
@@ -154,34 +154,40 @@ def reading(folder: Path, scratch: Path, use_dask: bool) -> None:
     first = plan(folder, scratch / "one")
     two = plan(folder, scratch / "two", 2)
     time.sleep(3)  # files that were written just now are compared by content
-    child_settle = plan(folder, scratch / "one")
+    settled = plan(folder, scratch / "one")
     second = plan(folder, scratch / "one")
     chosen = sorted(folder.rglob("*.FCStd"))[:: max(1, count // 5)][:5]
     for path in chosen:
-        content = path.read_bytes()
-        path.write_bytes(content[:-2] + bytes([content[-2] ^ 1, content[-1]]))
+        rename_a_feature(path)
     five = plan(folder, scratch / "one")
-    runs = {"first": first, "jobs 2": two, "settled": child_settle, "second": second, "five": five}
+    runs = {"first": first, "jobs 2": two, "settled": settled, "second": second, "five": five}
     for name, run in runs.items():
+        each = run["cpu"] / count * 1e6
         print(
-            f"{name:8} cpu {run['cpu']:7.2f} s  wall {run['wall']:7.2f} s  {run['cpu'] / count * 1e6:6.0f} µs each  "
+            f"{name:8} cpu {run['cpu']:7.2f} s  wall {run['wall']:7.2f} s  {each:6.0f} µs each  "
             f"reads {run['reads']:6}  parent {run['rss_mb']:.0f} MB  assemblies {run['assemblies']}"
         )
     print(f"first : null = {first['cpu'] / null['cpu']:.2f}")
-    print(
-        f"first : second = {first['cpu'] / second['cpu']:.1f},  first : five = {first['cpu'] / five['cpu']:.1f}"
-    )
-    print(
-        f"jobs 1 : jobs 2 = {first['wall'] / two['wall']:.2f} by the clock; same answers: {first['digest'] == two['digest']}"
-    )
+    print(f"first : second = {first['cpu'] / second['cpu']:.1f}")
+    print(f"first : five = {first['cpu'] / five['cpu']:.1f}")
+    same = first["digest"] == two["digest"] == second["digest"]
+    print(f"jobs 1 : jobs 2 = {first['wall'] / two['wall']:.2f} by the clock; same answers: {same}")
     if use_dask:
         from dask.distributed import LocalCluster
 
         with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
             run = plan(folder, scratch / "dask", 1, cluster.scheduler_address)
-        print(
-            f"dask: wall {run['wall']:.2f} s, same answers: {run['digest'] == five['digest'] or run['digest'] == first['digest']}"
-        )
+        print(f"dask: wall {run['wall']:.2f} s, same answers: {run['digest'] == five['digest']}")
+
+
+def rename_a_feature(path: Path) -> None:
+    """A person works in a file and saves it."""
+    with zipfile.ZipFile(path) as container:
+        entries = {name: container.read(name) for name in container.namelist()}
+    entries["Document.xml"] = entries["Document.xml"].replace(b'"Box1"/>', b'"Pad"/>')
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as container:
+        for name, content in entries.items():
+            container.writestr(name, content)
 
 
 def serve(scratch: Path, documents: int) -> tuple[Any, Any]:
@@ -236,7 +242,7 @@ def state(server: Any) -> dict[str, Any]:
         while page := client.search_items(limit=500, offset=offset):
             names.update({item.part_number: item.id for item in page})
             offset += len(page)
-        boms = client.get_boms([number for number in names])
+        boms = client.get_boms(list(names))
         versions = {names[n]: client.get_bom_version(n) for n, lines in boms.items() if lines}
         return {
             "boms": {

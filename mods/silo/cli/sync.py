@@ -141,6 +141,8 @@ def _results(
     begin = time.monotonic()
     told = _Progress(len(tops))
     with common.reading_of(args) as reading:
+        if summary.base:
+            reading.index.expect(summary.base)
         plan = make_plan(
             tops,
             reading,
