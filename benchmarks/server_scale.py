@@ -38,7 +38,7 @@ from silo_server.db import tables
 from silo_server.db.bulk import insert_rows
 from silo_server.db.engine import Database
 from silo_server.operation.backup import back_up, restore
-from silo_server.run import running_server
+from silo_server.run import running_server, spare_the_collector
 from silo_server.settings import Settings
 
 TOKEN = "silo_scale"
@@ -234,6 +234,7 @@ def move(origin: Settings, target: Settings, folder: Path) -> None:
 
 def measure(settings: Settings, size: int, bad: list[str], show: bool) -> dict[str, float]:
     """The CPU seconds of each request; checks the plans of what it asks the database."""
+    spare_the_collector()  # as a server's own process does
     with (
         running_server(settings.database_url, token=TOKEN, files_dir=settings.files_dir) as server,
         Api(server.base_url, TOKEN) as api,

@@ -293,10 +293,7 @@ def _run_workers(settings: Settings, workers: int, sock: socket.socket) -> None:
 
 
 def _work(settings: Settings, sock: socket.socket, on_up: Callable[[], None] | None = None) -> None:
-    # An answer of 100 000 rows is as many small objects; Python's collector, as it is set, would look through
-    # all of them (and through every loaded module) again and again while they are made. Half the time goes.
-    gc.freeze()
-    gc.set_threshold(50_000, 20, 100)
+    spare_the_collector()
     allow_many_files()
     log_to_stderr(settings)
     server = SiloServer(_config(create_app(settings), settings), on_up or (lambda: None))
@@ -306,6 +303,16 @@ def _work(settings: Settings, sock: socket.socket, on_up: Callable[[], None] | N
         watch = threading.Thread(target=_end_with, args=(parent.sentinel, server), daemon=True)
         watch.start()
     server.run(sockets=[sock])
+
+
+def spare_the_collector() -> None:
+    """Set Python's garbage collector for large answers; for a process that does nothing but serve.
+
+    An answer of 100 000 rows is as many small objects; the collector, as it is set, would look through all of
+    them (and through every loaded module) again and again while they are made. Half the time would go.
+    """
+    gc.freeze()
+    gc.set_threshold(50_000, 20, 100)
 
 
 def _end_with(sentinel: int, server: SiloServer) -> None:

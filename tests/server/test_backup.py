@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import json
+import math
+import os
 import shutil
 import threading
 from pathlib import Path
@@ -18,6 +20,7 @@ from silo.cli.main import main
 from silo_server.bootstrap import prepare
 from silo_server.db.engine import Database
 from silo_server.db.tables import metadata
+from silo_server.files import FileStore
 from silo_server.operation import backup
 from silo_server.run import running_server
 from silo_server.settings import Settings
@@ -89,6 +92,24 @@ def test_what_was_saved_comes_back_on_either_database(
         # Ids count on where they were, so that a new change follows the old ones.
         api.merge(parent, {})
         assert api.get(bom(parent, "history"))[0]["id"] > history[0]["id"]
+
+
+def test_files_that_a_restore_needs_are_not_collected_under_it(tmp_path: Path, databases: Databases) -> None:
+    """An old file that nothing refers to any more counts as new once a restore is about to refer to it."""
+    settings = Settings(database_url=databases.new("sqlite"), files_dir=tmp_path / "files")
+    with (
+        running_server(settings.database_url, token=TOKEN, settings=settings) as server,
+        Api(server.base_url, TOKEN) as api,
+    ):
+        fill(api)
+        backup.back_up(settings, tmp_path / "saved")
+    store = FileStore(settings.storage)
+    for path in store.older_than(math.inf):
+        os.utime(path, (0, 0))
+    (old,) = store.older_than(1)
+    backup.restore(settings, tmp_path / "saved", replace=True)
+    assert not store.remove_old(old, 1)
+    assert old.read_bytes() == b"first"
 
 
 def test_a_restore_into_a_running_server_resets_its_listeners(url: str, tmp_path: Path) -> None:

@@ -298,7 +298,7 @@ def _checksums(path: Path) -> set[str]:
 
 def _copy_files(source: FileStore, target: FileStore, wanted: Collection[str]) -> list[str]:
     """Copy what the target lacks; the hashes that the source does not have, or has damaged."""
-    return [c for c in sorted(wanted) if not target.holds(c) and not target.copy_from(source, c)]
+    return [c for c in sorted(wanted) if not target.renew(c) and not target.copy_from(source, c)]
 
 
 def _read_manifest(source: Path) -> Manifest:
