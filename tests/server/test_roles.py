@@ -50,6 +50,7 @@ TABLE: dict[tuple[str, str], str] = {
     ("POST", "/api/items"): EDITOR,
     ("GET", "/api/items/by-uuid/{uuid}"): VIEWER,
     ("POST", "/api/items/by-uuid"): VIEWER,  # a look-up with a long list; changes nothing
+    ("POST", "/api/items/boms"): VIEWER,  # the same
     ("GET", "/api/items/{part_number}"): VIEWER,
     ("PUT", "/api/items/{part_number}"): EDITOR,
     ("PATCH", "/api/items/{part_number}/properties"): EDITOR,
