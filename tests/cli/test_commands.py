@@ -389,3 +389,22 @@ def test_a_vault_report_names_what_changed_and_what_moved(
     assert ran.json()["summary"]["lines_changed"] == 0
     moved = ran.json()["summary"]["moved"]
     assert moved == [{"name": "Lid", "from": "parts/Cover.FCStd", "to": "parts/Lid.FCStd"}]
+
+
+def test_bom_and_diff_take_folders(run: Any, silo: Any, gearbox: Path) -> None:
+    """Each assembly with its own lines; the check says whether anything of the folder differs."""
+    found = run("bom", gearbox.parent, "--json").json()
+    assert [Path(one["assembly"]["doc_path"]).name for one in found["assemblies"]] == [
+        "Gearbox.FCStd",
+        "TopAssembly.FCStd",
+    ]
+    assert run("diff", gearbox.parent, "--check").code == 1
+    run("register", gearbox, "--yes")
+    assert run("diff", gearbox.parent, "--check").code == 1
+    assert run("sync", gearbox.parent).code == 0
+    assert run("diff", gearbox.parent, "--check").code == 0
+    set_element_count(gearbox, "CoverBolts", added=4)
+    ran = run("diff", gearbox.parent, "--check", "--json")
+    assert (ran.code, ran.json()["drift"]) == (1, True)
+    (gearbox.parent / "broken.FCStd").write_bytes(b"no document")
+    assert run("bom", gearbox.parent, "--json").code == 1

@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Mapping
 from dataclasses import replace
 
-from silo.bom.errors import SiloError
+from silo.bom.errors import InputError, SiloError
 from silo.bom.model import BomEntry, Extraction
-from silo.bom.report import base_of, bom_json, flat_json
+from silo.bom.report import base_of, bom_json, flat_json, relative
 from silo.bom.resolve import consolidation_findings
 from silo.bom_sync import assemblies, resolve, server_lines
 from silo.cli import common
@@ -24,7 +25,7 @@ def register(commands: Commands) -> None:
         "show the BOM of a FreeCAD assembly, read from its files without FreeCAD",
         "silo-mod bom examples/gearbox/TopAssembly.FCStd --flat",
     )
-    common.add_assembly_options(parser)
+    common.add_assembly_options(parser, folders=True)
     parser.add_argument(
         "--flat", action="store_true", help="quantities multiplied down the tree, each part once"
     )
@@ -43,6 +44,8 @@ def run(args: argparse.Namespace) -> int:
     """Print the BOM; 1 where an error says that it is not the whole one."""
     if args.verify:
         return _verify(args)
+    if os.path.isdir(args.top):
+        return _folder(args)
     extraction = common.read_top(args)
     if args.resolve:
         with common.client_of(args) as client:
@@ -68,6 +71,32 @@ def run(args: argparse.Namespace) -> int:
         out.print()
         out.print(show.findings_text(extraction.findings, base_of(extraction)))
     return 1 if extraction.blocked else 0
+
+
+def _folder(args: argparse.Namespace) -> int:
+    """Each assembly of a folder with its own lines, children first; 1 where one is not whole."""
+    if args.flat or args.resolve:
+        raise InputError("--flat and --resolve are for one assembly; name its file.")
+    from silo.cli import show
+
+    out, fine, data = show.console(), True, []
+    with common.plan_of(args) as (plan, reading, base):
+        for node in (node for layer in plan.layers for node in layer):
+            found = plan.extraction(node, reading)
+            fine = fine and not found.blocked
+            if args.json:
+                data.append(bom_json(found))
+                continue
+            out.print(show.bom_tree(found))
+            if found.findings:
+                out.print(show.findings_text(found.findings, base))
+            out.print()
+    errors = {relative(top, base): str(error) for top, error in plan.errors.items()}
+    if args.json:
+        common.print_json({"assemblies": data, "errors": errors})
+    for path, words in errors.items() if not args.json else ():
+        out.print(f"✗ {show.plain(path)}: {show.plain(words)}", style="red", markup=False)
+    return 0 if fine and not errors else 1
 
 
 def _verify(args: argparse.Namespace) -> int:

@@ -28,6 +28,7 @@ from silo.platform import hold_lock
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
     from silo.bom_sync import Resolved
+    from silo.vault.plan import Plan
     from silo.vault.reading import Reading
 
 Commands = Any  # argparse keeps the type of its sub-parsers to itself
@@ -52,12 +53,13 @@ def add_server_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--token", help="API token (else SILO_API_TOKEN, which other users cannot read)")
 
 
-def add_assembly_options(parser: argparse.ArgumentParser) -> None:
-    """``TOP.FCStd`` and ``--assembly``."""
-    parser.add_argument("top", metavar="TOP.FCStd", help="the assembly's file")
+def add_assembly_options(parser: argparse.ArgumentParser, *, folders: bool = False) -> None:
+    """``TOP.FCStd`` and ``--assembly``; where the command takes them, whole folders."""
+    more = ", or a folder: all assemblies below it" if folders else ""
+    parser.add_argument("top", metavar="TOP" if folders else "TOP.FCStd", help=f"the assembly's file{more}")
     parser.add_argument("--assembly", metavar="NAME", help="the assembly to read, where a file holds several")
     add_hardware_option(parser)
-    add_reading_options(parser, jobs=False)
+    add_reading_options(parser, jobs=folders)
 
 
 def add_hardware_option(parser: argparse.ArgumentParser) -> None:
@@ -190,6 +192,22 @@ def read_top(args: argparse.Namespace) -> Extraction:
     if isinstance(found, SiloError):
         raise found
     return with_suggestions(found)
+
+
+@contextmanager
+def plan_of(args: argparse.Namespace) -> Iterator[tuple[Plan, Reading, str]]:
+    """All assemblies of the folder that the options name, and the folder. InputError where it has none."""
+    from silo.files import documents_in
+    from silo.vault.plan import make_plan
+
+    base = os.path.realpath(args.top)
+    tops = documents_in([args.top])
+    if not tops:
+        raise InputError(f"no FreeCAD files (*.FCStd) in {args.top}")
+    with reading_of(args) as reading:
+        reading.index.expect(base)
+        plan = make_plan(tops, reading, assembly=args.assembly, hardware=not args.no_hardware)
+        yield plan, reading, base
 
 
 def reach(client: SiloClient, extraction: Extraction | None = None) -> None:

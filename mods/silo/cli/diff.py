@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from itertools import chain
 from typing import Any
 
@@ -24,7 +25,7 @@ def register(commands: Commands) -> None:
         "compare an assembly's BOM with the server's; changes nothing",
         "silo-mod diff TopAssembly.FCStd --check",
     )
-    common.add_assembly_options(parser)
+    common.add_assembly_options(parser, folders=True)
     parser.add_argument("--recursive", action="store_true", help="compare the sub-assemblies too")
     parser.add_argument("--check", action="store_true", help="exit 1 where CAD and server differ, for CI")
     common.add_json_option(parser)
@@ -34,6 +35,8 @@ def register(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the comparison; with ``--check`` 1 on drift, on broken links and on unregistered components."""
+    if os.path.isdir(args.top):
+        return _folder(args)
     extraction = common.read_top(args)
     with common.client_of(args) as client:
         common.reach(client, extraction)
@@ -53,6 +56,46 @@ def run(args: argparse.Namespace) -> int:
         common.print_json({"drift": drifted, "assemblies": data, "findings": findings})
     else:
         _show(whole, compared, names_of(whole, chain.from_iterable(lines)), base)
+    return 1 if args.check and drifted else 0
+
+
+def _folder(args: argparse.Namespace) -> int:
+    """Every assembly of a folder against the server; only those that differ are shown."""
+    from silo.batch import Options
+    from silo.batch_report import Summary, is_news
+    from silo.cli import show
+    from silo.vault.job import Job
+
+    out, data = show.console(), []
+    with common.plan_of(args) as (plan, reading, base), common.client_of(args) as client:
+        if not plan.uuids:
+            common.reach(client)
+        summary = Summary(base)
+        drifted = False
+        for result in Job(plan, reading, client, Options(recursive=True, dry_run=True), base).results():
+            summary.add(result)
+            drifted = drifted or not result.fine or bool(result.unregistered)
+            for outcome in result.outcomes:
+                news = is_news(outcome)
+                drifted = drifted or (outcome.plan is not None and outcome.plan.diff.drifted)
+                if args.json:
+                    compared = {"diff": diff_json(outcome.plan.diff)} if outcome.plan is not None else {}
+                    data.append({**_head(outcome.resolved, base), **compared})
+                elif news:
+                    out.print(show.outcome_text(outcome))
+                    if outcome.plan is not None and not blocking(outcome.resolved):
+                        out.print(show.diff_table(outcome.plan.diff, outcome.names))
+    if args.json:
+        findings = [finding_json(finding, base) for finding in summary.findings]
+        errors = [{"message": words, "files": files} for words, files in summary.errors.items()]
+        common.print_json({"drift": drifted, "assemblies": data, "findings": findings, "errors": errors})
+    else:
+        for words in (*summary.warnings, *summary.errors):
+            out.print(show.plain(words), markup=False)
+        compared_count = sum(summary.statuses.values())
+        out.print(f"Assemblies compared: {compared_count}; {'they differ' if drifted else 'no differences'}.")
+    if summary.exit_code == 3:
+        return 3
     return 1 if args.check and drifted else 0
 
 
