@@ -51,6 +51,15 @@ def test_our_save_takes_the_mark_away(said: dict[str, Any]) -> None:
     assert len(said["windows"]) == 1
 
 
+def test_the_property_editor_has_number_and_state(said: dict[str, Any]) -> None:
+    """Of each component, read only, in a group of its own; the file has nothing of it."""
+    number, *rest = said["shown"]["P"]
+    assert number.startswith("M01-")
+    assert rest == ["in Silo", "Silo", True]
+    assert said["shown"]["B"][1:] == ["in Silo", "Silo", True]
+    assert not said["in_file"]
+
+
 def test_the_project_opens_without_marks(said: dict[str, Any]) -> None:
     """Registering a part saves the assembly too, which keeps the times at which its parts were saved."""
     clean = {"modified": False, "undo": [], "touched": []}

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 import unicodedata
 
 import pytest
@@ -10,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.workbench import words
-from silo.workbench.words import counted, plain, quantity, tip, visible
+from silo.workbench.words import breakable, counted, plain, quantity, tip, visible
 
 
 @pytest.mark.parametrize(
@@ -89,3 +90,18 @@ def test_texts_are_translated_by_what_freecad_offers() -> None:
         assert words.translate("Silo", "Sync") == "Silo:cnyS"
     finally:
         words.use(lambda _context, text: text)
+
+
+@pytest.mark.parametrize("text", ["", "a short text", "BOM Updated: A01-0001 Torso", "x" * 26])
+def test_ordinary_texts_are_not_broken(text: str) -> None:
+    """What a person copies is what was said."""
+    assert breakable(text) == text
+
+
+def test_a_long_word_can_be_broken_anywhere_sensible() -> None:
+    """No piece is longer than a narrow pane takes, and nothing is lost."""
+    word = "/home/ann/projects/TorsoTopPlateWithAVeryLongName" + "x" * 60 + ".FCStd"
+    text = f"read-only: {word} is"
+    found = breakable(text)
+    assert found.replace("\u200b", "") == text
+    assert max(map(len, re.split("[ \u200b]", found))) <= 26

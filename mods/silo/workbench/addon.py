@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ from silo.workbench.settings.preferences import GROUP, Preferences
 from silo.workbench.words import plain, translate
 
 if TYPE_CHECKING:
+    from silo.bom.model import BomEntry
     from silo.outbox.send import Sent
     from silo.workbench.commit.flow import CommitFlow
     from silo.workbench.freecad.hooks import CommitHook
@@ -158,6 +160,7 @@ class AddOn:
                 register=self.register_path,
                 show=self.show_objects,
                 view=self.open_page,
+                known=self._show_numbers,
             )
         return self._previews
 
@@ -193,11 +196,18 @@ class AddOn:
     def _sent(self, sent: Sent) -> None:
         """A commit of this FreeCAD arrived."""
         path = sent.entry.path
+        if sent.resolved is not None:
+            self._show_numbers(path, sent.resolved.entries)
         if self._previews is not None:
             self._previews.again(path)
         left = len(sent.resolved.unresolved) if sent.resolved is not None else 0
         if left and self.preferences.flag("AskRegister") and self.commits.was_asked_for(sent.entry.key):
             self.register_path(path)
+
+    def _show_numbers(self, path: str, entries: Iterable[BomEntry]) -> None:
+        from silo.workbench.freecad import silo_group
+
+        silo_group.show(path, entries)
 
     def _bug(self, error: BaseException) -> None:
         host.error(plain(f"[Silo] unexpected problem: {type(error).__name__}: {error}", 500))

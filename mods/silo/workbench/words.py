@@ -39,6 +39,32 @@ def plain(text: str, most: int = 200) -> str:
     return shown if len(shown) <= most and len(text) <= most * 4 else shown[: most - 1].rstrip() + "…"
 
 
+# Longer words get places where a line may end.
+_LONG_WORD = 26
+_ZERO_WIDTH = "\u200b"
+
+
+def breakable(text: str) -> str:
+    """A text whose long words (paths, names without a blank) can be broken: after a sign or a small letter.
+
+    A place where a line may end is a character without width; texts without long words stay as they are.
+    """
+    return " ".join(word if len(word) <= _LONG_WORD else _broken(word) for word in text.split(" "))
+
+
+def _broken(word: str) -> str:
+    made, run = [], 0
+    for number, letter in enumerate(word):
+        made.append(letter)
+        run += 1
+        following = word[number + 1 : number + 2]
+        hump = letter.islower() and following.isupper()
+        if following and (letter in "/\\_-.:," or hump or run >= _LONG_WORD):
+            made.append(_ZERO_WIDTH)
+            run = 0
+    return "".join(made)
+
+
 def visible(text: str, most: int = 20_000) -> str:
     """Text of several lines for the report view and message boxes: the same, but lines and blanks stay."""
     shown = (c if c == "\n" or unicodedata.category(c) not in _HIDDEN else " " for c in text[:most])

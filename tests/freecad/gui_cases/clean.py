@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import sys
+import zipfile
 from collections.abc import Callable
 from typing import Any
 
@@ -24,6 +25,7 @@ from inside import (
     run,
     settled,
     tell,
+    unmark,
     wait,
 )
 
@@ -51,7 +53,15 @@ def story() -> None:
         RUNS.get(name, nothing)(one)
         wait(settled)
         done[name] = {"known": name in RUNS, "changed": difference(before, states())}
-    tell(done=done)
+    tell(
+        done=done, shown={obj.Name: shown_in_editor(obj) for obj in (doc.getObject("P"), doc.getObject("B"))}
+    )
+    # Another save, so that what must not be in the file could be.
+    from silo.workbench.freecad import saving
+
+    saving.save(doc)
+    with zipfile.ZipFile(top) as packed:
+        tell(in_file=b"SiloNumber" in packed.read("Document.xml"))
     reopened(top)
 
 
@@ -64,9 +74,10 @@ def project() -> str:
             box.Document.recompute()
             box.Document.save()
     path = str(assembly("Top", ("P", parts[0], 0), ("B", parts[1], 3)).Document.FileName)
-    for doc in App.listDocuments().values():
-        doc.recompute()
-        doc.save()
+    for name in ("Plate", "Bolt", "Top"):
+        App.getDocument(name).recompute()
+        App.getDocument(name).save()
+        unmark(App.getDocument(name))
     return path
 
 
@@ -174,6 +185,16 @@ def settings(one: Any) -> None:
 
 def activity(one: Any) -> None:
     Gui.runCommand("Silo_Activity")
+
+
+def shown_in_editor(obj: Any) -> list[Any]:
+    """Number, state, group and what a person can do about them."""
+    names = ("SiloNumber", "SiloState")
+    return [
+        *(obj.getPropertyByName(name) for name in names),
+        *{obj.getGroupOfProperty(name) for name in names},
+        *{"ReadOnly" in (*obj.getPropertyStatus(name), *obj.getTypeOfProperty(name)) for name in names},
+    ]
 
 
 def reopened(top: str) -> None:

@@ -19,6 +19,9 @@ SAME = 1e-7
 _ABSENT = object()
 # FreeCAD writes these by itself.
 _OWN = frozenset(("LastModifiedDate", "LastModifiedBy", "_LinkTouched", "_ChildCache", "TipName"))
+# Shown in the property editor, and not written into the file (:mod:`silo.workbench.freecad.silo_group`).
+SHOWN_NUMBER, SHOWN_STATE = "SiloNumber", "SiloState"
+_SHOWN = (SHOWN_NUMBER, SHOWN_STATE)
 # Their values are the live thing itself, which is the same before and after.
 _ALIVE = ("Spreadsheet::PropertySheet", "Mesh::PropertyMeshKernel", "Points::PropertyPointKernel")
 
@@ -73,7 +76,7 @@ class EditWatch:
         """A property that the file has not; an object's, or the document's."""
         doc = getattr(owner, "Document", owner)
         edits = self._docs.get(doc.Name)
-        if edits is not None and not doc.Restoring:
+        if edits is not None and not doc.Restoring and name not in _SHOWN:
             edits.before.setdefault((owner.Name if doc is not owner else "", name), _ABSENT)
 
     def slotRemoveDynamicProperty(self, owner: Any, name: str) -> None:
@@ -103,7 +106,7 @@ class EditWatch:
 
     def _remember(self, doc: Any, obj: str, name: str, owner: Any) -> None:
         edits = self._docs.get(doc.Name)
-        if edits is None or (obj, name) in edits.before:
+        if edits is None or (obj, name) in edits.before or name in _SHOWN:
             return
         if doc.Restoring:
             # What came before it is part of opening the file, too: its label.

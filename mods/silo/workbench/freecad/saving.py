@@ -109,8 +109,8 @@ def _save(doc: Any) -> None:
 
 
 @contextmanager
-def others_unmarked(doc: Any) -> Iterator[None]:
-    """Documents without edits stay so while this one is changed and saved.
+def others_unmarked(doc: Any = None) -> Iterator[None]:
+    """Documents without edits stay so while this one is changed and saved; None for all of them.
 
     FreeCAD marks each document that links to a saved one, for the time of saving that it keeps of it (0.20
     does so whatever we do), and each that shows an axis cross, for the size of that. Nobody edited them.

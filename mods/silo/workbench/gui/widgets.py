@@ -48,7 +48,7 @@ def label(text: str, tone: Tone = Tone.PLAIN, *, bold: bool = False, wrap: bool 
     """Plain text that wraps, and that can be selected and copied."""
     made = QtWidgets.QLabel()
     made.setTextFormat(QtCore.Qt.TextFormat.PlainText)
-    made.setText(text)
+    made.setText(words.breakable(text) if wrap else text)
     made.setWordWrap(wrap)
     made.setTextInteractionFlags(QtCore.Qt.TextInteractionFlag.TextSelectableByMouse)
     if wrap:
@@ -76,7 +76,8 @@ def link_button(text: str, call: Callable[[], None], tip: str = "") -> Any:
     made = QtWidgets.QPushButton(text)
     made.setFlat(True)
     made.setCursor(QtCore.Qt.CursorShape.PointingHandCursor)
-    made.setStyleSheet(link_style("#7cb7ff" if is_dark(made) else "#0b5cad"))
+    # By a label: some themes give buttons a light text on grounds of their own, which ours does not have.
+    made.setStyleSheet(link_style("#7cb7ff" if is_dark(QtWidgets.QLabel()) else "#0b5cad"))
     made.setSizePolicy(QtWidgets.QSizePolicy.Policy.Fixed, QtWidgets.QSizePolicy.Policy.Fixed)
     made.setToolTip(words.tip(tip))
     made.clicked.connect(lambda _checked=False: call())

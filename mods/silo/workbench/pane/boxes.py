@@ -58,10 +58,17 @@ class Box(QtWidgets.QFrame):  # type: ignore[misc]
         layout.setSpacing(6)
         if entry.icon:
             layout.addWidget(widgets.picture(entry.icon), 0, QtCore.Qt.AlignmentFlag.AlignTop)
-        layout.addWidget(widgets.label(entry.title, bold=True), 1)
-        when = widgets.label(
-            " · ".join(filter(None, (entry.who, _clock(entry.when)))), Tone.QUIET, wrap=False
-        )
+        title = widgets.label(entry.title, bold=True)
+        if entry.who:
+            # Below the title: a long name would leave it no room.
+            column = QtWidgets.QVBoxLayout()
+            column.setSpacing(0)
+            column.addWidget(title)
+            column.addWidget(widgets.label(entry.who, Tone.QUIET))
+            layout.addLayout(column, 1)
+        else:
+            layout.addWidget(title, 1)
+        when = widgets.label(_clock(entry.when), Tone.QUIET, wrap=False)
         when.setToolTip(time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(entry.when)))
         layout.addWidget(when, 0, QtCore.Qt.AlignmentFlag.AlignTop)
         return layout
@@ -110,7 +117,8 @@ class BannerWidget(QtWidgets.QFrame):  # type: ignore[misc]
             f"QFrame#siloBanner {{ background: {told.ground}; border-radius: 4px; }}"
             f" QFrame#siloBanner QLabel {{ color: {told.ink}; }}"
             if told.ground
-            else ""
+            # The ground of the boxes, for which the colours are chosen; a theme's own may have any shade.
+            else f"QFrame#siloBanner {{ background: {_ground(self)}; border-radius: 4px; }}"
         )
         text = widgets.label(told.text)
         self._layout.addWidget(text)

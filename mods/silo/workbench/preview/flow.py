@@ -3,10 +3,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from silo.bom.errors import SiloError
+from silo.bom.model import BomEntry
 from silo.outbox.entry import new_key
 from silo.workbench.commit.flow import CommitFlow, commit_of
 from silo.workbench.commit.snapshot import Snapshot
@@ -35,9 +36,10 @@ class PreviewFlow:
         register: Callable[[str], None],
         show: Callable[[str, tuple[str, ...]], None],
         view: Callable[[str], None],
+        known: Callable[[str, Iterable[BomEntry]], None] = lambda _path, _entries: None,
     ) -> None:
         self._session, self._commits, self._desk = session, commits, desk
-        self._register, self._show, self._view = register, show, view
+        self._register, self._show, self._view, self._known = register, show, view, known
         self._open: dict[str, Window] = {}
 
     def start(self, doc: Any) -> None:
@@ -87,9 +89,14 @@ class PreviewFlow:
         self._session.ask(
             translate("Silo", "Comparing with Silo"),
             lambda client, control: ask(taken, client, control),
-            done=lambda preview: self._with_dialog(taken.path, lambda dialog: dialog.fill(preview)),
+            done=self._answered,
             failed=lambda error: self._with_dialog(taken.path, lambda dialog: dialog.fail(error)),
         )
+
+    def _answered(self, preview: Preview) -> None:
+        path = preview.snapshot.path
+        self._known(path, preview.top.resolved.entries)
+        self._with_dialog(path, lambda dialog: dialog.fill(preview))
 
     def _with_dialog(self, path: str, call: Callable[[Window], None]) -> None:
         # The window may have been closed while the server was thinking.

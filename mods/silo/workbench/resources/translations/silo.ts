@@ -398,6 +398,26 @@
             <translation type="unfinished" />
         </message>
         <message>
+            <location filename="../../freecad/silo_group.py" />
+            <source>in Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../freecad/silo_group.py" />
+            <source>not registered: left out of the BOM</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../freecad/silo_group.py" />
+            <source>Part number in Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../freecad/silo_group.py" />
+            <source>What Silo knows of this component</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
             <location filename="../../gui/closing.py" />
             <location filename="../../settings/page.py" />
             <source>Silo</source>
