@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from silo.addon_install import CHECKOUT, Place, ask_freecad, install_folder, install_packages
+from silo.addon_install import Place, ask_freecad, install_folder, install_packages
 from silo.bom.errors import ConfigError, InputError
+from silo.files import shipped
 
 STAND_IN = """#!{python}
 import sys, types
@@ -59,7 +60,7 @@ def test_packages_go_where_that_freecad_looks(freecad: tuple[int, int], folder: 
 def test_the_checkout_is_linked_once(tmp_path: Path) -> None:
     """A repeat finds it there."""
     assert "now leads" in install_folder(place(tmp_path))
-    assert place(tmp_path).mod.resolve() == CHECKOUT
+    assert place(tmp_path).mod.resolve() == shipped()
     assert "already" in install_folder(place(tmp_path))
 
 

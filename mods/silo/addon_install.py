@@ -18,15 +18,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from silo.bom.errors import ConfigError, InputError
+from silo.files import shipped
 from silo.freecadcmd.run import find_freecadcmd
 from silo.freecads import exchange_folder, start
 from silo.platform import child_options, python_beside
 
 # As package.xml declares them to the Addon Manager.
-PACKAGES = ("requests>=2.31", "sseclient-py>=1.8", "pydantic>=2.7")
+PACKAGES = ("requests>=2.31", "sseclient-py>=1.8", "pydantic>=2.10")
 FOLDER = "Silo"
-# A checkout has what FreeCAD's loaders want at its root.
-CHECKOUT = Path(__file__).resolve().parents[2]
 
 _ASK = """
 import importlib.util, json, os, sys
@@ -132,13 +131,17 @@ def _any_python() -> str:
     )
 
 
-def install_folder(place: Place, source: Path = CHECKOUT, *, copy: bool = False) -> str:
-    """Link (or copy) the add-on into ``Mod``; returns what was done. A stranger's folder is left alone."""
+def install_folder(place: Place, source: Path | None = None, *, copy: bool = False) -> str:
+    """Link (or copy) the add-on into ``Mod``; returns what was done. A stranger's folder is left alone.
+
+    source
+        holds what FreeCAD's loaders want at its root: the checkout, or what a wheel ships, which is copied.
+    """
+    source = source or shipped()
     if not (source / "package.xml").is_file():
-        raise InputError(
-            f"{source} holds no package.xml: install the add-on from a checkout of silo-mod, or clone it "
-            f"into {place.mod}"
-        )
+        raise InputError(f"{source} holds no package.xml; install silo-mod again")
+    whole = (source / "mods" / "silo").is_dir()
+    copy = copy or not whole
     target = place.mod
     if target.is_symlink() and target.resolve() == source:
         return f"{target} leads to this checkout already"
@@ -152,9 +155,9 @@ def install_folder(place: Place, source: Path = CHECKOUT, *, copy: bool = False)
         target.mkdir()
         for name in names:
             shutil.copy2(source / name, target / name)
-        shutil.copytree(
-            source / "mods" / "silo", target / "mods" / "silo", ignore=shutil.ignore_patterns("__pycache__")
-        )
+        modules = source / "mods" / "silo" if whole else Path(__file__).parent
+        without = shutil.ignore_patterns("__pycache__", "shipped")
+        shutil.copytree(modules, target / "mods" / "silo", ignore=without)
         if (source / "docs").is_dir():
             shutil.copytree(source / "docs", target / "docs", ignore=shutil.ignore_patterns("decisions"))
         return f"copied to {target}"

@@ -101,3 +101,9 @@ def sha256_of(path: str) -> str:
         return content_hash(path)
     except OSError as error:
         raise DocumentError(path, error.strerror or str(error)) from error
+
+
+def shipped() -> Path:
+    """The folder with the example and the add-on's own files: the checkout, or what the wheel holds of it."""
+    wheel = Path(__file__).parent / "shipped"
+    return wheel if wheel.is_dir() else Path(__file__).resolve().parents[2]

@@ -31,6 +31,7 @@ from silo.cli import common, show
 from silo.cli.common import Commands
 from silo.cli.register import proposals_for, register_all
 from silo.cli.serve import need_server_extra
+from silo.files import shipped
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
     from silo.api.client import SiloClient
     from silo.api.wire import MergeEvent
 
-EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "gearbox"
+EXAMPLE = shipped() / "examples" / "gearbox"
 TOP = "TopAssembly.FCStd"
 # Left without a number on purpose, to show what becomes of such parts.
 UNREGISTERED = "MotorMount"
@@ -62,9 +63,7 @@ def run(args: argparse.Namespace) -> int:
     """Run the demo."""
     need_server_extra()
     if not (EXAMPLE / TOP).is_file():
-        raise InputError(
-            f"the example {EXAMPLE / TOP} is not there; the demo runs from a checkout of silo-mod"
-        )
+        raise InputError(f"the example {EXAMPLE / TOP} is not there; install silo-mod again")
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="silo-demo-")))
         stack.enter_context(_private_data(folder / "data"))
