@@ -164,17 +164,9 @@ def violations(page: Page, axe: str) -> list[str]:
     ]
 
 
-@pytest.mark.parametrize(
-    ("scheme", "widths"),
-    [
-        ("light", [1440]),
-        ("dark", [390, 320]),
-        pytest.param("light", [390, 320], marks=pytest.mark.slow),
-        pytest.param("dark", [1440], marks=pytest.mark.slow),
-    ],
-)
+@pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_pages_of_an_edit_have_no_finding(
-    axe: str, api: Api, numbers: dict[str, str], visit: Visit, scheme: str, widths: list[int]
+    axe: str, api: Api, numbers: dict[str, str], visit: Visit, scheme: str
 ) -> None:
     """A choice, two readings, a kept form, columns by hand, a filter; at 1440, 390 and 320 px."""
     page = visit("editor", color_scheme=scheme)
@@ -183,7 +175,7 @@ def test_pages_of_an_edit_have_no_finding(
     path = f"/items/{parent}/bom?edit={child}"
 
     def look(what: str) -> None:
-        for width in widths:
+        for width in (1440, 390, 320):
             page.set_viewport_size({"width": width, "height": 844})
             findings.extend(f"{what} {width}: {finding}" for finding in violations(page, axe))
             wide = "document.documentElement.scrollWidth - document.documentElement.clientWidth"

@@ -40,9 +40,10 @@ def waits(api: Api, folder: str, *, conflict: bool = False, left_out: bool = Fal
         if left_out
         else {}
     )
-    api.good(
-        "POST", bom(parent, "merge"), {**merge_body({used: 4 if conflict else 1}, document=document), **more}
-    )
+    now = {used: 4 if conflict else 1}
+    # Lines of which nobody knows the component stay as they are while one is missing: they are gone before.
+    api.merge(parent, now, document=document)
+    api.good("POST", bom(parent, "merge"), {**merge_body(now, document=document), **more})
     return parent
 
 

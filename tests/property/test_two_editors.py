@@ -141,13 +141,6 @@ def test_nothing_is_lost_or_reverted_without_a_choice(api: Api, seed: int) -> No
     play(api, Random(seed), STEPS)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(10, 22))
-def test_nothing_is_lost_in_long_games(api: Api, seed: int) -> None:
-    """The same for longer."""
-    play(api, Random(seed), 300)
-
-
 def play(api: Api, random: Random, steps: int) -> None:
     """One game; every save is compared with what the three texts of each field say it must do."""
     parent, *children = api.items(3)

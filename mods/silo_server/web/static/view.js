@@ -5,6 +5,8 @@
 import { afterTyping } from "./typing.js";
 
 const form = document.getElementById("view");
+const here = () => location.pathname + location.search;
+let address = here();
 let request = null;
 
 // A form that somebody may have typed into is not replaced; the link or the button then loads the page.
@@ -28,6 +30,7 @@ async function show(url, push) {
     // The link that was used is another element now.
     if (other === focus && focus) document.getElementById(focus)?.focus({ preventScroll: true });
     if (push) history[push]({ view: true }, "", url);
+    address = here();
     document.dispatchEvent(new CustomEvent("shown"));
   } catch (error) {
     shown.removeAttribute("aria-busy");
@@ -65,5 +68,6 @@ if (form) {
   });
 }
 
-// Back and forward: the whole page, with its form as it was then.
-addEventListener("popstate", () => location.reload());
+// Back and forward: the whole page, with its form as it was then. A link to a place on this page comes here as
+// well; it must not throw away what somebody is typing.
+addEventListener("popstate", () => here() !== address && location.reload());
