@@ -2,12 +2,15 @@
 """Photograph the web pages into ``docs/images/web-*.png``: the example assembly on a server of its own.
 
 Run: ``.venv/bin/python scripts/screenshots_web.py [FOLDER]`` (needs Chromium on the machine). Into another
-FOLDER every page is photographed in light and dark, wide and narrow, to look at while working on them.
+FOLDER every page is photographed, in light and wide, in dark and on the narrowest phone, to look at while
+working on them: with the example, with a real project where the test data are at hand, and with 10 000 lines.
 """
 
 from __future__ import annotations
 
+import os
 import shutil
+import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -21,6 +24,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests" / "support"))
 
 from gearbox_story import GearboxStory  # noqa: E402
+from large_boms import write_boms  # noqa: E402
 
 from silo.api.client import SiloClient  # noqa: E402
 from silo_server.run import RunningServer, running_server  # noqa: E402
@@ -28,6 +32,11 @@ from silo_server.settings import Settings  # noqa: E402
 
 DOCS = ROOT / "docs" / "images"
 WIDE, NARROW = {"width": 1200, "height": 800}, {"width": 390, "height": 844}
+SMALLEST = {"width": 320, "height": 640}
+REAL = ROOT.parent / "shared" / "data" / "assemblies" / "lmn3"
+REAL_TOP = "assemblies/assembly.FCStd"
+# A picture of ten thousand rows is too tall for any viewer; its beginning shows how it looks.
+MOST_HEIGHT = 3000
 IMPORT = (
     "Part number,Quantity,Unit,Notes\nM01-0001,1,,\nF01-0001,14,,torque 25 Nm\nC01-0002,0.05,l,oil\nX99,1,,\n"
 )
@@ -57,6 +66,9 @@ def main() -> None:
             else:
                 folder.mkdir(parents=True, exist_ok=True)
                 _all(browser, server, state, top, folder)
+                real = _real(server, Path(scratch))
+                large = write_boms(f"sqlite:///{Path(scratch) / 'silo.db'}")
+                _views(browser, server, state, {"real": real, "wide": large[0], "deep": large[1]}, folder)
             browser.close()
 
 
@@ -101,7 +113,10 @@ def _log_in(browser: Browser, server: RunningServer, state: Path) -> Path:
 
 def _shots(top: str) -> list[Shot]:
     return [
-        Shot("items", "/items", ".items"),
+        Shot("items", "/items", "tbody"),
+        Shot("new", "/items/new"),
+        Shot("edititem", "/items/F01-0001/edit"),
+        Shot("waiting", "/waiting"),
         Shot("item", f"/items/{top}", ".tree"),
         Shot("flat", f"/items/{top}?view=flat"),
         Shot("merge", f"/items/{top}/bom", ".banner.warn"),
@@ -117,27 +132,73 @@ def _shots(top: str) -> list[Shot]:
     ]
 
 
-def _all(browser: Browser, server: RunningServer, state: Path, top: str, folder: Path) -> None:
-    for scheme in ("light", "dark"):
-        for width, viewport in (("wide", WIDE), ("narrow", NARROW)):
+def _real(server: RunningServer, scratch: Path) -> str:
+    """A real project, registered and synced as a user does it; "" where it is not at hand."""
+    if not REAL.is_dir():
+        return ""
+    copy = scratch / "lmn3"
+    shutil.copytree(REAL, copy, copy_function=shutil.copyfile)  # the data are read-only
+    environ = {**os.environ, "SILO_API_URL": server.base_url, "SILO_API_TOKEN": str(server.token)}
+    command = [sys.executable, "-m", "silo.cli.main"]
+    top = str(copy / REAL_TOP)
+    subprocess.run([*command, "register", top, "--yes"], env=environ, check=False)
+    # Some of its files are really missing: what an incomplete BOM looks like.
+    subprocess.run([*command, "sync", top, "--recursive", "--allow-missing"], env=environ, check=False)
+    with SiloClient(server.base_url, server.token) as client:
+        found = client.search_items("assembly")
+    return next((item.part_number for item in found if item.name == "assembly"), "")
+
+
+def _views(browser: Browser, server: RunningServer, state: Path, tops: dict[str, str], folder: Path) -> None:
+    for name, top in tops.items():
+        if not top:
+            continue
+        path = f"/items/{top}"
+        shots = [
+            Shot(f"{name}-tree", path),
+            Shot(f"{name}-tree-all", f"{path}?depth=18&page=10"),
+            Shot(f"{name}-flat", f"{path}?view=flat&sort=-cost&pieces=10"),
+            Shot(f"{name}-found", f"{path}?q=bearing"),
+            Shot(f"{name}-bom", f"{path}/bom"),
+            Shot(f"{name}-history", f"{path}/history"),
+            Shot(f"{name}-compare", f"{path}/compare"),
+            Shot(f"{name}-print", f"{path}/print"),
+            Shot(f"{name}-edit", f"{path}/edit"),
+            Shot(f"{name}-import", f"{path}/import"),
+            Shot(f"{name}-items", "/items?sort=-changed"),
+            Shot(f"{name}-waiting", "/waiting"),
+            Shot(f"{name}-activity", "/activity"),
+        ]
+        for scheme, viewport in (("light", WIDE), ("dark", SMALLEST)):
             context = browser.new_context(
                 base_url=server.base_url, storage_state=state, color_scheme=scheme, viewport=viewport
             )
             page = context.new_page()
-            for shot in _shots(top):
-                _photograph(page, shot, folder / f"{shot.name}-{width}-{scheme}.png")
-            _check_import(page, top)
-            page.screenshot(path=folder / f"checked-{width}-{scheme}.png", full_page=True)
+            for shot in shots:
+                _photograph(page, shot, folder / f"{shot.name}-{scheme}.png")
             context.close()
-            stranger = browser.new_context(
-                base_url=server.base_url, color_scheme=scheme, viewport=viewport
-            ).new_page()
-            _photograph(stranger, Shot("login", "/login"), folder / f"login-{width}-{scheme}.png")
-            stranger.context.close()
+
+
+def _all(browser: Browser, server: RunningServer, state: Path, top: str, folder: Path) -> None:
+    for scheme, width, viewport in (("light", "wide", WIDE), ("dark", "narrow", SMALLEST)):
+        context = browser.new_context(
+            base_url=server.base_url, storage_state=state, color_scheme=scheme, viewport=viewport
+        )
+        page = context.new_page()
+        for shot in _shots(top):
+            _photograph(page, shot, folder / f"{shot.name}-{width}-{scheme}.png")
+        _check_import(page, top)
+        page.screenshot(path=folder / f"checked-{width}-{scheme}.png", full_page=True)
+        context.close()
+        stranger = browser.new_context(
+            base_url=server.base_url, color_scheme=scheme, viewport=viewport
+        ).new_page()
+        _photograph(stranger, Shot("login", "/login"), folder / f"login-{width}-{scheme}.png")
+        stranger.context.close()
 
 
 def _for_docs(browser: Browser, server: RunningServer, state: Path, top: str) -> None:
-    wanted = {"items", "item", "merge", "compare", "activity"}
+    wanted = {"items", "item", "merge", "compare", "activity", "waiting", "edititem"}
     for scheme, viewport, suffix in (("light", WIDE, ""), ("dark", NARROW, "-phone")):
         context = browser.new_context(
             base_url=server.base_url, storage_state=state, color_scheme=scheme, viewport=viewport
@@ -152,7 +213,11 @@ def _for_docs(browser: Browser, server: RunningServer, state: Path, top: str) ->
 def _photograph(page: Page, shot: Shot, path: Path) -> None:
     page.goto(shot.path)
     page.locator(shot.show).first.wait_for()
-    page.screenshot(path=path, full_page=True)
+    width, height = page.evaluate("() => [innerWidth, document.documentElement.scrollHeight]")
+    if page.evaluate("() => document.documentElement.scrollWidth > innerWidth"):
+        print(f"{shot.path} is wider than the screen of {width}")
+    clip = {"x": 0, "y": 0, "width": width, "height": min(height, MOST_HEIGHT)}
+    page.screenshot(path=path, full_page=True, clip=clip)
 
 
 def _check_import(page: Page, top: str) -> None:
