@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -24,7 +25,7 @@ from silo_server.services.bom.last_sync import in_sentences, last_sync
 from silo_server.services.bom.lines import LineId, component_of, line_of, lines_of, mark_of
 from silo_server.services.bom.review import Action, Decision
 from silo_server.services.items import get_item
-from silo_server.values import Actor, Item, Line
+from silo_server.values import Actor, Item, Line, LineState
 from silo_server.web import line_form
 from silo_server.web.forms import AmbiguousError, Form, back, text, texts, whole
 from silo_server.web.guard import Reader, Writer
@@ -307,6 +308,8 @@ def _show(
         item=item,
         total=len(lines),
         table=table,
+        # A line is named by its child, which is shorter than its id, where the child has no other line.
+        several={child for child, count in Counter(line.child_id for line in lines).items() if count > 1},
         table_at=table_at,
         shows=SHOWS,
         editing=editing,
@@ -348,6 +351,10 @@ _SORTS: Mapping[str, Callable[[Line], Any]] = {
 }
 
 
+def _remarks(state: LineState) -> tuple[str | None, ...]:
+    return state.notes, state.reason, state.find_number, *state.reference_designators
+
+
 def table_of(lines: Sequence[Line], path: str, view: str) -> tuple[Page[Line], Address]:
     """The lines that the query ``view`` asks for, and the address with it."""
     asked = {name: value[:200] for name, value in parse_qsl(view) if name in ("q", "show", "sort", "page")}
@@ -356,17 +363,10 @@ def table_of(lines: Sequence[Line], path: str, view: str) -> tuple[Page[Line], A
         line
         for line in lines
         if (shown is None or shown[1](line))
-        and test(
-            line.child_part_number,
-            line.child_name,
-            line.state.notes,
-            line.state.reason,
-            line.state.find_number,
-            *line.state.reference_designators,
-        )
+        and test(line.child_part_number, line.child_name, *_remarks(line.state))
     ]
-    number = asked.pop("page", "1")
-    wanted = int(number) if number.isascii() and number.isdigit() and len(number) < 8 else 1
+    number = asked.pop("page", "")[:7]
+    wanted = int(number) if number.isascii() and number.isdigit() else 1
     table = page_of(arranged(found, asked.get("sort", ""), _SORTS), len(lines), wanted)
     return table, Address(path, asked | ({"page": str(table.number)} if table.number > 1 else {}))
 
