@@ -36,6 +36,9 @@ class Kind(Enum):
     LOCAL = auto()  # geometry modelled in this very file
     NOTHING = auto()  # joints, sheets, sketches, datums, variables
 
+    # Each is there once. Enum's own hash is written in Python, and a walk asks for it thousands of times.
+    __hash__ = object.__hash__
+
 
 COMPONENTS = frozenset({Kind.LINK, Kind.ASSEMBLY_LINK})
 INLINE = frozenset({Kind.LINK_GROUP, Kind.CONTAINER, Kind.FOLDER})
@@ -156,6 +159,12 @@ def is_assembly3(obj: object) -> bool:
 
 def no_component(obj: object) -> str:
     """What a link's target is instead of a component ("a spreadsheet"); "" where it may well be one."""
+    if derived(obj, "PartDesign::Body") or derived(obj, "App::Part"):  # most are, so no long list for them
+        return ""
+    if derived(obj, "Part::Feature") and not (
+        derived(obj, "Part::Part2DObject") or derived(obj, "Part::Datum")
+    ):
+        return ""
     if derived(obj, "App::FeaturePython") and (has_own(obj, "JointType") or has_own(obj, "ObjectToGround")):
         return "a joint"
     return next((words for name, words in _NO_COMPONENTS.items() if derived(obj, name)), "")

@@ -45,14 +45,21 @@ class Members:
         self._way = way
         self._identity = (identity_of(container) or "").lower()
         self._groups: dict[Key, Leaves] = {}
+        self._inside: tuple[Any, list[Member]] | None = None
         self.declared: set[Key] = set()
         self.shown: set[Key] = set()
         self.features: list[Any] = []
         self.array_left_out = False
 
+    def inside(self, container: Any) -> list[Member]:
+        """All that lies in a container within its own file; looked through once for each in turn."""
+        if self._inside is None or self._inside[0] is not container:
+            self._inside = (container, list(flattened(container, self._key, self.is_closed)))
+        return self._inside[1]
+
     def leaves(self, container: Any) -> Leaves:
         """The objects that lie in a container and are counted on their own, and how often each is shown."""
-        found = list(flattened(container, self._key, self.is_closed))
+        found = self.inside(container)
         self.features += [obj for _, obj, kind in found if kind is Kind.LOCAL]
         left_out = self.left_out(found)
         covered = left_out | self._repeated(found, left_out) | self._grouped(found, left_out)

@@ -22,11 +22,11 @@ from typing import TYPE_CHECKING, Any
 
 from silo.bom.document import label_of, same_document
 from silo.bom.findings import FindingCode
-from silo.bom.walk.arrays import draft_count, elements, is_array
+from silo.bom.walk.arrays import draft_count, elements
 from silo.bom.walk.consumed import consumed
 from silo.bom.walk.copies import own_parts, stale_copies
 from silo.bom.walk.counts import Contents, Count, Key, Leaves, Lost, Worth, add
-from silo.bom.walk.kinds import COMPONENTS, INLINE, REPEATERS, Kind, flattened, kind_of, sources
+from silo.bom.walk.kinds import COMPONENTS, INLINE, REPEATERS, Kind, kind_of, sources
 from silo.bom.walk.members import DECLARABLE, Members
 from silo.bom.walk.standard import STANDARD_PARTS
 from silo.bom.walk.targets import Target, is_assembly_link, is_link
@@ -78,7 +78,7 @@ class Reading:
 
     def _look_at_the_rest(self, container: Any) -> None:
         """What lies in the assembly and is no component."""
-        found = list(flattened(container, self._key, self._members.is_closed))
+        found = [*self._members.inside(container)]
         found += [(key, obj, kind) for key, (obj, kind, _) in self._of_repeater(container).items()]
         left_out = self._members.left_out(found)
         for key, obj, kind in found:
@@ -200,9 +200,8 @@ class Reading:
         if self._members.report_left_out(link):
             self._holds_components = True
             return {}
-        if is_array(link):
-            for element in elements(link):
-                self._members.report_left_out(element)
+        for element in elements(link):
+            self._members.report_left_out(element)
         target = self._reader.resolve(link)
         if target.obj is None:
             self._holds_components = True
@@ -244,7 +243,9 @@ class Reading:
             self._links.add(key)
             self._notes.link_type(link)
         self._remarks(link, target)
-        whole = {brought: (obj, count * target.instances) for brought, (obj, count) in worth.items()}
+        whole = worth
+        if target.instances != 1:
+            whole = {brought: (obj, count * target.instances) for brought, (obj, count) in worth.items()}
         if is_assembly_link(link):
             for part in own_parts(link, target.obj, self._key):
                 add(whole, self._worth(self._key(part), part, kind_of(part)))
