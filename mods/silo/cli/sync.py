@@ -236,7 +236,9 @@ def _show(result: TopResult, *, whole: bool) -> None:
 
     out = show.console()
     if result.error is not None:
-        out.print(f"✗ {show.plain(result.top)}: {show.plain(str(result.error))}", style="red", markup=False)
+        words = str(result.error)
+        where = "" if os.path.basename(result.top) in words else f"{result.top}: "
+        out.print(f"✗ {show.plain(where + words)}", style="red", markup=False)
         return
     for outcome in result.outcomes:
         if not whole and not is_news(outcome):
