@@ -3,15 +3,20 @@
 
 Run: ``.venv/bin/python scripts/screenshots_freecad.py [FOLDER] [STYLE]``. It needs FreeCAD and Xvfb; the
 newest of ``scripts/freecad-roots.sh --list`` is taken, or that of ``SILO_PICTURES_FREECAD`` (such as 1.0).
+With ``--tour`` it makes the animated ``addon-tour.gif`` instead: a commit after a colleague's.
 STYLE names a style sheet of FreeCAD, such as "FreeCAD Dark.qss", to look at the windows in another theme.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import sys
 import tempfile
+import zipfile
 from pathlib import Path
+
+from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "tests" / "freecad"), str(ROOT / "tests" / "support")]
@@ -32,6 +37,8 @@ LATER = ("Cover", "MotorMount")
 
 def main() -> None:
     """Set the stage, then let FreeCAD photograph itself."""
+    tour = "--tour" in sys.argv
+    sys.argv = [word for word in sys.argv if word != "--tour"]
     folder = Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else DOCS
     folder.mkdir(parents=True, exist_ok=True)
     version = os.environ.get("SILO_PICTURES_FREECAD") or max(
@@ -43,9 +50,15 @@ def main() -> None:
     ):
         freecad.prepare()
         with freecad.server.client() as client:
-            prepare(freecad, client)
+            top = prepare(freecad, client)
+        freecad.answers["colleague commits"] = lambda: colleague_commits(freecad, *top)
         furnish(freecad.home / "user.cfg", sys.argv[2] if len(sys.argv) > 2 else "")
-        freecad.run("pictures.py", env={"SILO_PICTURES": str(folder), "QT_XCB_NO_MITSHM": "1"})
+        env = {"SILO_PICTURES": str(folder), "QT_XCB_NO_MITSHM": "1"}
+        if tour:
+            env["SILO_TOUR"] = "1"
+        freecad.run("pictures.py", env=env)
+    if tour:
+        animate(folder)
     for picture in sorted(folder.glob("addon-*.png")):
         print(f"{picture}  {picture.stat().st_size / 1000:.0f} kB")
 
@@ -65,7 +78,34 @@ def furnish(config: Path, style: str) -> None:
     config.write_text(config.read_text().replace(mod, more + mod))
 
 
-def prepare(freecad: Window, client: SiloClient) -> None:
+def animate(folder: Path) -> None:
+    """The frames of the tour as one animated picture."""
+    frames = sorted(folder.glob("tour-*.png"), key=lambda path: int(path.stem.removeprefix("tour-")))
+    images = [Image.open(path).convert("RGB").resize((990, 600), Image.Resampling.LANCZOS) for path in frames]
+    few = [image.quantize(96, dither=Image.Dither.NONE) for image in images]
+    few[0].save(
+        folder / "addon-tour.gif", save_all=True, append_images=few[1:], duration=2200, loop=0, optimize=True
+    )
+    for path in frames:
+        path.unlink()
+
+
+def colleague_commits(freecad: Window, number: str, top: Path) -> str:
+    """Somebody else commits the assembly with another number of bolts, from a copy of it."""
+    copy = freecad.folder / "colleague" / top.name
+    copy.parent.mkdir()
+    with zipfile.ZipFile(top) as source, zipfile.ZipFile(copy, "w", zipfile.ZIP_DEFLATED) as target:
+        for entry in source.infolist():
+            content = source.read(entry)
+            if entry.filename == "Document.xml":
+                content = re.sub(rb'(name="ElementCount"[^>]*>\s*<Integer value=")4"', rb'\g<1>5"', content)
+            target.writestr(entry, content)
+    with freecad.server.client() as client:
+        client.upload_file(number, copy, comment="One bolt more for the cover")
+    return number
+
+
+def prepare(freecad: Window, client: SiloClient) -> tuple[str, Path]:
     """A server that knows the assembly from before, and on which people have worked since."""
     story = GearboxStory(freecad.folder, client)
     extraction = read_assembly(str(story.top))
@@ -80,6 +120,7 @@ def prepare(freecad: Window, client: SiloClient) -> None:
     story.upload()
     story.sync()
     people_worked(story, client)
+    return story.number_of("TopAssembly"), story.top
 
 
 def people_worked(story: GearboxStory, client: SiloClient) -> None:

@@ -46,6 +46,9 @@ def story() -> None:
     wait(lambda: one.session.shown.connection == "online")
     top = open_machine()
     arrange(one)
+    if os.environ.get("SILO_TOUR"):
+        tour(one, top)
+        return
     new_parts(top)
     preview(one, top)
     registering(one, top)
@@ -191,6 +194,50 @@ def show(top: Any) -> None:
     view.viewIsometric()
     view.fitAll()
     view.setNavigationType("Gui::CADNavigationStyle")
+
+
+# --- the tour --------------------------------------------------------------------------------------------
+
+
+def tour(one: Any, top: Any) -> None:
+    """A commit while a colleague has committed the same assembly: frames for an animated picture."""
+    frames: list[Any] = []
+
+    def frame() -> None:
+        still(600)
+        screen = QtGui.QGuiApplication.primaryScreen() if hasattr(QtGui, "QGuiApplication") else None
+        screen.grabWindow(0, 0, 0, WIDTH, HEIGHT).save(str(PICTURES / f"tour-{len(frames)}.png"))
+        frames.append(None)
+
+    show(top)
+    frame()
+    top.getObject(_named(top, "CoverBolts")).ElementCount = 6
+    top.recompute()
+    ask("colleague commits")
+    wait(lambda: boxes("Revision ") and settled())
+    frame()
+
+    def answer(found: Any) -> None:
+        found.resize(860, 420)
+        found.move(60, 180)
+        found.comment.setPlainText("Two more cover bolts")
+        frame()
+        wait(lambda: found._choices)
+        frame()
+        for box in found._choices.values():
+            box.showPopup()
+            frame()
+            box.hidePopup()
+            box.setCurrentIndex(next(n for n in range(box.count()) if box.itemData(n) == "on top"))
+            box.activated.emit(box.currentIndex())
+        frame()
+        found.commit.click()
+
+    with dialog("SiloCommitDialog", answer):
+        Gui.runCommand("Origin_Commit")
+    wait(lambda: boxes("BOM Updated") or boxes("Committed"))
+    wait(settled)
+    frame()
 
 
 # --- what is photographed --------------------------------------------------------------------------------

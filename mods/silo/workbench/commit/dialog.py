@@ -104,8 +104,10 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
             item.setData(0, QtCore.Qt.ItemDataRole.UserRole, number)
             self._mark(item, row, tree)
             tree.addTopLevelItem(item)
-        tree.header().setStretchLastSection(True)
-        tree.resizeColumnToContents(0)
+        # The state has the rest of the width: a long name must not push it out of sight.
+        tree.header().setStretchLastSection(False)
+        tree.header().setSectionResizeMode(1, QtWidgets.QHeaderView.ResizeMode.Stretch)
+        self._fit(tree, 0)
         return tree
 
     def _make_selecting(self) -> Any:
@@ -162,6 +164,12 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         """The comment."""
         return str(self.comment.toPlainText()).strip()
 
+    def _fit(self, tree: Any, column: int) -> None:
+        """As wide as its texts, but not more than some thirty letters; tool tips have the rest."""
+        tree.resizeColumnToContents(column)
+        most = 32 * tree.fontMetrics().averageCharWidth()
+        tree.setColumnWidth(column, min(tree.columnWidth(column) + 8, most))
+
     # -- what colleagues did ----------------------------------------------------------------------------
 
     def show_theirs(self, found: Mapping[str, Theirs]) -> None:
@@ -177,7 +185,7 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
             self.files.setColumnHidden(_CHOICE, False)
             self.files.setRootIsDecorated(True)
             for column in (0, _CHOICE):
-                self.files.resizeColumnToContents(column)
+                self._fit(self.files, column)
             self.resize(max(self.width(), 860), max(self.height(), 460))
         self._update_commit()
 
