@@ -8,8 +8,9 @@ import ntpath
 from typing import Any
 
 import pytest
+from fakes import Doc
 
-from silo.bom import BomEntry, Extraction, Finding, FindingCode, Place, Severity, diff_bom
+from silo.bom import BomEntry, Extraction, Finding, FindingCode, Place, Severity, diff_bom, extract
 from silo.bom.errors import InputError
 from silo.bom.report import (
     bom_json,
@@ -71,7 +72,7 @@ def test_the_json_of_the_command() -> None:
             "code": "missing_file",
             "severity": "error",
             "message": "parts/b.FCStd is missing",
-            "where": ["top.FCStd#L"],
+            "where": [{"file": "top.FCStd", "object": "L"}],
         }
     ]
 
@@ -150,3 +151,11 @@ def test_a_project_folder_is_the_same_on_every_machine(path: str, top: str, fold
         "C:" + path.replace("/", "\\"), "C:" + top.replace("/", "\\") if top else "", ntpath
     )
     assert windows == folder or "/" not in path
+
+
+def test_a_label_of_megabytes_is_cut() -> None:
+    """In findings, lines and JSON alike."""
+    top = Doc("/v/top.FCStd")
+    members = top.link("L", None), top.body("B", Label="x" * 1_000_000)
+    found = extract(top.assembly(*members, Label="y" * 1_000_000))
+    assert len(json.dumps(bom_json(found))) < 5000

@@ -180,7 +180,7 @@ def test_a_missing_file_never_reads_as_removed(run: Any, silo: Any, gearbox: Pat
     [cause] = outcome["blocked_by"]
     assert cause["code"] == "missing_file"
     assert "parts/Cover.FCStd" in cause["message"]
-    assert cause["where"] == ["TopAssembly.FCStd#Cover"]
+    assert cause["where"] == [{"file": "TopAssembly.FCStd", "object": "Cover"}]
     allowed = run("sync", gearbox, "--allow-missing", "--json").json()["results"][0]["assemblies"][0]
     assert allowed["status"] == "merged"
     assert allowed["diff"]["removed"] == []

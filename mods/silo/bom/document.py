@@ -94,6 +94,10 @@ def object_name(obj: object) -> str:
     return f"{NAMELESS}{id(obj):x}"
 
 
+# A damaged or hostile file may hold megabytes; nobody reads more than this.
+_LONGEST_LABEL = 300
+
+
 def label_of(obj: object) -> str:
     """The object's ``Label``, for people only; its ``Name`` where it has none that can be read."""
     for name in ("Label", "Name"):
@@ -102,7 +106,7 @@ def label_of(obj: object) -> str:
         except DocumentError:  # a message about a damaged object must not fail for its label
             continue
         if isinstance(text, str) and text:
-            return text
+            return text if len(text) <= _LONGEST_LABEL else f"{text[:_LONGEST_LABEL]}…"
     return "an unnamed object"
 
 

@@ -10,7 +10,7 @@ from types import ModuleType
 from typing import Any
 
 from silo.bom.errors import InputError
-from silo.bom.findings import Finding, Place
+from silo.bom.findings import Finding
 from silo.bom.identity import walk_entries
 from silo.bom.model import BomDiff, BomEntry, Extraction, rows_as_dicts
 from silo.bom.naming import display_name
@@ -73,7 +73,7 @@ def entry_json(entry: BomEntry, base: str) -> dict[str, Any]:
 
 
 def finding_json(finding: Finding, base: str) -> dict[str, Any]:
-    """One finding; places are ``file#object`` relative to the top file's folder.
+    """One finding; places are ``file`` and ``object``, files relative to the top file's folder.
 
     A broken link also has the ``file`` that it records, and the one that was probably meant, if there is one.
     """
@@ -82,7 +82,7 @@ def finding_json(finding: Finding, base: str) -> dict[str, Any]:
         "code": finding.code.value,
         "severity": finding.severity.value,
         "message": shorten(finding.message, base),
-        "where": [str(Place(relative(place.doc_path, base), place.obj)) for place in finding.where],
+        "where": [{"file": relative(place.doc_path, base), "object": place.obj} for place in finding.where],
         **{key: relative(path, base) for key, path in files.items() if path},
     }
 
