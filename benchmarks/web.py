@@ -6,7 +6,7 @@
 The server is a process of its own on SQLite, on the loopback. Each page is opened N times in a fresh context.
 Printed are medians: kB over the wire with all style sheets, scripts and pictures; the same once more with
 what the browser kept; requests; ms of CPU of the server, and of the page's main thread in the browser; ms
-until the last byte of the page; ms until the first contentful paint (it shows the table: the page comes as one
+until the last byte of the page; ms until the first contentful paint (it shows the table: all comes as one
 piece); DOM nodes; and ms of an interaction, from the key or the click to the new table on the screen.
 """
 

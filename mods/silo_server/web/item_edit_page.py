@@ -46,7 +46,7 @@ LABELS = {
     "long_description": "Long description",
 }
 EMPTY_ROWS = 2
-LONGEST = 10_000
+SHORT, LONGEST = 200, 10_000
 
 
 @dataclass(frozen=True)
@@ -281,7 +281,8 @@ def _typed(form: FormData, prefix: str = "") -> dict[str, str]:
 
 
 def _text(form: FormData, key: str) -> str:
-    return text(form, key, LONGEST).replace("\r\n", "\n")
+    most = SHORT if key == "name" else LONGEST
+    return text(form, key, most).replace("\r\n", "\n")
 
 
 def _is_plain(value: Any) -> bool:
