@@ -7,6 +7,7 @@ import argparse
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from silo.bom.errors import InputError
 from silo.cli import common
 from silo.cli import inertia_common as shared
 from silo.cli.common import Commands
@@ -48,6 +49,10 @@ def register(commands: Commands) -> None:
 def run(args: argparse.Namespace) -> int:
     """Calculate and show; 1 for warnings with --strict, or items that a push did not find."""
     shared.need_inertia_extra(args.via)
+    if args.no_hardware:
+        raise InputError(
+            "mass weighs every part that is there; --no-hardware cannot leave standard parts out"
+        )
     # The documents hold identities; their part numbers are the server's, for a preview as well.
     shared.check_options(args, asks_server=args.push)
     from silo.inertia.calculator import Task, calculate
