@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -55,6 +57,7 @@ class AddOn:
         self._registrations: RegisterFlow | None = None
         self._hook: CommitHook | None = None
         self._drawn: Shown | None = None
+        self._window: Any = None
         self._timer: Any = None
         self._watch: Any = None
 
@@ -191,7 +194,24 @@ class AddOn:
     def _draw(self) -> None:
         shown, self._drawn = self._drawn, None
         if shown is not None:
-            self.dock.update_shown(shown)
+            self.dock.update_shown(replace(shown, presence=self._presence()) if shown.newer else shown)
+
+    def _presence(self) -> tuple[str, ...]:
+        """What colleagues committed of the documents that are open, since they were opened."""
+        told = []
+        for doc in host.documents():
+            identity = self.desk.identity(doc) if doc.FileName else None
+            newer = self.session.newer_than(identity, self.opened.of(doc).since) if identity else None
+            if newer is not None:
+                text = translate("Silo", "{who} committed {name} (revision {n}) since you opened it.")
+                for key, value in (
+                    ("{who}", newer.who or translate("Silo", "Somebody")),
+                    ("{name}", plain(f"{newer.part_number} {doc.Label}", 60)),
+                    ("{n}", str(newer.revision)),
+                ):
+                    text = text.replace(key, value)
+                told.append(text)
+        return tuple(told)
 
     def _sent(self, sent: Sent) -> None:
         """A commit of this FreeCAD arrived."""
@@ -291,6 +311,32 @@ class AddOn:
             from silo.workbench.mass.flow import MassFlow
 
             MassFlow().start(doc)
+
+    def open_from_silo(self) -> None:
+        """Find an item and open its file."""
+        from silo.workbench.revisions.dialog import OpenDialog
+
+        doc = host.active_document()
+        folder = os.path.dirname(doc.FileName) if doc is not None and doc.FileName else ""
+        self._window = OpenDialog(self.revisions, host.main_window(), folder)
+        self._window.show()
+
+    def history(self) -> None:
+        """The revisions of the active document."""
+        from silo.workbench.revisions.dialog import HistoryDialog
+
+        doc = host.active_document()
+        if doc is None or not doc.FileName:
+            return
+        identity = self.desk.identity(doc)
+        if not identity:
+            name = plain(os.path.basename(doc.FileName), 80)
+            text = translate("Silo", "{name} has no Silo part number yet. Register it first.")
+            self.desk.warn(translate("Silo", "History"), text.replace("{name}", name))
+            return
+        self._window = HistoryDialog(self.revisions, host.main_window(), doc.FileName)
+        self._window.show()
+        self.revisions.history(identity, self.opened.of(doc), self._window.fill, self._window.fail)
 
     def register_path(self, path: str) -> None:
         """Give part numbers to the components of this document, where it is open."""

@@ -21,6 +21,8 @@ HELP = "Silo_Help"
 INSTALL = "Silo_InstallPackages"
 ACTIVITY = "Silo_Activity"
 SETTINGS = "Silo_Settings"
+OPEN = "Silo_Open"
+HISTORY = "Silo_History"
 
 
 class Command:
@@ -112,6 +114,19 @@ def commands(addon: Any) -> dict[str, Command]:
             icon="silo-activity",
             keys="Ctrl+Alt+A",
             run=addon.show_activity,
+        ),
+        OPEN: Command(
+            text=translate("Silo", "Open from Silo…"),
+            tip=translate("Silo", "Find an item in Silo and open its file with all that it links to"),
+            icon="silo-open",
+            run=addon.open_from_silo,
+        ),
+        HISTORY: Command(
+            text=translate("Silo", "History…"),
+            tip=translate("Silo", "The revisions of this document: who, when, and what changed in the BOM"),
+            icon="silo-history",
+            run=addon.history,
+            active=addon.has_document,
         ),
         SETTINGS: Command(
             text=translate("Silo", "Silo Settings…"),

@@ -20,8 +20,10 @@ from silo.workbench.commands import (
     COMMIT,
     FALLBACK,
     HELP,
+    HISTORY,
     INSTALL,
     MASS,
+    OPEN,
     OWN_COMMIT,
     REGISTER,
     SETTINGS,
@@ -37,7 +39,7 @@ PREFERENCE_GROUP = "Silo"
 LOADING_MS = 30
 
 TOOLBAR = (COMMIT, BOM, REGISTER, ACTIVITY)
-MENU = (COMMIT, BOM, REGISTER, MASS, ACTIVITY, SETTINGS, HELP)
+MENU = (COMMIT, OPEN, HISTORY, BOM, REGISTER, MASS, ACTIVITY, SETTINGS, HELP)
 
 # Kept for FreeCAD's whole run: its C++ side holds no reference to what Python hands over.
 _kept: list[Any] = []

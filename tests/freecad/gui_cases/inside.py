@@ -26,7 +26,7 @@ except ImportError:
 FOLDER = Path(os.environ["SILO_TEST_FOLDER"])
 VAULT = FOLDER / "vault"
 WAIT_S = 40
-LONGEST_S = 60
+LONGEST_S = int(os.environ.get("SILO_TEST_LONGEST", "60"))
 
 _told: dict[str, Any] = {}
 

@@ -80,6 +80,8 @@ class Window:
     folder: Path
     server: Server
     answers: dict[str, Callable[[], Any]] = field(default_factory=dict)
+    # Two that run at once look for free screens from here.
+    screen: int = 0
 
     @property
     def vault(self) -> Path:
@@ -132,7 +134,7 @@ class Window:
         log = self.folder / "freecad.log"
         command = [
             self.freecad.sibling("xvfb-run"),
-            *("-n", str(FIRST_SCREEN + 100 * WORKER), "-a", "-s", "-screen 0 1600x1000x24"),
+            *("-n", str(FIRST_SCREEN + 100 * WORKER + self.screen), "-a", "-s", "-screen 0 1600x1000x24"),
             self.freecad.command.replace("freecadcmd", "freecad"),
             str(SCRIPTS / script),
         ]

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from urllib.parse import urlsplit
 
 from silo.workbench.pane.activity import Action, Do, Tone
@@ -12,6 +12,8 @@ from silo.workbench.words import plain, translate
 
 # Ground and ink; yellow read-only, orange degraded, red offline, as the Kindred workbench has them.
 _YELLOW, _ORANGE, _RED = ("#ffe08a", "#4a3b00"), ("#ffc078", "#5c2b00"), ("#f8b4b9", "#5f0a12")
+
+_MOST_PRESENT = 5
 
 
 @dataclass(frozen=True)
@@ -26,7 +28,19 @@ class Banner:
 
 
 def banner(shown: Shown) -> Banner:
-    """The banner for a state."""
+    """The banner for a state: the connection, and what colleagues committed of the open documents."""
+    made = _connection(shown)
+    if not shown.presence:
+        return made
+    more = shown.presence[:_MOST_PRESENT]
+    left = len(shown.presence) - len(more)
+    if left:
+        more = (*more, translate("Silo", "… and {n} more").replace("{n}", str(left)))
+    ground, ink = (made.ground, made.ink) if made.ground else _YELLOW
+    return replace(made, text="\n".join((made.text, *more)), ground=ground, ink=ink)
+
+
+def _connection(shown: Shown) -> Banner:
     settings = Action(Do.SETTINGS, translate("Silo", "Settings…"))
     again = Action(Do.RETRY, translate("Silo", "Try again"))
     if not shown.server.configured:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from silo.bom.errors import DocumentError, SiloError
 from silo.folders import cache_folder
-from silo.workbench.commit.snapshot import part_identity
+from silo.workbench.commit.opened import Base
 from silo.workbench.commit.theirs import Choice, Theirs
 from silo.workbench.pane.activity import Entry, Line, Tone
 from silo.workbench.session.session import Session
@@ -238,16 +238,13 @@ class RevisionFlow:
     # -- the history of a document ----------------------------------------------------------------------
 
     def history(
-        self, doc: Any, base: Any, done: Callable[[History], None], failed: Callable[[SiloError], None]
-    ) -> bool:
-        """The revisions of a document's item; False where the document has none.
+        self, identity: str, base: Base, done: Callable[[History], None], failed: Callable[[SiloError], None]
+    ) -> None:
+        """The revisions of a document's item.
 
         base
-            what the document was made from (:class:`silo.workbench.commit.opened.Base`).
+            what the document was made from.
         """
-        identity = part_identity(doc)
-        if not identity:
-            return False
         outbox = self._session.outbox
 
         def run(client: SiloClient, _control: Control) -> History:
@@ -264,7 +261,6 @@ class RevisionFlow:
             return History(known, made_from.revision_number if made_from is not None else None)
 
         self._session.ask(translate("Silo", "Asking Silo"), run, done, failed)
-        return True
 
     def bom_change(
         self,

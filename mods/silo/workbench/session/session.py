@@ -39,6 +39,8 @@ class Shown:
         all that is in the outbox, oldest first.
     newer
         UUID of an item → the newest commit of it that another FreeCAD has made since this one runs.
+    presence
+        the same in words, for the documents that are open.
     """
 
     server: Server = field(default_factory=Server)
@@ -48,6 +50,7 @@ class Shown:
     waiting: tuple[Waiting, ...] = ()
     activity: Activity = field(default_factory=Activity)
     newer: Mapping[str, Newer] = field(default_factory=dict)
+    presence: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,28 @@
         <name>Silo</name>
         <message>
             <location filename="../../addon.py" />
+            <source>{who} committed {name} (revision {n}) since you opened it.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../addon.py" />
+            <location filename="../../commit/dialog.py" />
+            <location filename="../../commit/theirs.py" />
+            <source>Somebody</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../addon.py" />
+            <source>{name} has no Silo part number yet. Register it first.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../addon.py" />
+            <source>History</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../addon.py" />
             <source>[Silo] This document is not open: </source>
             <translation type="unfinished" />
         </message>
@@ -97,6 +119,26 @@
         <message>
             <location filename="../../commands.py" />
             <source>Show what happens in Silo, and what waits to be sent</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Open from Silo…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>Find an item in Silo and open its file with all that it links to</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>History…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commands.py" />
+            <source>The revisions of this document: who, when, and what changed in the BOM</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -224,12 +266,6 @@
         <message>
             <location filename="../../commit/dialog.py" />
             <source>… and {n} more lines</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../commit/dialog.py" />
-            <location filename="../../commit/theirs.py" />
-            <source>Somebody</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -470,6 +506,7 @@ They are installed in {folder}.</source>
             <location filename="../../mass/dialog.py" />
             <location filename="../../preview/dialog.py" />
             <location filename="../../register/dialog.py" />
+            <location filename="../../revisions/dialog.py" />
             <source>Close</source>
             <translation type="unfinished" />
         </message>
@@ -638,6 +675,12 @@ They are installed in {folder}.</source>
         </message>
         <message>
             <location filename="../../pane/banner.py" />
+            <location filename="../../pane/boxes.py" />
+            <source>… and {n} more</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/banner.py" />
             <source>Settings…</source>
             <translation type="unfinished" />
         </message>
@@ -699,11 +742,6 @@ They are installed in {folder}.</source>
         <message>
             <location filename="../../pane/boxes.py" />
             <source>{n} things wait to be sent</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/boxes.py" />
-            <source>… and {n} more</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -894,6 +932,7 @@ They are installed in {folder}.</source>
             <location filename="../../preview/columns.py" />
             <location filename="../../preview/dialog.py" />
             <location filename="../../register/dialog.py" />
+            <location filename="../../revisions/dialog.py" />
             <source>Part number</source>
             <translation type="unfinished" />
         </message>
@@ -901,6 +940,7 @@ They are installed in {folder}.</source>
             <location filename="../../preview/columns.py" />
             <location filename="../../preview/dialog.py" />
             <location filename="../../register/dialog.py" />
+            <location filename="../../revisions/dialog.py" />
             <source>Name</source>
             <translation type="unfinished" />
         </message>
@@ -1412,6 +1452,126 @@ They are installed in {folder}.</source>
         <message>
             <location filename="../../register/rows.py" />
             <source>The following components have no Silo part number and will be excluded from the BOM until registered:</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Revision</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>When</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Who</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Comment</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Fetching…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Opened.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Replace edited files (copies are kept)</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Open from Silo</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Part number, name or description</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Open</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Project folder:</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Nothing found.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>newest</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>with the newest of all that it links to</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>It has no file in Silo.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Choose the project folder first.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>History of {name}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Get This Revision as a Copy…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Asking Silo…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>yours</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Comparing…</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>BOM: {changes}</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>No change of the BOM.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../revisions/dialog.py" />
+            <source>Choose a folder</source>
             <translation type="unfinished" />
         </message>
         <message>

@@ -1,0 +1,353 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""*Open from Silo…* and *History*: two windows over :mod:`silo.workbench.revisions.flow`. Not modal."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from silo.bom.errors import SiloError
+from silo.workbench.gui import widgets
+from silo.workbench.gui.qt import QtCore, QtGui, QtWidgets
+from silo.workbench.pane.activity import Tone
+from silo.workbench.revisions.flow import History, Known, RevisionFlow, left_alone
+from silo.workbench.words import plain, tip, translate
+
+if TYPE_CHECKING:
+    from silo.api.wire import Item, Revision
+    from silo.vault.pull import Pulled
+
+# Milliseconds after the last key.
+TYPING_MS = 250
+PICTURE = 128
+_DATA = QtCore.Qt.ItemDataRole.UserRole
+
+
+def revision_texts(revision: Revision) -> list[str]:
+    """Number, time, who, comment."""
+    when = revision.created_at.astimezone().strftime("%Y-%m-%d %H:%M") if revision.created_at else ""
+    return [
+        str(revision.revision_number),
+        when,
+        plain(revision.created_by or "", 40),
+        plain(revision.comment),
+    ]
+
+
+def _table(name: str, headings: Sequence[str]) -> Any:
+    tree = QtWidgets.QTreeWidget()
+    tree.setObjectName(name)
+    tree.setRootIsDecorated(False)
+    tree.setHeaderLabels(list(headings))
+    tree.header().setStretchLastSection(True)
+    return tree
+
+
+def _revisions_table() -> Any:
+    headings = (
+        translate("Silo", "Revision"),
+        translate("Silo", "When"),
+        translate("Silo", "Who"),
+        translate("Silo", "Comment"),
+    )
+    return _table("revisions", headings)
+
+
+def _buttons(texts: Sequence[tuple[str, str, Callable[[], None]]]) -> tuple[Any, list[Any]]:
+    box, made = QtWidgets.QHBoxLayout(), []
+    box.addStretch(1)
+    for name, text, call in texts:
+        button = QtWidgets.QPushButton(text)
+        button.setObjectName(name)
+        button.setAutoDefault(False)
+        button.clicked.connect(lambda _checked=False, call=call: call())
+        box.addWidget(button)
+        made.append(button)
+    return box, made
+
+
+class _Window(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
+    """What both have: a line of news below, and fetching into a folder."""
+
+    def __init__(self, flow: RevisionFlow, parent: Any, name: str, title: str) -> None:
+        super().__init__(parent)
+        self._flow = flow
+        self._closed = False
+        self._again: Callable[[], None] = lambda: None
+        self.setObjectName(name)
+        self.setWindowTitle(title)
+        self.setAttribute(QtCore.Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.finished.connect(self._end)
+        self.news = widgets.label("", Tone.QUIET)
+
+    def _end(self, _result: int = 0) -> None:
+        self._closed = True
+
+    def _alive(self, call: Callable[[Any], None]) -> Callable[[Any], None]:
+        """An answer that comes after the window was closed is nobody's."""
+        return lambda found: None if self._closed else call(found)
+
+    def say(self, text: str, tone: Tone = Tone.QUIET) -> None:
+        """The line of news."""
+        self.news.setText(text)
+        widgets.paint(self.news, tone)
+
+    def fail(self, error: SiloError) -> None:
+        """What went wrong."""
+        self.say(str(error), Tone.ERROR)
+
+    def fetch(self, part_number: str, revision: int | None, folder: Path, *, overwrite: bool = False) -> None:
+        """Fetch into a folder, then open it; what was left alone is said, with the way to replace it."""
+        self.say(translate("Silo", "Fetching…"))
+
+        def done(pulled: Pulled) -> None:
+            self._flow.open(str(pulled.top))
+            if self._closed:
+                return
+            told = left_alone(pulled)
+            self.say("\n".join(told) or translate("Silo", "Opened."), Tone.WARNING if told else Tone.QUIET)
+            self._offer(part_number, revision, folder, pulled)
+
+        self._flow.pull(
+            part_number, revision, folder, overwrite=overwrite, done=done, failed=self._alive(self.fail)
+        )
+
+    def _offer(self, part_number: str, revision: int | None, folder: Path, pulled: Pulled) -> None:
+        self.replace.setVisible(any(one.state.value == "edited" for one in pulled.files))
+        self._again = lambda: self.fetch(part_number, revision, folder, overwrite=True)
+
+    def _make_replace(self) -> Any:
+        """Replacing edited files takes a press of its own."""
+        self.replace = QtWidgets.QPushButton(translate("Silo", "Replace edited files (copies are kept)"))
+        self.replace.setObjectName("replace")
+        self.replace.setAutoDefault(False)
+        self.replace.hide()
+        self.replace.clicked.connect(lambda _checked=False: self._again())
+        return self.replace
+
+
+class OpenDialog(_Window):
+    """Search as you type, choose an item and a revision, open it with all that it links to."""
+
+    def __init__(self, flow: RevisionFlow, parent: Any, folder: str) -> None:
+        super().__init__(flow, parent, "SiloOpen", translate("Silo", "Open from Silo"))
+        self.resize(820, 520)
+        layout = QtWidgets.QVBoxLayout(self)
+        self.words = QtWidgets.QLineEdit()
+        self.words.setObjectName("words")
+        self.words.setPlaceholderText(translate("Silo", "Part number, name or description"))
+        self.words.setClearButtonEnabled(True)
+        layout.addWidget(self.words)
+        layout.addLayout(self._make_middle(), 1)
+        layout.addLayout(self._make_folder(folder))
+        layout.addWidget(self.news)
+        row, (self.open_button, _) = _buttons(
+            (
+                ("open", translate("Silo", "Open"), self._open),
+                ("close", translate("Silo", "Close"), self.reject),
+            )
+        )
+        row.insertWidget(0, self._make_replace())
+        layout.addLayout(row)
+        self.open_button.setEnabled(False)
+        self._asked = 0
+        self._typing = QtCore.QTimer(self)
+        self._typing.setSingleShot(True)
+        self._typing.setInterval(TYPING_MS)
+        self._typing.timeout.connect(self._search)
+        self.words.textChanged.connect(lambda _text: self._typing.start())
+        self._search()
+
+    def _make_middle(self) -> Any:
+        layout = QtWidgets.QHBoxLayout()
+        self.items = _table("items", (translate("Silo", "Part number"), translate("Silo", "Name")))
+        self.items.currentItemChanged.connect(lambda _now, _before: self._chosen())
+        layout.addWidget(self.items, 3)
+        right = QtWidgets.QVBoxLayout()
+        self.picture = QtWidgets.QLabel()
+        self.picture.setFixedHeight(PICTURE)
+        right.addWidget(self.picture)
+        self.revisions = _revisions_table()
+        self.revisions.itemDoubleClicked.connect(lambda _item, _column: self._open())
+        right.addWidget(self.revisions, 1)
+        layout.addLayout(right, 4)
+        return layout
+
+    def _make_folder(self, folder: str) -> Any:
+        layout = QtWidgets.QHBoxLayout()
+        layout.addWidget(widgets.label(translate("Silo", "Project folder:"), wrap=False))
+        self.folder = QtWidgets.QLineEdit(folder)
+        self.folder.setObjectName("folder")
+        layout.addWidget(self.folder, 1)
+        choose = QtWidgets.QPushButton("…")
+        choose.setAutoDefault(False)
+        choose.clicked.connect(lambda _checked=False: self._choose_folder())
+        layout.addWidget(choose)
+        return layout
+
+    def _choose_folder(self) -> None:
+        found = ask_folder(self, self.folder.text())
+        if found:
+            self.folder.setText(found)
+
+    def _search(self) -> None:
+        self._asked += 1
+        mine = self._asked
+
+        def done(found: list[Item]) -> None:
+            if mine == self._asked:  # what was typed meanwhile has its own answer
+                self._fill(found)
+
+        self._flow.search(self.words.text().strip(), self._alive(done), self._alive(self.fail))
+
+    def _fill(self, found: Sequence[Item]) -> None:
+        self.items.clear()
+        for item in found:
+            row = QtWidgets.QTreeWidgetItem([plain(item.part_number, 60), plain(item.name, 120)])
+            row.setToolTip(1, tip(item.description))
+            row.setData(0, _DATA, item.part_number)
+            self.items.addTopLevelItem(row)
+        self.items.resizeColumnToContents(0)
+        self.say("" if found else translate("Silo", "Nothing found."))
+        if found:
+            self.items.setCurrentItem(self.items.topLevelItem(0))
+
+    def _chosen(self) -> None:
+        self.revisions.clear()
+        self.picture.clear()
+        self.open_button.setEnabled(False)
+        number = self._number()
+        if not number:
+            return
+
+        def done(known: Known) -> None:
+            if self._number() == number:
+                self._show(known)
+
+        self._flow.details(number, self._alive(done), self._alive(self.fail))
+
+    def _number(self) -> str:
+        row = self.items.currentItem()
+        return str(row.data(0, _DATA)) if row is not None else ""
+
+    def _show(self, known: Known) -> None:
+        newest = QtWidgets.QTreeWidgetItem([translate("Silo", "newest"), "", "", ""])
+        newest.setText(3, translate("Silo", "with the newest of all that it links to"))
+        newest.setData(0, _DATA, 0)
+        rows = [newest] if known.revisions else []
+        for revision in known.revisions:
+            row = QtWidgets.QTreeWidgetItem(revision_texts(revision))
+            row.setToolTip(3, tip(revision.comment))
+            row.setData(0, _DATA, revision.revision_number)
+            rows.append(row)
+        self.revisions.addTopLevelItems(rows)
+        for column in range(3):
+            self.revisions.resizeColumnToContents(column)
+        picture = QtGui.QPixmap()
+        if known.picture and picture.loadFromData(known.picture):
+            self.picture.setPixmap(picture.scaledToHeight(PICTURE))
+        if rows:
+            self.revisions.setCurrentItem(rows[0])
+        else:
+            self.say(translate("Silo", "It has no file in Silo."))
+        self.open_button.setEnabled(bool(rows))
+
+    def _open(self) -> None:
+        row, folder = self.revisions.currentItem(), self.folder.text().strip()
+        if row is None or not self._number():
+            return
+        if not folder:
+            self.say(translate("Silo", "Choose the project folder first."), Tone.WARNING)
+            return
+        self.fetch(self._number(), row.data(0, _DATA) or None, Path(folder).expanduser())
+
+
+class HistoryDialog(_Window):
+    """The revisions of a document: who, when, comment, what changed in the BOM; any of them as a copy."""
+
+    def __init__(self, flow: RevisionFlow, parent: Any, path: str) -> None:
+        title = translate("Silo", "History of {name}").replace("{name}", plain(os.path.basename(path), 80))
+        super().__init__(flow, parent, "SiloHistory", title)
+        self._path = path
+        self._history: History | None = None
+        self.resize(680, 460)
+        layout = QtWidgets.QVBoxLayout(self)
+        self.revisions = _revisions_table()
+        self.revisions.currentItemChanged.connect(lambda _now, _before: self._chosen())
+        layout.addWidget(self.revisions, 1)
+        self.change = widgets.label("")
+        self.change.setObjectName("change")
+        layout.addWidget(self.change)
+        layout.addWidget(self.news)
+        row, (self.get_button, _) = _buttons(
+            (
+                ("get", translate("Silo", "Get This Revision as a Copy…"), self._get),
+                ("close", translate("Silo", "Close"), self.reject),
+            )
+        )
+        row.insertWidget(0, self._make_replace())
+        layout.addLayout(row)
+        self.get_button.setEnabled(False)
+        self.say(translate("Silo", "Asking Silo…"))
+
+    def fill(self, history: History) -> None:
+        """Show the revisions."""
+        if self._closed:
+            return
+        self._history = history
+        self.say("" if history.known.revisions else translate("Silo", "It has no file in Silo."))
+        for revision in history.known.revisions:
+            texts = revision_texts(revision)
+            if revision.revision_number == history.base:
+                texts[0] += " ← " + translate("Silo", "yours")
+            row = QtWidgets.QTreeWidgetItem(texts)
+            row.setToolTip(3, tip(revision.comment))
+            row.setData(0, _DATA, revision.revision_number)
+            self.revisions.addTopLevelItem(row)
+        for column in range(3):
+            self.revisions.resizeColumnToContents(column)
+        if history.known.revisions:
+            self.revisions.setCurrentItem(self.revisions.topLevelItem(0))
+
+    def _number(self) -> int:
+        row = self.revisions.currentItem()
+        return int(row.data(0, _DATA)) if row is not None else 0
+
+    def _chosen(self) -> None:
+        number = self._number()
+        self.get_button.setEnabled(bool(number))
+        if self._history is None or not number:
+            return
+        numbers = [one.revision_number for one in self._history.known.revisions]
+        older = next((one for one in numbers if one < number), None)
+        self.change.setText(translate("Silo", "Comparing…"))
+
+        def done(text: str) -> None:
+            if self._number() == number:
+                told = translate("Silo", "BOM: {changes}").replace("{changes}", plain(text, 600))
+                self.change.setText(told if text else translate("Silo", "No change of the BOM."))
+
+        def failed(error: SiloError) -> None:
+            self.change.setText(str(error))
+
+        item = self._history.known.item
+        self._flow.bom_change(
+            item.part_number, self._path, older, number, self._alive(done), self._alive(failed)
+        )
+
+    def _get(self) -> None:
+        if self._history is None:
+            return
+        number, item = self._number(), self._history.known.item
+        folder = ask_folder(self, os.path.dirname(os.path.dirname(self._path)))
+        if folder:
+            name = f"{plain(item.part_number, 60).replace('/', '_')}-r{number}"
+            self.fetch(item.part_number, number, Path(folder) / name)
+
+
+def ask_folder(parent: Any, start: str) -> str:
+    """The folder that a person chose; "" where none was chosen."""
+    title = translate("Silo", "Choose a folder")
+    return str(QtWidgets.QFileDialog.getExistingDirectory(parent, title, start))

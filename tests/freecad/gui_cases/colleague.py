@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Inside two FreeCADs at once: Alice and Bob have the same assemblies open; each takes a part out of each.
+
+Alice commits first. Bob then meets her commits: ``Left`` he leaves out, ``OnTop`` he commits on top, for
+``Taken`` he takes hers, ``Copied`` lies in a copy of the project folder and has an edit that was only saved.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, os.environ["SILO_TEST_CASES"])
+
+from inside import (
+    VAULT,
+    App,
+    Gui,
+    QtWidgets,
+    addon,
+    assembly,
+    boxes,
+    dialog,
+    labels,
+    part,
+    register,
+    run,
+    settled,
+    tell,
+    wait,
+)
+
+SHARED = Path(os.environ["SILO_TEST_SHARED"])
+NAMES = ("Left", "OnTop", "Taken", "Copied")
+LONG_S = 55
+
+
+def say(what: str) -> None:
+    (SHARED / what).touch()
+
+
+def until(what: str) -> None:
+    wait((SHARED / what).exists, LONG_S)
+
+
+def remove(doc: Any, name: str) -> None:
+    """Take a link out of an assembly."""
+    doc.removeObject(name)
+    doc.recompute()
+
+
+def commit(doc: Any, comment: str, choice: str | None = None) -> dict[str, Any]:
+    """Commit by the command; what the dialog shows once it has looked at Silo. Choice "": press Cancel."""
+    seen: dict[str, Any] = {}
+
+    def answer(found: Any) -> None:
+        if choice is not None:
+            wait(lambda: any(one.revision for one in found._theirs.values()))
+            item = found.files.topLevelItem(0)
+            seen["title"] = found.windowTitle()
+            seen["row"] = [item.text(0), item.text(1), item.checkState(0) == 0 or str(item.checkState(0))]
+            seen["details"] = [item.child(n).text(1) for n in range(item.childCount())]
+            seen["can_commit"] = found.commit.isEnabled()
+            picture(found, f"commit {choice or 'cancelled'}")
+        found.comment.setPlainText(comment)
+        if choice == "":
+            found.reject()
+            return
+        if choice is not None:
+            box = found.files.itemWidget(item, 2)
+            box.setCurrentIndex(box.findData(choice))
+        found.commit.click()
+
+    App.setActiveDocument(doc.Name)
+    with dialog("SiloCommitDialog", answer):
+        Gui.runCommand("Origin_Commit")
+    wait(settled)
+    return seen
+
+
+def alice() -> None:
+    one = addon()
+    one.preferences.set("AskRegister", False)
+    bolt, plate = part("Bolt"), part("Plate")
+    tops = {name: assembly(name, ("Bolts", bolt, 4), ("Plate", plate, 0)).Document for name in NAMES}
+    tell(numbers=register(bolt.Document, plate.Document, *tops.values()))
+    wait(lambda: one.session.shown.connection == "online")
+    for doc in (bolt.Document, plate.Document, *tops.values()):
+        commit(doc, "first")
+    wait(lambda: not one.session.shown.waiting)
+    say("ready")
+    until("opened")
+    for doc in tops.values():
+        remove(doc, "Plate")
+        commit(doc, "without the plate")
+    wait(lambda: not one.session.shown.waiting and settled())
+    tell(boxes=len(boxes("BOM Updated")))
+    say("committed")
+
+
+def bob() -> None:
+    one = addon()
+    one.preferences.set("AskRegister", False)
+    wait(lambda: one.session.shown.connection == "online")
+    until("ready")
+    for file in SHARED.glob("vault/*.FCStd"):
+        shutil.copy2(file, VAULT)
+    folders = {name: VAULT if name == "Copied" else SHARED / "vault" for name in NAMES}
+    docs = {name: App.openDocument(str(folders[name] / f"{name}.FCStd")) for name in NAMES}
+    copied = docs["Copied"]
+    copied.Comment = "saved, and not committed"
+    copied.save()
+    say("opened")
+    until("committed")
+    wait(lambda: sum(newer.revision == 2 for newer in one.session.shown.newer.values()) == 4)
+    one.dock.show_and_raise()
+    wait(lambda: any("since you opened it" in text for text in labels(one.dock)))
+    tell(pane=[text for text in labels(one.dock) if "since you opened it" in text])
+    for doc in docs.values():
+        remove(doc, "Bolts")
+    mine = {name: doc.FileName for name, doc in docs.items()}
+    tell(left=commit(docs["Left"], "mine", ""))
+    tell(on_top=commit(docs["OnTop"], "mine", "on top"))
+    tell(taken=commit(docs["Taken"], "mine", "take"))
+    wait(lambda: boxes("Took"))
+    taken = next(doc for doc in App.listDocuments().values() if doc.FileName == mine["Taken"])
+    tell(has=sorted(obj.Name for obj in taken.getObject("Assembly").Group))
+    tell(linked=[obj.LinkedObject is not None for obj in taken.getObject("Assembly").Group])
+    tell(copied=commit(copied, "mine", "open"))
+    wait(lambda: any("revisions" in doc.FileName for doc in App.listDocuments().values()))
+    theirs = next(doc for doc in App.listDocuments().values() if "revisions" in doc.FileName)
+    group = theirs.getObject("Assembly").Group
+    tell(beside=[[obj.Name, obj.LinkedObject is not None] for obj in group])
+    tell(both=sorted(obj.Name for obj in copied.getObject("Assembly").Group))
+    # Once more after the answer: mine is what the next commit is made from.
+    docs["OnTop"].Comment = "next"
+    seen = len(boxes("Committed")) + len(boxes("BOM Updated"))
+    commit(docs["OnTop"], "next")
+    wait(lambda: len(boxes("Committed")) + len(boxes("BOM Updated")) >= seen and settled())
+    wait(lambda: not one.session.shown.waiting)
+    tell(waiting=[str(entry.reason) for entry in one.session.shown.waiting])
+    windows(one, docs["OnTop"])
+
+
+def picture(widget: Any, name: str) -> None:
+    """For those who look: what the test saw."""
+    if folder := os.environ.get("SILO_TEST_PICTURES"):
+        QtWidgets.QApplication.processEvents()
+        widget.grab().save(os.path.join(folder, f"{name}.png"))
+
+
+def windows(one: Any, doc: Any) -> None:
+    """*History* of a document, then *Open from Silo* into an empty folder."""
+    App.setActiveDocument(doc.Name)
+    Gui.runCommand("Silo_History")
+    history = one._window
+    wait(lambda: history.revisions.topLevelItemCount() == 4)
+    wait(lambda: history.change.text() == "No change of the BOM.")
+    history.revisions.setCurrentItem(history.revisions.topLevelItem(1))
+    wait(lambda: "Plate" in history.change.text())
+    picture(history, "history")
+    rows = [history.revisions.topLevelItem(n) for n in range(4)]
+    tell(history=[[row.text(column) for column in (0, 3)] for row in rows], change=history.change.text())
+    history.reject()
+    Gui.runCommand("Silo_Open")
+    found = one._window
+    found.words.setText("Taken")
+    wait(lambda: found.items.topLevelItemCount() == 1 and found.revisions.topLevelItemCount() == 3)
+    found.folder.setText(str(VAULT.parent / "empty"))
+    found.revisions.setCurrentItem(found.revisions.topLevelItem(2))
+    picture(found, "open")
+    found.open_button.click()
+    wait(lambda: found.news.text() == "Opened.")
+    opened = next(doc for doc in App.listDocuments().values() if "empty" in doc.FileName)
+    group = opened.getObject("Assembly").Group
+    tell(opened=sorted([obj.Name, obj.LinkedObject is not None] for obj in group))
+    found.reject()
+
+
+run(alice if os.environ["SILO_TEST_ROLE"] == "alice" else bob)

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Two FreeCADs with the same assemblies open, and a real server: nobody's commit is undone without a word."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from freecad_cases.machines import WANTED
+from gui_cases.window import Window, window
+
+pytestmark = [pytest.mark.freecad, pytest.mark.slow]
+
+
+@dataclass
+class Day:
+    """What the two told, and the server that they talked to."""
+
+    alice: dict[str, Any]
+    bob: dict[str, Any]
+    window: Window
+
+    def revisions(self, name: str) -> list[tuple[int, str]]:
+        """(number, comment) of an item's files, oldest first."""
+        with self.window.server.client() as client:
+            found = client.revisions(self.alice["numbers"][name])
+        return [(one.revision_number, one.comment) for one in reversed(found) if one.file_name]
+
+    def lines(self, name: str) -> dict[str, bool]:
+        """Part → whether the assembly still uses it, by the names of the parts."""
+        names = {number: name for name, number in self.alice["numbers"].items()}
+        with self.window.server.client() as client:
+            found = client.get_bom(self.alice["numbers"][name])
+        return {names[line.child_part_number]: line.unreferenced_since is None for line in found}
+
+
+@pytest.fixture(name="day", scope="module", params=WANTED)
+def _day(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Day]:
+    folder = tmp_path_factory.mktemp("two").resolve()
+    (folder / "alice").mkdir()
+    (folder / "bob").mkdir()
+    with window(request.param, folder / "alice") as alice:
+        bob = Window(alice.freecad, folder / "bob", alice.server, {}, screen=50)
+        told: dict[str, Any] = {}
+        for one in (alice, bob):
+            one.prepare()
+
+        def run_alice() -> None:
+            told["alice"] = alice.run("colleague.py", env=environment(alice, "alice"))
+
+        thread = threading.Thread(target=run_alice)
+        thread.start()
+        try:
+            told["bob"] = bob.run("colleague.py", env=environment(alice, "bob"))
+        finally:
+            thread.join()
+        yield Day(told["alice"], told["bob"], alice)
+
+
+def environment(alice: Window, role: str) -> dict[str, str]:
+    shared: Path = alice.folder
+    # The two wait for each other.
+    return {"SILO_TEST_ROLE": role, "SILO_TEST_SHARED": str(shared), "SILO_TEST_LONGEST": "150"}
+
+
+def test_the_pane_says_who_committed_meanwhile(day: Day) -> None:
+    """Without being asked, by the server's events."""
+    (text,) = day.bob["pane"]
+    assert text.count("since you opened it") == 4
+    assert f"{day.alice['numbers']['Left']} Left (revision 2)" in text
+
+
+def test_without_a_choice_nothing_is_undone(day: Day) -> None:
+    """The row is not checked, and says who, what, and what mine would undo."""
+    left = day.bob["left"]
+    assert left["title"].startswith("Commit to Silo – ")
+    assert left["row"][0] == "Left.FCStd"
+    assert "committed revision 2; yours was made from revision 1" in left["row"][1]
+    assert "without the plate" in left["details"][0]
+    assert "Plate: 1 → 0 by them, as before in yours" in left["details"]
+    assert "Bolt: 4 → 0 by you, as before in theirs" in left["details"]
+    assert left["can_commit"] is False
+    assert day.revisions("Left") == [(1, "first"), (2, "without the plate")]
+    assert day.lines("Left") == {"Bolt": True, "Plate": False}
+
+
+def test_on_top_at_a_persons_word(day: Day) -> None:
+    """The comment says so, the BOM is mine; the commit after it asks nothing."""
+    numbers = [number for number, _ in day.revisions("OnTop")]
+    comments = [comment for _, comment in day.revisions("OnTop")]
+    assert numbers == [1, 2, 3, 4]
+    assert comments[2].startswith("mine (on top of revision 2 by ")
+    assert comments[3] == "next"
+    assert day.lines("OnTop") == {"Bolt": False, "Plate": True}
+
+
+def test_theirs_is_taken_and_mine_is_kept(day: Day) -> None:
+    """FreeCAD has theirs open, with its links; a copy of mine is there."""
+    assert day.bob["has"] == ["Bolts"]
+    assert day.bob["linked"] == [True]
+    assert len(day.revisions("Taken")) == 2
+    kept = list((day.window.folder.parent / "bob").rglob("kept-aside/**/*Taken.FCStd"))
+    assert len(kept) == 1
+
+
+def test_a_copied_folder_knows_what_it_was_made_from(day: Day) -> None:
+    """Though its file was saved since; theirs opens beside mine with all its links."""
+    assert "yours was made from revision 1" in day.bob["copied"]["row"][1]
+    assert day.bob["beside"] == [["Bolts", True]]
+    assert day.bob["both"] == ["Plate"]
+    assert len(day.revisions("Copied")) == 2
+    assert day.bob["waiting"] == []
+
+
+def test_the_history_and_an_old_revision_with_all_that_it_links_to(day: Day) -> None:
+    """Newest first, with what each changed; revision 1 opens whole from an empty folder."""
+    numbers = [row[0] for row in day.bob["history"]]
+    assert numbers == ["4 ← yours", "3", "2", "1"]
+    assert day.bob["history"][2][1] == "without the plate"
+    assert "+ Plate 1" in day.bob["change"]
+    assert "- Bolt 4" in day.bob["change"]
+    assert day.bob["opened"] == [["Bolts", True], ["Plate", True]]
