@@ -81,6 +81,12 @@ def commit(doc: Any, comment: str, choice: str | None = None) -> dict[str, Any]:
     return seen
 
 
+def found_open(folder: str, name: str) -> Any:
+    """The open document of this name below a folder of this name."""
+    docs = App.listDocuments().values()
+    return next((d for d in docs if folder in d.FileName and d.FileName.endswith(f"{name}.FCStd")), None)
+
+
 def alice() -> None:
     one = addon()
     one.preferences.set("AskRegister", False)
@@ -130,8 +136,7 @@ def bob() -> None:
     tell(has=sorted(obj.Name for obj in taken.getObject("Assembly").Group))
     tell(linked=[obj.LinkedObject is not None for obj in taken.getObject("Assembly").Group])
     tell(copied=commit(copied, "mine", "open"))
-    wait(lambda: any("revisions" in doc.FileName for doc in App.listDocuments().values()))
-    theirs = next(doc for doc in App.listDocuments().values() if "revisions" in doc.FileName)
+    theirs = wait(lambda: found_open("revisions", "Copied"))
     group = theirs.getObject("Assembly").Group
     tell(beside=[[obj.Name, obj.LinkedObject is not None] for obj in group])
     tell(both=sorted(obj.Name for obj in copied.getObject("Assembly").Group))
@@ -174,7 +179,7 @@ def windows(one: Any, doc: Any) -> None:
     picture(found, "open")
     found.open_button.click()
     wait(lambda: found.news.text() == "Opened.")
-    opened = next(doc for doc in App.listDocuments().values() if "empty" in doc.FileName)
+    opened = wait(lambda: found_open("empty", "Taken"))
     group = opened.getObject("Assembly").Group
     tell(opened=sorted([obj.Name, obj.LinkedObject is not None] for obj in group))
     found.reject()
