@@ -64,7 +64,7 @@ def _day(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
 def environment(alice: Window, role: str) -> dict[str, str]:
     shared: Path = alice.folder
     # The two wait for each other.
-    return {"SILO_TEST_ROLE": role, "SILO_TEST_SHARED": str(shared), "SILO_TEST_LONGEST": "150"}
+    return {"SILO_TEST_ROLE": role, "SILO_TEST_SHARED": str(shared), "SILO_TEST_LONGEST": "170"}
 
 
 def test_the_pane_says_who_committed_meanwhile(day: Day) -> None:

@@ -35,7 +35,7 @@ from inside import (
 
 SHARED = Path(os.environ["SILO_TEST_SHARED"])
 NAMES = ("Left", "OnTop", "Taken", "Copied")
-LONG_S = 55
+LONG_S = 120
 
 
 def say(what: str) -> None:
@@ -96,13 +96,13 @@ def alice() -> None:
     wait(lambda: one.session.shown.connection == "online")
     for doc in (bolt.Document, plate.Document, *tops.values()):
         commit(doc, "first")
-    wait(lambda: not one.session.shown.waiting)
+    wait(lambda: not one.session.shown.waiting, LONG_S)
     say("ready")
     until("opened")
     for doc in tops.values():
         remove(doc, "Plate")
         commit(doc, "without the plate")
-    wait(lambda: not one.session.shown.waiting and settled())
+    wait(lambda: not one.session.shown.waiting and settled(), LONG_S)
     tell(boxes=len(boxes("BOM Updated")))
     say("committed")
 
