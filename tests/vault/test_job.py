@@ -23,7 +23,6 @@ from silo.bom_sync import Status, resolve, sync_tree
 from silo.fcstd import Library
 from silo.files import documents_in
 from silo.testing import FakeSilo
-from silo.vault import reading as reading_module
 from silo.vault.index import Index
 from silo.vault.job import Job
 from silo.vault.plan import make_plan
@@ -231,13 +230,11 @@ def answers(folder: Path, pool: Pool | None) -> list[str]:
         return [one.known.answer for one in Reading(memory, pool).ask_many(Question(top) for top in tops)]
 
 
-def test_a_worker_that_dies_costs_its_task_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_worker_that_dies_costs_its_task_only(tmp_path: Path) -> None:
     """It is asked again; the answers and their order are the same."""
-    monkeypatch.setattr(reading_module, "_WORTH_A_POOL", 0)
-    monkeypatch.setattr(reading_module, "CHUNK", 4)
     write(tmp_path, FakeSilo(), {100 + n: {n % 4: n + 1} for n in range(20)})
     Dying.deaths = 0
-    assert answers(tmp_path, Pool(Dying, 2)) == answers(tmp_path, None)
+    assert answers(tmp_path, Pool(Dying, 2, worth=0, chunk=4)) == answers(tmp_path, None)
     assert Dying.deaths > 4
 
 
@@ -254,40 +251,32 @@ class Killing(ProcessPoolExecutor):
         return super().submit(_kill_some, *args)
 
 
-def test_a_file_that_kills_every_reader_is_named_and_the_others_are_read(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_file_that_kills_every_reader_is_named_and_the_others_are_read(tmp_path: Path) -> None:
     """Real processes, really killed."""
-    monkeypatch.setattr(reading_module, "_WORTH_A_POOL", 0)
-    monkeypatch.setattr(reading_module, "CHUNK", 8)
-    monkeypatch.setattr(reading_module, "_processes", lambda jobs: Killing(jobs))
     write(tmp_path, FakeSilo(), {100 + n: {n % 4: n + 1} for n in range(12)})
     wanted = answers(tmp_path, None)
-    found = answers(tmp_path, Pool(lambda: Killing(2), 2))
+    found = answers(tmp_path, Pool(lambda: Killing(2), 2, alone=lambda: Killing(1), worth=0, chunk=8))
     different = [text for text, other in zip(found, wanted, strict=True) if text != other]
     assert len(different) == 1
     assert "a107.FCStd" in different[0]
     assert "the process that read it died" in different[0]
 
 
-def test_processes_give_the_same_answers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_processes_give_the_same_answers(tmp_path: Path) -> None:
     """To the byte and in order."""
-    monkeypatch.setattr(reading_module, "_WORTH_A_POOL", 0)
-    monkeypatch.setattr(reading_module, "CHUNK", 3)
     write(tmp_path, FakeSilo(), {100 + n: {n % 4: n + 1} for n in range(12)})
-    with pool_of(2) as pool:
+    with pool_of(2, worth=0) as pool:
         assert answers(tmp_path, pool) == answers(tmp_path, None)
 
 
-def test_a_dask_cluster_gives_the_same_answers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_dask_cluster_gives_the_same_answers(tmp_path: Path) -> None:
     """Through the same executor's interface."""
     distributed = pytest.importorskip("dask.distributed", reason="the extra 'dask' is not installed")
-    monkeypatch.setattr(reading_module, "_WORTH_A_POOL", 0)
     write(tmp_path, FakeSilo(), {100 + n: {n % 4: n + 1} for n in range(12)})
     with (
         distributed.LocalCluster(
             n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None
         ) as cluster,
-        pool_of(1, cluster.scheduler_address) as pool,
+        pool_of(1, cluster.scheduler_address, worth=0) as pool,
     ):
         assert answers(tmp_path, pool) == answers(tmp_path, None)

@@ -143,10 +143,27 @@ def ask_all(questions: Sequence[Question], run: str) -> tuple[list[Known], int]:
 
 
 class Pool:
-    """Makes executors for the work, and another one where that broke."""
+    """Makes executors for the work, and another one where that broke.
 
-    def __init__(self, make: Callable[[], Executor], jobs: int) -> None:
-        self.jobs = jobs
+    alone
+        makes one for a single question that may end its process.
+    worth
+        so many files are read here before others are called in: they take a moment to start.
+    chunk
+        questions that travel together.
+    """
+
+    def __init__(
+        self,
+        make: Callable[[], Executor],
+        jobs: int,
+        *,
+        alone: Callable[[], Executor] | None = None,
+        worth: int = _WORTH_A_POOL,
+        chunk: int = CHUNK,
+    ) -> None:
+        self.jobs, self.worth, self.chunk = jobs, worth, chunk
+        self.alone = alone or (lambda: _processes(1))
         self._make = make
         self._run = str(uuid4())
         self._executor: Executor | None = None
@@ -165,14 +182,14 @@ class Pool:
 
 
 @contextmanager
-def pool_of(jobs: int, dask: str | None = None) -> Iterator[Pool | None]:
+def pool_of(jobs: int, dask: str | None = None, *, worth: int = _WORTH_A_POOL) -> Iterator[Pool | None]:
     """Processes of this machine, or a Dask cluster at an address; None for one job."""
     if dask is not None:
         with _dask_client(dask) as client:
             workers = sum(client.nthreads().values())
-            yield Pool(client.get_executor, max(1, workers))
+            yield Pool(client.get_executor, max(1, workers), worth=worth)
         return
-    pool = Pool(lambda: _processes(jobs), jobs) if jobs > 1 else None
+    pool = Pool(lambda: _processes(jobs), jobs, worth=worth) if jobs > 1 else None
     try:
         yield pool
     finally:
@@ -253,7 +270,7 @@ class Reading:
     def ask_many(self, questions: Iterable[Question]) -> Iterator[Answer]:
         """The answers in the order of the questions, as they come."""
         waiting: deque[_Chunk] = deque()
-        for group in _grouped(questions, CHUNK):
+        for group in _grouped(questions, self._pool.chunk if self._pool is not None else CHUNK):
             waiting.append(self._begin(group))
             while waiting and (waiting[0].asked is None or len(waiting) > 3 * self._jobs):
                 yield from self._end(waiting)
@@ -275,7 +292,7 @@ class Reading:
         return chunk
 
     def _submit(self, chunk: _Chunk) -> None:
-        if self._pool is not None and self.asked >= _WORTH_A_POOL:
+        if self._pool is not None and self.asked >= self._pool.worth:
             chunk.asked = self._pool.submit(chunk.open)
             return
         for number, question in enumerate(chunk.questions):
@@ -331,7 +348,8 @@ class Reading:
 
     def _alone(self, question: Question) -> Known:
         """One question in a process of its own."""
-        with _processes(1) as executor:
+        assert self._pool is not None  # as above
+        with self._pool.alone() as executor:
             try:
                 found, reads = executor.submit(ask_all, [question], str(uuid4())).result()
             except BrokenProcessPool:
