@@ -81,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
     folders = [top for top in args.tops if Path(top).is_dir()]
     base = os.path.realpath(folders[0]) if len(folders) == len(args.tops) == 1 else ""
     options = Options(
-        recursive=args.recursive or bool(folders),
+        recursive=args.recursive or (bool(folders) and args.via == "files"),
         allow_missing=args.allow_missing,
         dry_run=args.dry_run,
         skip_parts=bool(folders),
