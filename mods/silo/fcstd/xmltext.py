@@ -89,8 +89,8 @@ class XmlText:
 
     @property
     def packed_size(self) -> int:
-        """Bytes of the text as the file holds it."""
-        return len(self._packed)
+        """Bytes that stay in memory, about: the packed text, and where each object of it stands."""
+        return len(self._packed) + self._entry.size // 4
 
     def digest(self, directory: bytes) -> str:
         """What tells this content from any other: of the packed text, and of the container's directory, which
