@@ -7,45 +7,53 @@ document. GUI thread.
 
 from __future__ import annotations
 
+import time
+from collections import deque
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from silo.workbench.freecad import host, saving
 from silo.workbench.freecad.edits import SHOWN_NUMBER, SHOWN_STATE
+from silo.workbench.gui import qt
 from silo.workbench.words import translate
 
 if TYPE_CHECKING:
     from silo.bom.model import BomEntry
 
-# Nobody looks at more of them, and each takes some microseconds.
-MOST = 2000
+# Nobody looks at more of them. Each turn takes so many seconds of the window's time, and then pauses.
+MOST, MOST_S, PAUSE_MS = 500, 0.005, 40
 # FreeCAD's numbers for "asks for no recompute" and "not written into the file" (App::PropertyType).
 _OUTPUT, _NO_PERSIST = 8, 32
 
 
 def show(path: str, entries: Iterable[BomEntry]) -> None:
-    """Show the number and the state of the components of a document, where it is open."""
+    """Show the number and the state of the components of a document, where it is open; some in each turn."""
+    in_silo = translate("Silo", "in Silo")
+    left_out = translate("Silo", "not registered: left out of the BOM")
+    todo = deque(
+        (name, entry.part_number or "", in_silo if entry.part_number else left_out)
+        for entry in entries
+        for name in entry.instances
+    )
+    while len(todo) > MOST:
+        todo.pop()
+    _turn(path, todo)
+
+
+def _turn(path: str, todo: deque[tuple[str, str, str]]) -> None:
+    # Each change makes FreeCAD measure the whole assembly for its axis cross: 1000 links take 2 s.
     doc = host.find_document(path)
-    if doc is None:
+    if doc is None or not todo:
         return
+    until = time.thread_time() + MOST_S
     with saving.others_unmarked():
-        _show(doc, entries)
-
-
-def _show(doc: Any, entries: Iterable[BomEntry]) -> None:
-    left = MOST
-    for entry in entries:
-        state = (
-            translate("Silo", "in Silo")
-            if entry.part_number
-            else translate("Silo", "not registered: left out of the BOM")
-        )
-        for name in entry.instances[:left]:
+        while todo and time.thread_time() < until:
+            name, number, state = todo.popleft()
             obj = doc.getObject(name)
             if obj is not None:
-                _put(obj, SHOWN_NUMBER, entry.part_number or "", translate("Silo", "Part number in Silo"))
+                _put(obj, SHOWN_NUMBER, number, translate("Silo", "Part number in Silo"))
                 _put(obj, SHOWN_STATE, state, translate("Silo", "What Silo knows of this component"))
-        left = max(0, left - len(entry.instances))
+    qt.later(PAUSE_MS, lambda: _turn(path, todo))
 
 
 def _put(obj: Any, name: str, value: str, tip: str) -> None:
