@@ -13,6 +13,9 @@ from silo.inertia.geometry.together import Together
 from silo.inertia.model import GeometryCode, GeometryProblem, SolidProps
 from silo.inertia.wording import counted
 
+STATED = 5e-5
+"""Relative: what the volume may depend on the way that it is taken, and no farther in silence."""
+
 MESH_TOLERANCE = 0.02
 """|V_mesh - V_brep| / V above this is bad geometry: all valid parts of 280 real ones stay below 0.7 %."""
 
@@ -133,9 +136,28 @@ def open_note(gap: Gap, volume_m3: float) -> Note:
     """A solid whose faces do not close."""
     words = (
         f"its faces do not close ({counted(gap.edges, 'open edge')}), so it has no exact volume: "
-        f"{volume_m3 * 1e6:.6g} cm³ from one point, {gap.other_m3 * 1e6:.6g} cm³ from another"
+        f"{volume_m3 * 1e6:.6g} cm³ from its middle, {gap.other_m3 * 1e6:.6g} cm³ from a corner of its box"
     )
     return (GeometryCode.OPEN_SHELL, words)
+
+
+def drift_note(drift: float) -> Note | None:
+    """A solid whose edges are shared but whose faces do not meet there; None where they do.
+
+    drift
+        how far its volume depends on the way that it is taken, relative.
+    """
+    if drift <= STATED:
+        return None
+    words = (
+        "its faces do not meet at their edges, by the file's own tolerances: its volume differs by "
+        f"{drift:.1g} with the way that it is taken"
+    )
+    return (GeometryCode.NOT_CONVERGENT if drift <= TORN else GeometryCode.OPEN_SHELL, words)
+
+
+TORN = 1e-3
+"""Relative: as open as a solid with a missing face, for a mass."""
 
 
 def cavity_note(found: Together) -> GeometryProblem:

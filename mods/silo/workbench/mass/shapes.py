@@ -35,6 +35,7 @@ from silo.inertia.geometry.measured import (
     Measured,
     Notes,
     cavity_note,
+    drift_note,
     integration_notes,
     mesh_notes,
     shell_note,
@@ -210,6 +211,8 @@ class _Product:
         notes += integration_notes(
             body.volume * MM**3, body.error, self.eps, distance_m=away, size_m=size * MM
         )
+        if (note := drift_note(body.drift)) is not None:
+            notes.append(note)
         if not solid.isValid():
             notes.append(INVALID)
         if mesh is not None:

@@ -96,12 +96,15 @@ class Moments:
     com : (3,)
     inertia : (3, 3), per unit density about ``com``; signed as the volume
     error : estimated, relative to the volume
+    drift : relative; how far the volume depends on the way that it is taken, from another point (half the
+        box's diagonal away) or along one axis only. For a surface that closes it does not
     """
 
     volume: float
     com: Floats
     inertia: Floats
     error: float
+    drift: float = 0.0
 
 
 def integrate(faces: Iterable[Face], *, centre: Floats, size: float, volume: float, eps: float) -> Moments:
@@ -114,7 +117,7 @@ def integrate(faces: Iterable[Face], *, centre: Floats, size: float, volume: flo
     """
     # A shell without any volume would be refined for ever; below this, rounding is larger than the tolerance.
     tolerance = eps * max(abs(volume) / size**3, THIN)
-    total, error = np.zeros(10), 0.0
+    total, error = np.zeros(15), 0.0
     for face in faces:
         flux, doubt = _Flux(face, centre, size, tolerance).run()
         total += flux
@@ -123,13 +126,16 @@ def integrate(faces: Iterable[Face], *, centre: Floats, size: float, volume: flo
 
 
 def _moments(total: Floats, error: float, centre: Floats, size: float) -> Moments:
-    volume, first, second = total[0] / 3, total[1:4] / 4, _symmetric(total[4:] / 5)
+    volume, first, second = total[0] / 3, total[1:4] / 4, _symmetric(total[4:10] / 5)
     if volume == 0.0 or not np.isfinite(total).all():
         return Moments(0.0, centre.copy(), np.zeros((3, 3)), np.inf)
     com = first / volume
     about = second - volume * np.outer(com, com)
     inertia = (np.trace(about) * np.eye(3) - about) * size**5
-    return Moments(float(volume) * size**3, centre + com * size, inertia, abs(error / (3 * volume)))
+    along = np.array([total[13], total[14], total[0] - total[13] - total[14]])
+    from_elsewhere, spread = np.linalg.norm(total[10:13]) / 3, np.abs(along - volume).max()
+    drift = float(max(from_elsewhere, spread) / abs(volume))
+    return Moments(float(volume) * size**3, centre + com * size, inertia, abs(error / (3 * volume)), drift)
 
 
 def _symmetric(six: Floats) -> Floats:
@@ -185,7 +191,10 @@ def _gauss(order: int) -> tuple[Floats, Floats]:
 
 @dataclass(eq=False)
 class _Flux:
-    """The ten fluxes through one face: of 1, x, y, z, xx, yy, zz, xy, xz, yz times (r·n)."""
+    """The ten fluxes through one face: of 1, x, y, z, xx, yy, zz, xy, xz, yz times (r·n).
+
+    Behind them its normal n (3), and the fluxes of x and of y alone.
+    """
 
     face: Face
     centre: Floats
@@ -206,7 +215,7 @@ class _Flux:
             self.pieces = np.union1d(self.pieces, (self.pieces[1:] + self.pieces[:-1]) / 2)
             before = flux
             flux, error = self._around()
-            change = float(np.abs(flux - before).max())
+            change = float(np.abs(flux - before)[:10].max())
             if change <= self.tolerance:
                 break
         return flux, error + change
@@ -217,12 +226,12 @@ class _Flux:
         low = np.concatenate([s[:-1] for s in stretches]) if stretches else np.zeros(0)
         high = np.concatenate([s[1:] for s in stretches]) if stretches else np.zeros(0)
         owner = np.repeat(np.arange(len(stretches)), [len(s) - 1 for s in stretches])
-        total, error = np.zeros(10), 0.0
+        total, error = np.zeros(15), 0.0
         for split in range(MAX_SPLITS + 1):
             if not len(low):
                 break
             fine, coarse = self._stretch(owner, low, high)
-            doubts = _doubt(np.abs(fine - coarse).max(axis=1), np.abs(fine).max(axis=1))
+            doubts = _doubt(np.abs(fine - coarse)[:, :10].max(axis=1), np.abs(fine)[:, :10].max(axis=1))
             done = (doubts <= self.tolerance) | (split == MAX_SPLITS)
             total += fine[done].sum(axis=0)
             error += float(doubts[done].sum())
@@ -246,7 +255,7 @@ class _Flux:
         return np.union1d(breaks, breaks[0] + inside * (breaks[-1] - breaks[0]))
 
     def _stretch(self, owner: NDArray[np.intp], low: Floats, high: Floats) -> tuple[Floats, Floats]:
-        """(n, 10) fluxes of n stretches of the edges ``owner``, by the finer rule and by the coarser."""
+        """(n, 15) fluxes of n stretches of the edges ``owner``, by the finer rule and by the coarser."""
         half = (high - low) / 2
         t = ((high + low) / 2)[:, None] + half[:, None] * _NODES
         points = np.empty((len(low), 15, 2))
@@ -257,7 +266,7 @@ class _Flux:
             signs[mine] = edge.sign
         slopes = points[:, :, 1] @ _DERIVE.T
         slopes[np.abs(slopes) < FLAT * max(float(np.abs(points[:, :, 1]).max()), 1.0)] = 0.0
-        inner = np.zeros((len(low), 15, 10))
+        inner = np.zeros((len(low), 15, 15))
         moving = slopes != 0.0
         if moving.any():
             inner[moving] = self._inner(points[moving])
@@ -265,13 +274,13 @@ class _Flux:
         return np.einsum("j,njk->nk", _WEIGHTS, values), np.einsum("j,njk->nk", _GAUSS, values)
 
     def _inner(self, ends: Floats) -> Floats:
-        """(n, 10) integrals over u, from the middle break to each end (n, 2).
+        """(n, 15) integrals over u, from the middle break to each end (n, 2).
 
         Where edges do not quite meet, by the file's tolerances, the error grows with the distance from there.
         """
         rows, low, high = _clipped(self.pieces, ends[:, 0])
         x, weight = _gauss(self.face.surface.order)
-        result = np.zeros((len(ends), 10))
+        result = np.zeros((len(ends), 15))
         step = max(CHUNK // len(x), 1)
         for start in range(0, len(rows), step):
             some = slice(start, start + step)
@@ -285,9 +294,12 @@ class _Flux:
         point, du, dv = self.face.surface.at(u, v)
         x, y, z = np.moveaxis((point - self.centre) / self.size, 2, 0)
         (ux, uy, uz), (vx, vy, vz) = np.moveaxis(du / self.size, 2, 0), np.moveaxis(dv / self.size, 2, 0)
-        flux = x * (uy * vz - uz * vy) + y * (uz * vx - ux * vz) + z * (ux * vy - uy * vx)
+        nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        along_x, along_y = x * nx, y * ny
+        flux = along_x + along_y + z * nz
         fx, fy, fz = flux * x, flux * y, flux * z
-        return np.stack([flux, fx, fy, fz, fx * x, fy * y, fz * z, fx * y, fx * z, fy * z], axis=2)
+        second = (fx * x, fy * y, fz * z, fx * y, fx * z, fy * z)
+        return np.stack([flux, fx, fy, fz, *second, nx, ny, nz, along_x, along_y], axis=2)
 
 
 def _doubt(difference: Floats, value: Floats) -> Floats:

@@ -6,9 +6,8 @@ from __future__ import annotations
 from typing import Any
 
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeSolid, BRepBuilderAPI_Sewing
-from OCP.BRepGProp import BRepGProp
+from OCP.BRepGProp import BRepGProp_Domain, BRepGProp_Face, BRepGProp_Vinert
 from OCP.gp import gp_Pnt
-from OCP.GProp import GProp_GProps
 from OCP.ShapeAnalysis import ShapeAnalysis_Shell
 from OCP.Standard import Standard_Failure
 from OCP.TopoDS import TopoDS
@@ -16,6 +15,7 @@ from OCP.TopoDS import TopoDS
 from silo.inertia.geometry.kernel import occt
 from silo.inertia.geometry.kernel.tessellate import MM, bounds, box
 from silo.inertia.geometry.measured import CONVERGED, Gap
+from silo.inertia.geometry.mesh import Floats
 
 MEETING = 1e-4
 """Share of a shape's size; edges that are closer are one. Real files have gaps of 5 µm in parts of 100 mm."""
@@ -31,10 +31,10 @@ def gap_of(solid: Any) -> Gap | None:
     if _is_closed(solid):
         return None
     sewing = _sewn(occt.faces_of(solid), MEETING * box(solid)[1])
-    here, corner = _volume(solid, *_middle(solid)), _volume(solid, *_corner(solid))
+    here, corner = _flux(solid, box(solid)[0]), _flux(solid, bounds(solid)[0])
     if sewing is not None and not sewing.NbFreeEdges() and not sewing.NbMultipleEdges():
         # Closed all the same; but faces that disagreed on what is outside were turned for it.
-        sewn = abs(_volume(sewing.SewedShape(), *_middle(solid)))
+        sewn = abs(_flux(sewing.SewedShape(), box(solid)[0]))
         if abs(sewn - abs(here)) <= CONVERGED * sewn:
             return None
         return Gap(0, sewn * MM**3)
@@ -83,17 +83,11 @@ def _solid(shell: Any) -> Any:
     return BRepBuilderAPI_MakeSolid(_as_shell(shell)).Solid()
 
 
-def _volume(shape: Any, x: float, y: float, z: float) -> float:
-    system = GProp_GProps(gp_Pnt(x, y, z))
-    BRepGProp.VolumeProperties_s(shape, system)
-    return float(system.Mass())
+def _flux(shape: Any, point: Floats) -> float:
+    """The volume [mm^3] as it is seen from ``point`` ((3,) [mm]), by the kernel's usual integration.
 
-
-def _middle(solid: Any) -> tuple[float, float, float]:
-    x, y, z = box(solid)[0].tolist()
-    return x, y, z
-
-
-def _corner(solid: Any) -> tuple[float, float, float]:
-    x, y, z = bounds(solid)[0].tolist()
-    return x, y, z
+    The kernel's own sum for a shape is taken from a point of its own choice.
+    """
+    seen = gp_Pnt(*point.tolist())
+    found = (BRepGProp_Vinert(BRepGProp_Face(f), BRepGProp_Domain(f), seen) for f in occt.faces_of(shape))
+    return float(sum(one.Mass() for one in found))
