@@ -214,7 +214,7 @@ def test_files_and_exports_are_downloads(
         page.get_by_role("link", name="plan.txt").click()
     assert Path(download.value.path()).read_bytes() == b"as sent"
     with page.expect_download() as download:
-        page.get_by_role("link", name="all levels as CSV").click()
+        page.get_by_role("link", name="all levels as CSV", exact=True).click()
     assert download.value.suggested_filename.endswith("-bom-indented.csv")
     assert machine["screw"] in Path(download.value.path()).read_text("utf-8")
 
