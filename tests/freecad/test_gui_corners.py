@@ -121,6 +121,10 @@ def test_missing_packages_are_installed_by_one_button(version: str, tmp_path: Pa
     assert said["buttons"] == ["Install What Silo Needs…"]
     assert "requests, pydantic, sseclient-py" in said["before"][0]
     assert said["during"] == [True, False]
+    if "no Python with pip" in failed["after"][0]:
+        # A root of another Debian release has none, and that is what the window says.
+        assert failed["after"][0].endswith(by_hand)
+        return
     assert "could not be installed: pip could not install" in failed["after"][0]
     assert failed["after"][0].endswith(by_hand)
     assert failed["button"]
