@@ -37,7 +37,7 @@ def main() -> None:
 
 
 def shorten(lines: list[str]) -> str:
-    """The steps that tell the story: reading, and the sync after the edit."""
+    """The steps that show the work: reading, and the sync after the edit."""
     starts = [n for n, line in enumerate(lines) if re.search(r"(^|m)\d  ", line)]
     if len(starts) < 5:
         return "\n".join(lines)

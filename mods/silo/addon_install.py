@@ -89,7 +89,7 @@ def ask_freecad(freecadcmd: str | None = None, data: Path | None = None) -> Plac
             raise ConfigError(f"{command} does not answer: {error}") from error
         if not out.is_file():
             last = (run.stderr or run.stdout).strip().splitlines()[-1:] or ["it said nothing"]
-            raise ConfigError(f"{command} did not tell where its folders are: {last[0]}")
+            raise ConfigError(f"{command} did not report where its folders are: {last[0]}")
         told = json.loads(out.read_text(encoding="utf-8"))
     major, minor = (int(part) for part in told["freecad"])
     pythons = (*python_beside(told["prefix"]), *python_beside(os.path.dirname(os.path.realpath(command))))

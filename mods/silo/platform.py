@@ -23,7 +23,7 @@ from typing import Any, BinaryIO, Protocol
 
 NAME = sys.platform
 WINDOWS = os.name == "nt"
-# Modes tell who may read a file; on Windows access lists do, which a mode does not show.
+# Modes say who may read a file; on Windows access lists do, which a mode does not show.
 MODES_COUNT = os.name == "posix"
 
 # Another program has the file open: a virus scanner, an indexer, a colleague. ERROR_ACCESS_DENIED,

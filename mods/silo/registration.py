@@ -129,7 +129,7 @@ def register(
     check: Check = lambda _entry: None,
     ask: Ask = unclear,
 ) -> Registration:
-    """Register one component; an error is returned, not raised, so that the others go on.
+    """Register one component; an error is returned, not raised, so that the others are still registered.
 
     properties
         further properties of the first revision, such as the file's hash.

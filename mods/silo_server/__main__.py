@@ -11,7 +11,7 @@ from silo_server.run import serve
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Serve until told to stop; 2 with one plain sentence where it cannot."""
+    """Serve until stopped; 2 with one plain sentence where it cannot."""
     parser = argparse.ArgumentParser(prog="python -m silo_server", description=__doc__)
     parser.add_argument(
         "--host", default="127.0.0.1", help="address to listen on (default: this machine only)"

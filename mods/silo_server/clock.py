@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Time as the server stores and tells it: UTC, ISO 8601."""
+"""Time as the server stores and sends it: UTC, ISO 8601."""
 
 from __future__ import annotations
 

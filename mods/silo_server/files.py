@@ -93,7 +93,7 @@ class FileStore:
         if path.is_dir():
             shutil.rmtree(path, ignore_errors=True)
             return True
-        # An upload puts a new file at this place before its revision is committed. What was moved away tells
+        # An upload puts a new file at this place before its revision is committed. What was moved away shows
         # whether it was the old one; deleting it by name could hit the new one.
         handle, name = tempfile.mkstemp(dir=self.root, prefix="upload-")
         os.close(handle)

@@ -75,7 +75,7 @@ class Compressed:
 
 
 class BodyLimit:
-    """413 for a body above the limit, told or sent; uploads have a limit of their own."""
+    """413 for a body above the limit, announced or sent; uploads have a limit of their own."""
 
     def __init__(self, app: ASGIApp, settings: Settings) -> None:
         self.app = app

@@ -157,7 +157,7 @@ def serve(
     reset_admin: str | None = None,
     tell: Callable[[Greeting], None] = _tell,
 ) -> None:
-    """Serve until interrupted; tells the address, a token and a login link through ``tell`` first.
+    """Serve until interrupted; reports the address, a token and a login link through ``tell`` first.
 
     token
         the first token; ``SILO_API_TOKEN`` where None, a new one where that is not set either.
@@ -299,7 +299,7 @@ def _work(settings: Settings, sock: socket.socket, on_up: Callable[[], None] | N
     server = SiloServer(_config(create_app(settings), settings), on_up or (lambda: None))
     parent = multiprocessing.parent_process()
     if parent is not None:
-        # A parent that was killed cannot tell its workers; they must not serve on without it.
+        # A parent that was killed cannot stop its workers; they must not serve on without it.
         watch = threading.Thread(target=_end_with, args=(parent.sentinel, server), daemon=True)
         watch.start()
     server.run(sockets=[sock])

@@ -30,7 +30,7 @@ class Settings:
     files_dir
         where uploads are kept by hash; beside an SQLite database where not given.
     poll_seconds
-        how often the event log is looked at without having been told of news: the safety net for a lost
+        how often the event log is looked at without a notice of news: the safety net for a lost
         notification, and how SQLite's changes by another process are seen.
     public_url
         how users reach the server (``https://silo.example.com``), for links that are sent on. Where it is

@@ -182,7 +182,7 @@ class Line(NamedTuple):
 
 
 def number(value: float | Decimal | None) -> float | int | None:
-    """A count reads as a count: 12.0 is told as 12."""
+    """A count reads as a count: 12.0 is written as 12."""
     if isinstance(value, Decimal):
         return plain(value)
     return int(value) if value is not None and value == int(value) else value

@@ -31,7 +31,7 @@ class Downloads(Protocol):
 
 
 class MayHaveArrivedError(ConflictError):
-    """Nothing tells whether one of these revisions is the file. ``newest``: the last of them."""
+    """Nothing shows whether one of these revisions is the file. ``newest``: the last of them."""
 
     def __init__(self, part_number: str, sent: Sent, revisions: Sequence[int]) -> None:
         numbers = ", ".join(map(str, revisions))
@@ -91,7 +91,7 @@ def checksum_of(revision: Revision) -> str:
 def _same_content(
     client: Downloads, part_number: str, revision: Revision, sent: Sent, cancelled: Cancel | None
 ) -> bool | None:
-    """None: nothing tells."""
+    """None: nothing shows it."""
     repacked = Path(sent.file_name).suffix.lower() in REPACKED
     if revision.file_size is not None and revision.file_size != sent.size and not repacked:
         return False

@@ -2,7 +2,7 @@
 """A live connection to the server's events that looks after itself.
 
 ``EventListener`` keeps one stream open from a thread of its own: it begins again after every loss, with
-growing pauses and a little chance (many clients must not return in one moment), goes on where it stopped
+growing pauses and a little chance (many clients must not return in one moment), resumes where it stopped
 (``Last-Event-ID``), and says how it is doing. It only calls back; it knows no Qt and touches no document.
 """
 
@@ -137,7 +137,7 @@ class EventListener:
 
     @property
     def last_event_id(self) -> str | None:
-        """Where the next connection goes on."""
+        """Where the next connection resumes."""
         return self._last_id
 
     def start(self) -> None:
@@ -268,4 +268,4 @@ class EventListener:
                 callback(value)
             except Exception:
                 # Whatever a callback does, the connection must live on.
-                log.exception("an error in the receiver of server events; the connection goes on")
+                log.exception("an error in the receiver of server events; the connection stays open")

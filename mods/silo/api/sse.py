@@ -145,7 +145,7 @@ def read_block(block: bytes) -> ServerEvent | None:
 
 
 def _marker(block: bytes) -> str | None:
-    # A server may set the id without an event, to say from where to go on.
+    # A server may set the id without an event, to say where to resume.
     found = _ID.findall(block)
     return found[-1].decode("utf-8", "replace") or None if found and b"\0" not in found[-1] else None
 

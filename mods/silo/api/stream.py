@@ -54,7 +54,7 @@ class HttpEventStream:
 
     @property
     def last_event_id(self) -> str | None:
-        """The id to go on from: of the last event, or of a bare mark that the server set."""
+        """The id to resume from: of the last event, or of a bare mark that the server set."""
         return self._parser.last_event_id
 
     def __iter__(self) -> Iterator[ServerEvent]:

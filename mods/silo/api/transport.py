@@ -44,7 +44,7 @@ _LOGIN = frozenset(("login", "log-in", "logon", "signin", "sign-in", "sign_in", 
 
 
 class Cancel(Protocol):
-    """What tells a long call to stop; :class:`threading.Event` is one."""
+    """What stops a long call; :class:`threading.Event` is one."""
 
     def is_set(self) -> bool: ...
 

@@ -87,7 +87,7 @@ NAMELESS = "object-"
 
 
 def object_name(obj: object) -> str:
-    """The object's ``Name``; for an object that has none, something that tells it from any other."""
+    """The object's ``Name``; for an object that has none, something unique to it."""
     name = getattr(obj, "Name", None)
     if isinstance(name, str) and (name or getattr(obj, "is_document_root", False)):
         return name

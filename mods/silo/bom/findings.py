@@ -16,7 +16,7 @@ from enum import StrEnum
 class Severity(StrEnum):
     """How much a finding matters."""
 
-    INFO = "info"  # told for completeness: this is how it was counted
+    INFO = "info"  # for completeness: this is how it was counted
     WARNING = "warning"  # counted, or left out, in a way a person should look at
     ERROR = "error"  # the BOM cannot be trusted as it stands; it is not synced without consent
 

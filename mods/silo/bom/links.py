@@ -5,7 +5,7 @@ The rules of this module:
 
 * a component is (target file, target object); labels never decide;
 * quantities are per one parent; levels count up from the top;
-* an assembly inside itself is cut where it closes the ring, and told as a cycle;
+* an assembly inside itself is cut where it closes the ring, and reported as a cycle;
 * whatever is not counted has a finding.
 
 What one assembly holds is read by :mod:`silo.bom.walk.contents`, each once; this module puts the levels
@@ -61,7 +61,7 @@ def extract(
     """Walk an assembly.
 
     inspect
-        tells why a live link has no target; links read from FCStd files know it themselves.
+        says why a live link has no target; links read from FCStd files know it themselves.
     canonical
         makes one path of the several that may name one file (``os.path.realpath`` for live documents).
     whole
@@ -133,14 +133,14 @@ class _Walker:
         self._nameless: dict[int, list[Any]] = {}
 
     def key(self, obj: Any) -> Key:
-        """What tells an object from any other: its file and its name in it."""
+        """What identifies an object: its file and its name in it."""
         return (self._path(obj), object_name(obj))
 
     def component(self, obj: Any) -> Key:
         """What a component is; the same as its key where it has a name.
 
-        Nameless ones are told apart by the order in which their document showed them, so that two documents
-        made of one file agree.
+        Nameless ones are distinguished by the order in which their document showed them, so that two
+        documents made of one file agree.
         """
         if isinstance(obj, Lost):
             return (self._canonical_path(obj.file), obj.name)

@@ -27,9 +27,9 @@ from silo.bom.model import BomDiff, BomEntry
 class MergePlan:
     """What a merge will write: the diff, and which unreferenced flags it sets and clears (part numbers).
 
-    ``tell`` names the lines that people own and of which the server has not yet heard what the assembly says
-    now: a new conflict, a changed one, or one that is over. No line is written for them, but the server must
-    know to ask a person, or to stop asking.
+    ``tell`` names the lines that people own and of which the server does not know yet what the assembly
+    says now: a new conflict, a changed one, or one that is over. No line is written for them, but the server
+    must know to ask a person, or to stop asking.
     """
 
     diff: BomDiff
@@ -60,7 +60,7 @@ def plan_merge(
     lines
         the server's lines; ``unreferenced_since`` (any true value) marks those flagged before.
         ``assembly_told`` says whether the server heard of the assembly's quantity for a line that people own,
-        ``assembly_quantity`` which; a server that says neither is not told of conflicts alone.
+        ``assembly_quantity`` which; a server that says neither is not sent conflicts alone.
     missing
         as in :func:`silo.bom.diff.diff_bom`: the lines of these components stay as they are.
     """

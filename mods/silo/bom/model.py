@@ -118,7 +118,7 @@ class BomEntry:
 
 @dataclass(frozen=True)
 class Extraction:
-    """What a walk found: the assembly itself, its entries, and everything worth telling."""
+    """What a walk found: the assembly itself, its entries, and its findings."""
 
     assembly: BomEntry
     entries: tuple[BomEntry, ...] = ()

@@ -66,7 +66,7 @@ def proposed_name(entry: BomEntry, *, shares_file: bool = False) -> str:
     """The document's label (spec §2), or the object's where that says more.
 
     FreeCAD makes a document's label from its file's name; only one that a person chose (it differs) stands
-    before an object's own label. Where a file gives several components, the object's label tells them apart.
+    before an object's own label. Where a file gives several components, the object's label decides.
     """
     if entry.standard:
         return entry.standard

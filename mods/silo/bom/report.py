@@ -50,7 +50,7 @@ def project_folder(path: str, top: str = "", rules: ModuleType = os.path) -> str
 
 
 def base_of(extraction: Extraction) -> str:
-    """The folder that paths are told relative to: that of the top file."""
+    """The folder that printed paths are relative to: that of the top file."""
     return os.path.dirname(extraction.assembly.doc_path)
 
 

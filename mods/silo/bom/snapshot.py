@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """An extraction as plain data and back, whole: for another process, or for later.
 
-``silo.bom.report`` tells a BOM to people and machines with short paths; this keeps everything. Entries are
+``silo.bom.report`` prints a BOM for people and machines with short paths; this keeps everything. Entries are
 kept in a table, each distinct one once, because nested assemblies share their children and a tree written
 out in full could be exponentially larger. What a look-up adds (``also``,
 ``unregistered``) is a later step's and not kept.

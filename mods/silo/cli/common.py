@@ -219,7 +219,7 @@ def reach(client: SiloClient, extraction: Extraction | None = None) -> None:
     entries = () if extraction is None else walk_entries((extraction.assembly, *extraction.entries))
     if any(entry.silo_uuid for entry in entries):
         return
-    with suppress(NotFoundError):  # a server that does not tell who we are has answered all the same
+    with suppress(NotFoundError):  # a server that does not say who we are has answered all the same
         client.whoami()
 
 

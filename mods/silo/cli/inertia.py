@@ -113,7 +113,7 @@ def _task(args: argparse.Namespace) -> Task:
         raise InputError("--frame urdf needs --urdf FILE, whose joints say where the link frames are")
     if args.urdf:
         data = read_urdf(args.urdf)
-        link_names(data, args.urdf)  # a file that cannot be filled is told before anything else is read
+        link_names(data, args.urdf)  # a file that cannot be filled is reported before anything else is read
         try:
             frames, root = urdf_frames(data, args.urdf), root_link(data, args.urdf)
             doubts = frame_doubts(data, args.urdf)

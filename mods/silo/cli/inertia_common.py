@@ -155,7 +155,7 @@ def material_table(args: argparse.Namespace) -> MaterialTable:
 
 
 def check_options(args: argparse.Namespace, *, asks_server: bool) -> None:
-    """Bad numbers, output files and a missing server are told before minutes of reading, not after."""
+    """Bad numbers, output files and a missing server are reported before minutes of reading, not after."""
     density = args.default_density
     if density is not None and not (density > 0 and math.isfinite(density)):
         raise InputError(f"--default-density: wanted kg/m³ above 0, got {density:g}")

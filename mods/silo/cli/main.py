@@ -172,7 +172,7 @@ class _Output(io.TextIOBase):
 
 
 def _system_said_no(error: OSError) -> int:
-    """A file that we were told to write, or the output itself: no such folder, no right, a full disk."""
+    """A file that we were asked to write, or the output itself: no such folder, no right, a full disk."""
     what = error.filename or "the output cannot be written"
     print(f"silo-mod: {what}: {error.strerror or error}", file=sys.stderr)
     return BAD_INPUT

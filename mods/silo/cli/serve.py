@@ -50,7 +50,7 @@ def need_server_extra() -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Serve until told to stop, which is how a server ends: 0 also after Ctrl-C or a TERM signal."""
+    """Serve until stopped, which is how a server ends: 0 also after Ctrl-C or a TERM signal."""
     need_server_extra()
     from silo_server.run import Greeting, serve
 

@@ -73,7 +73,7 @@ def bom_tree(extraction: Extraction) -> Tree:
     def grow(branch: Tree, entries: Iterable[BomEntry]) -> None:
         for entry in entries:
             if left[0] <= 0:
-                branch.add(Text("… more; --json tells all", "dim"))
+                branch.add(Text("… more; --json has all", "dim"))
                 return
             left[0] -= 1
             grow(branch.add(entry_text(entry, base)), entry.children)

@@ -39,7 +39,7 @@ def register(commands: Commands) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print events until told to stop; the connection is made anew whenever it is lost."""
+    """Print events until stopped; the connection is made anew whenever it is lost."""
     from silo.api.events import EventListener
 
     events: queue.Queue[ServerEvent | ConnectionState] = queue.Queue()

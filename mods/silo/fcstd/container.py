@@ -41,7 +41,7 @@ STORED, _DEFLATED = 0, 8
 
 
 class FileState(NamedTuple):
-    """What tells one state of a file from another without reading it."""
+    """What identifies one state of a file without reading it."""
 
     device: int
     inode: int

@@ -144,7 +144,7 @@ def refusal(recorded: str) -> NotFound | None:
 
 
 def _respelt_by_disk(recorded: str, spelt: Spelt) -> bool:
-    """True where a disk that does not tell case apart found a name of the link under another spelling.
+    """True where a disk that ignores case found a name of the link under another spelling.
 
     How the user spelt the folders above is not the link's matter.
     """

@@ -43,7 +43,7 @@ _KINDS: dict[str, type] = {
 class FcstdObject:
     """One object of a document. Properties are attributes, under FreeCAD's names.
 
-    There is one ``FcstdObject`` per object of a document, so ``is``, ``==`` and ``hash`` tell objects apart.
+    There is one ``FcstdObject`` per object of a document, so ``is``, ``==`` and ``hash`` distinguish objects.
     Reading a property may raise DocumentError where the file turns out to be damaged.
     """
 

@@ -147,7 +147,7 @@ class _Project:
             (f"the only other file with {_names(lost.objects)}", unused),
         ]
         for why, fitting in rules:
-            # Copies of one file share its date; their names may still tell them apart.
+            # Copies of one file share its date; their names may still distinguish them.
             exact = [path for path in fitting if _same_name(path, lost.file)] or fitting
             if len(exact) == 1:
                 return exact[0], why

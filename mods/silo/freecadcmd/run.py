@@ -69,8 +69,8 @@ def run_freecad(
     env
         set in FreeCAD's environment beside our own, such as ``FREECAD_USER_HOME``.
 
-    A file that FreeCAD cannot read, dies of or hangs on gives its error, and the rest goes on. ConfigError
-    where there is no FreeCAD, or where it does not start.
+    A file that FreeCAD cannot read, dies of or hangs on gives its error, and the rest is still read.
+    ConfigError where there is no FreeCAD, or where it does not start.
     """
     settings = {"assembly": assembly, "no_hardware": not hardware}
     for top, line in _each(tops, settings, command, timeout_s, env):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Parts and rows that share a name: which is which. By parent, quantity, mass; else in order, and told. Pure.
+"""Parts and rows that share a name: which is which. By parent, quantity, mass; else in order, warned. Pure.
 
-Rows with equal data are one :class:`Bundle`: nobody needs to tell them apart.
+Rows with equal data are one :class:`Bundle`: nobody needs to distinguish them.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Pair:
 
 @dataclass(eq=False)
 class _Open:
-    """What is still to be told apart."""
+    """What is still to be matched."""
 
     products: list[Product]
     bundles: list[Bundle]

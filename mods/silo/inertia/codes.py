@@ -31,7 +31,7 @@ class MassCode(StrEnum):
     SUB_ASSEMBLY = "sub_assembly_mass_differs"
     SUB_ASSEMBLY_SHARED = "sub_assembly_mass_shared"  # a sub-assembly's mass spread over its parts by volume
     # matching
-    AMBIGUOUS = "ambiguous"  # same name, and nothing to tell apart but the order
+    AMBIGUOUS = "ambiguous"  # same name, and nothing but the order to go by
     COUNT_DIFFERS = "count_differs"
     ROW_UNUSED = "row_unused"
     # links
@@ -70,12 +70,12 @@ class Rule(StrEnum):
 
 
 class Decided(StrEnum):
-    """What told apart several parts or rows of one name."""
+    """What decided between several parts or rows of one name."""
 
-    ONLY = "only"  # nothing to tell apart
+    ONLY = "only"  # nothing to decide
     SAME_DATA = "same_data"  # several rows that say the same
     PARENT = "parent"  # the sub-assembly around it
     QUANTITY = "quantity"
     MASS = "mass"  # density times volume fits one row's mass only
     REMAINING = "remaining"  # the last part and the last row
-    ORDER = "order"  # nothing but the order; told as ambiguous
+    ORDER = "order"  # nothing but the order; reported as ambiguous

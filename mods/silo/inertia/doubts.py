@@ -11,10 +11,10 @@ from silo.inertia.materials.density import DENSEST, LIGHTEST
 from silo.inertia.model import Prototype
 
 ROUNDING_LIMIT = 0.02
-"""A quantum above this share of the mass is told."""
+"""A quantum above this share of the mass is reported."""
 
 MISMATCH_LIMIT = 0.05
-"""Mass against density times volume, and STEP density against the one used: above this share is told."""
+"""Mass against density times volume, and STEP density against the one used: above this share is reported."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ def missing(found: Callable[[str], bool] = _found) -> tuple[str, ...]:
 
 
 def sentence(packages: Sequence[str], folder: str, python: tuple[int, int]) -> str:
-    """What to tell the user, in one line: a command that can be copied, for this very FreeCAD.
+    """The hint for the user, in one line: a command that can be copied, for this very FreeCAD.
 
     folder
         where this FreeCAD looks for additional packages; python: its version of Python.

@@ -122,7 +122,8 @@ def _extractions(
         except SiloError as error:
             found = error
         # The next file starts from nothing: no half loaded parts of this one, and no memory held. Before the
-        # result is told, so that what FreeCAD may die of in closing is this file's fault, not the next one's.
+        # result is reported, so that what FreeCAD may die of in closing is this file's fault, not the
+        # next one's.
         host.close_all()
         yield top, found
 

@@ -91,7 +91,7 @@ class Names:
 
 
 def when_loaded(call: Callable[[], None]) -> None:
-    """Call once all add-ons are loaded. A timer alone does not tell: the splash screen lets timers pass."""
+    """Call once all add-ons are loaded. A timer alone is not enough: the splash screen lets timers pass."""
     if host.has_active_workbench():
         call()
     else:

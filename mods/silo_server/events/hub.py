@@ -4,7 +4,7 @@
 The log in the database is the truth. The hub keeps the newest part of it in memory (the ring) as ready-made
 frames and wakes all listeners when it grows. A listener is only a cursor, the id of the last event it was
 given; it takes what is newer from the ring, or, when it is too slow or was away, from the log. So a slow
-client blocks nobody, costs nothing and loses nothing; only one that is behind the log's horizon is told
+client blocks nobody, costs nothing and loses nothing; only one that is behind the log's horizon is sent
 ``reset`` and must read everything again.
 
 News arrive by a call after a commit in this process, by PostgreSQL's NOTIFY from another, and at the latest
@@ -190,7 +190,7 @@ class Hub:
             self._wake()
 
     def _wake(self) -> None:
-        # Everybody who waits now goes on; who comes later waits for the next time.
+        # All who wait now are released; later ones wait for the next time.
         news, self._news = self._news, asyncio.Event()
         if self.closed:
             self._news.set()

@@ -76,7 +76,7 @@ class EventStream(Response):
     async def _run(self, send: Send) -> None:
         hub = self._hub
         cursor, reset = await hub.place(self._last)
-        # The first bytes tell proxies and clients that the stream stands.
+        # The first bytes show proxies and clients that the stream stands.
         await _send(send, _hello(cursor) + (_reset(cursor) if reset else b""))
         beats, epoch = hub.beats, hub.epoch
         while not hub.closed:

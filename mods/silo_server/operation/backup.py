@@ -177,7 +177,7 @@ def _open(settings: Settings) -> Iterator[Database]:
 
 @contextmanager
 def _exclusive(db: Database) -> Iterator[Connection]:
-    """A transaction that keeps all other writers, and migrations, waiting; readers go on."""
+    """A transaction that keeps all other writers, and migrations, waiting; readers continue."""
     with db.engine.execution_options(silo_write=True).connect() as connection, connection.begin():
         if connection.dialect.name == "postgresql":
             connection.execute(text("SET LOCAL statement_timeout = 0"))

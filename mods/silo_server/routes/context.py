@@ -109,7 +109,7 @@ def find_actor(request: Request) -> Actor | None:
 
 
 def client_address(request: Request) -> str:
-    """The caller's address, as told by the connection (or by a proxy that uvicorn trusts)."""
+    """The caller's address, as given by the connection (or by a proxy that uvicorn trusts)."""
     return request.client.host if request.client else ""
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Values as the API tells them."""
+"""Values as the API sends them."""
 
 from __future__ import annotations
 

@@ -138,7 +138,7 @@ def get_housekeeping(server: ServerDep, caller: Admin) -> dict[str, Any]:
 
 @router.put("/api/admin/mode", responses=READ_ERRORS)
 def set_mode(server: ServerDep, caller: Admin, body: ModeBody) -> dict[str, Any]:
-    """Take changes, or take none (503) until told otherwise; all processes follow at once."""
+    """Take changes, or take none (503) until set otherwise; all processes follow at once."""
     with server.db.write(caller, even_when_read_only=True) as tx:
         put_state(tx, "mode", body.mode)
         audit.note(tx, "mode.set", body.mode)

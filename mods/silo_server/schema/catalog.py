@@ -158,7 +158,7 @@ def _parse_field(raw: Mapping[str, Any]) -> PropertyField:
 
 
 def describe(schema: Schema) -> dict[str, Any]:
-    """The schema as ``GET /api/schemas/{name}`` tells it: the segments with their values."""
+    """The schema as ``GET /api/schemas/{name}`` sends it: the segments with their values."""
     values = {category.code: category.name for category in schema.categories.values()}
     return {
         "name": schema.name,

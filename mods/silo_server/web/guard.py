@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Who may see and do what on the pages: as for the API, but who is not logged in is led to the login page."""
+"""Who may see and do what on the pages: as for the API, but visitors are led to the login page."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def own_form(request: Request) -> None:
 
 
 def install(app: FastAPI) -> None:
-    """Lead who is not logged in to the login page."""
+    """Lead visitors who are not logged in to the login page."""
     app.add_exception_handler(LoginNeededError, _to_login)
     app.add_exception_handler(OldFormError, _send_again)
 

@@ -2,7 +2,7 @@
 """Import of a BOM from CSV: first every row with what would become of it, then, on a click, all of it.
 
 Between the two the file travels in the form, packed, so that nothing waits on the server and any of its
-processes can go on.
+processes can continue.
 """
 
 from __future__ import annotations

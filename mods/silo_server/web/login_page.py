@@ -26,7 +26,7 @@ Next = Annotated[str, Query(max_length=500)]
 
 @router.get("/login")
 def login_form(request: Request, next: Next = START) -> Response:
-    """The login form; who is logged in already goes on."""
+    """The login form; users who are logged in already are sent on."""
     if find_actor(request) is not None:
         return back(local_path(next))
     return page(request, "login.html", None, target=local_path(next), problem="", kept=None)

@@ -105,7 +105,7 @@ def create_login_link(request: Request, server: ServerDep, caller: Administrator
 
 @router.post("/mode")
 def set_mode(server: ServerDep, caller: Administrator, form: Form) -> Response:
-    """Take changes, or take none until told otherwise."""
+    """Take changes, or take none until set otherwise."""
     mode = text(form, "mode")
     if mode not in MODES:
         raise RejectedError("mode: wanted normal or read-only; load the page again")

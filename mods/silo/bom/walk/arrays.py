@@ -2,7 +2,7 @@
 """How many instances an array shows: link arrays, Draft arrays, and single elements that are left out.
 
 Draft arrays have ``Count`` where they are made of links. Those without links have none before FreeCAD 1.0,
-and some are saved with 0; then the numbers of the pattern tell (``draftobjects/array.py``, 0.20 to 1.1).
+and some are saved with 0; then the numbers of the pattern count (``draftobjects/array.py``, 0.20 to 1.1).
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def array_count(link: object) -> int:
 
 
 def draft_count(array: object) -> int | None:
-    """Instances of a Draft array; None where neither its count nor its pattern tells."""
+    """Instances of a Draft array; None where neither its count nor its pattern says."""
     count = own(array, "Count")
     if isinstance(count, int) and count > 0:
         return count

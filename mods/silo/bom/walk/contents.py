@@ -103,7 +103,7 @@ class Reader:
         return known
 
     def component(self, obj: Any) -> Key:
-        """What tells one component from another: of standard parts their designation, of others the key."""
+        """What identifies a component: of standard parts their designation, of others the key."""
         key = self.key(obj)
         text, registered = self.standard(obj, key)
         return (STANDARD_PARTS, text) if text and not registered else key

@@ -121,7 +121,7 @@ def _python_kind(obj: object) -> Kind:
 
 @lru_cache(maxsize=1024)
 def _kind_by_names(names: frozenset[str] | tuple[str, ...]) -> Kind | None:
-    """What a Python object with these properties is; None for one that they do not tell."""
+    """What a Python object with these properties is; None for one that they do not identify."""
     has = frozenset(names).issuperset
     if has(("Base",)) and not frozenset(names).isdisjoint(_ARRAY_MARKS):
         return Kind.DRAFT_ARRAY
@@ -189,8 +189,8 @@ def flattened(
 ) -> Iterator[tuple[T, Any, Kind]]:
     """Everything that lies in a container at any depth within its own file, each object once, with its key.
 
-    Inline parts, groups and folders come before what they hold. Links are not followed. ``key`` tells objects
-    apart; ``closed`` says of an inner container that what it holds is its own affair.
+    Inline parts, groups and folders come before what they hold. Links are not followed. ``key`` identifies an
+    object; ``closed`` says of an inner container that what it holds is its own affair.
     """
     seen: set[T] = set()
     open_containers = [iter(members(container))]

@@ -82,7 +82,7 @@ class Notes:
 
     def __init__(self, path_of: Callable[[Any], str]) -> None:
         self._path_of = path_of
-        self.reading = ""  # the file that is being read; for objects that do not tell theirs
+        self.reading = ""  # the file that is being read; for objects that do not know theirs
         self._notes: dict[_Slot, _Note] = {}
 
     def findings(self) -> tuple[Finding, ...]:

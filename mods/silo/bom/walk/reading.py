@@ -11,7 +11,7 @@ object with an identity of its own, there is a component. Further:
 * what lies in something suppressed or excluded is left out with it;
 * a standard part that a cut, a boolean or a fusion consumes is no piece to buy;
 * a broken link brings a :class:`Lost` component with its quantity, and a finding that blocks;
-* what a damaged file does not tell is a finding that blocks; the rest is counted.
+* what cannot be read of a damaged file is a finding that blocks; the rest is counted.
 
 Nothing here depends on where the assembly is used, so each is read once.
 """
@@ -228,7 +228,7 @@ class Reading:
 
     def _whole_object(self, key: Key, link: Any, target: Target) -> Worth:
         name = self._key(target.obj)
-        # FreeCAD makes two documents of one file that it opened by two paths; the path tells.
+        # FreeCAD makes two documents of one file that it opened by two paths; the path decides.
         if same_document(target.obj.Document, self._document) or (self._path and name[0] == self._path):
             return self._in_document(link, target)
         if words := self._reader.no_component(name, target.obj):

@@ -41,7 +41,7 @@ class Rings:
         return distance[there] <= distance[here]
 
     def example(self, node: Key) -> tuple[Key, ...]:
-        """A ring to tell of: the shortest through the first of those in a ring with ``node``."""
+        """A ring to report: the shortest through the first of those in a ring with ``node``."""
         members = self._members[node]
         if members not in self._told:
             self._told[members] = self._shortest(min(members))

@@ -53,7 +53,7 @@ class _Trail:
 
 
 class _EndlessError(Exception):
-    """The chain never ends; told as a finding, never raised to a caller."""
+    """The chain never ends; reported as a finding, never raised to a caller."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +105,7 @@ def is_mirrored(link: object, index: int | None = None) -> bool:
     """True for a negative scale: an odd number of negative axes makes the other hand of a part.
 
     index
-        of one element of an array; else any mirrored element tells.
+        of one element of an array; else any mirrored element decides.
     """
     one = slice(None) if index is None else slice(index, index + 1)
     if any(_negative(vector) for vector in tuple(own(link, "ScaleList") or ())[one]):

@@ -51,7 +51,7 @@ class Columns:
 
     @property
     def usable(self) -> bool:
-        """True where rows can be told apart: by name, part number or description."""
+        """True where rows can be distinguished: by name, part number or description."""
         return bool({Role.NAME, Role.PART_NUMBER, Role.DESCRIPTION} & self.at.keys())
 
 

@@ -44,7 +44,7 @@ class MassReader:
         self._told_unit = self._told_force = False
 
     def read(self, row: Row, name: str, quantity: float | None) -> MassCell:
-        """The mass of one piece; every doubt is told, with the line."""
+        """The mass of one piece; every doubt is reported, with the line."""
         one = self._cell(Role.MASS, row, name)
         total = self._cell(Role.TOTAL_MASS, row, name)
         if one.kg is None and total.kg is not None:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Mass cells of a BOM: number, unit, rounding quantum. "0.3 kg*", "1.234,5 g", "10.5 oz", "- None -".
 
-A cell is either empty (in any of the spellings below), a mass, or a problem that is told with its line. It is
+A cell is either empty (in any of the spellings below), a mass, or a problem, reported with its line. It is
 never None in silence.
 """
 

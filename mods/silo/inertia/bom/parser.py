@@ -214,7 +214,7 @@ def _duplicates(rows: Sequence[BOMEntry]) -> list[BomWarning]:
         BomWarning(
             BomCode.DUPLICATE_NAME,
             f"{len(same)} rows are named “{name}” (lines {', '.join(str(r.line) for r in same)}) "
-            "with different data; parts are told apart by quantity and mass",
+            "with different data; parts are matched by quantity and mass",
             same[1].line,
             name,
         )

@@ -25,7 +25,7 @@ class BomCode(StrEnum):
 
 @dataclass(frozen=True)
 class BomWarning:
-    """One thing worth telling about the BOM; ``line`` of the file (1 = first), 0 where it is no one line."""
+    """One finding about the BOM; ``line`` of the file (1 = first), 0 where it is no one line."""
 
     code: BomCode
     message: str
@@ -86,7 +86,7 @@ class BOMEntry:
 
     @property
     def data(self) -> tuple[str | None, float | None]:
-        """What decides a mass; rows with equal data need not be told apart."""
+        """What decides a mass; rows with equal data need not be distinguished."""
         return (self.material, self.mass_kg)
 
 

@@ -129,7 +129,7 @@ def python() -> str:
 
 
 def _environment() -> dict[str, str]:
-    # The child must find the same modules, however this process was told of them.
+    # The child must find the same modules, however this process found them.
     paths = os.pathsep.join(p for p in sys.path if p)
     # One thread: numpy's pool would reserve memory for each core, which counts against the limit.
     return {**os.environ, "PYTHONPATH": paths, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}

@@ -37,7 +37,7 @@ def user_rows(path: Path | str) -> tuple[Material, ...]:
     ``.toml``: ``[materials]`` with ``"My alloy" = 2810``, ``= "2.81 g/cm3"`` or
     ``= { density = …, aliases = […] }``.
 
-    All bad rows are told together, in one ConfigError.
+    All bad rows are reported together, in one ConfigError.
     """
     path = Path(path)
     try:

@@ -2,7 +2,7 @@
 """A URDF with its ``<inertial>`` elements filled in, every other byte of the file as it was.
 
 An XML library that writes a file again changes quotes, spaces, comments' places; people's diffs then show the
-whole file. So the places are found with expat, which tells byte positions, and only they are replaced.
+whole file. So the places are found with expat, which gives byte positions, and only they are replaced.
 """
 
 from __future__ import annotations
@@ -213,7 +213,7 @@ class _Reader:
         self._stack.pop()
         above = self._stack[-1] if self._stack else ""
         if self._open is not None and tag == "inertial" and above == "link":
-            # For a tag that closes itself expat tells the place behind it as that of its end.
+            # For a tag that closes itself expat gives the place behind it as that of its end.
             first, closed = self._tag_end(self._inertial_at)
             self._open.inertial = (self._inertial_at, first if closed else self._tag_end(here)[0])
             self._open.inertials += 1

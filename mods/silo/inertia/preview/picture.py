@@ -45,7 +45,7 @@ def write_picture(
     page = np.ones((height, width, 3))
     page[:, :stage] = image.reshape(height, SMOOTH, stage, SMOOTH, 3).mean(axis=(1, 3))
     depth = canvas.depth[::SMOOTH, ::SMOOTH].astype(np.float64)
-    # Many ellipsoids over each other would hide the parts; then their rims alone must tell.
+    # Many ellipsoids over each other would hide the parts; then their rims alone must show them.
     fill = min(1.0, 5 / max(len(views), 1))
     for view, colour in zip(views, colours, strict=True):
         _blend_ellipsoid(page, depth, camera, view, colour, fill)

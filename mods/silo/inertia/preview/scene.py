@@ -74,7 +74,7 @@ def inertia_ellipsoid(props: MassProps) -> Ellipsoid | None:
 
 
 def colour_of(number: int) -> Colour:
-    """A colour for the n-th link; the first eight are told apart by colour-blind people as well as can be."""
+    """A colour for the n-th link; colour-blind people can distinguish the first eight as well as can be."""
     if number < len(_BASE):
         return _BASE[number]
     hue = (number * 0.618033988749895) % 1.0

@@ -86,7 +86,7 @@ class CommitFlow:
             return False
 
     def start(self, doc: Any) -> None:
-        """Commit a document: ask where there is something to ask, then go on without waiting."""
+        """Commit a document: ask where there is something to ask, then return without waiting."""
         if not doc.FileName:
             self._desk.save_as(doc)
         unregistered = bool(doc.FileName) and not self._desk.identity(doc)

@@ -2,7 +2,7 @@
 """What a commit saves, in which order, and what it leaves alone and why. GUI thread, but no widgets.
 
 A plan lists the document and everything below it that has unsaved edits, leaves before parents (spec,
-design decision 3). Nothing is lost: a document that FreeCAD cannot save whole is told, never written.
+design decision 3). Nothing is lost: a document that FreeCAD cannot save whole is reported, never written.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """The end of a commit that is not ours: a fork's ``Origin_Commit``, or an origin's ``commitDocument``.
 
-Nothing is replaced. A menu, a toolbar or a shortcut runs the command through its QAction, which tells us
+Nothing is replaced. A menu, a toolbar or a shortcut runs the command through its QAction, which signals us
 afterwards; a macro runs it without one, but then the document is saved, which an observer sees, or the origin
-is asked, whose method tells us. All of these only note the document; a moment later its BOM is synced, once.
+is asked, whose method calls us. All of these only note the document; a moment later its BOM is synced, once.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ class CommitHook:
             self.note(doc)
 
     def _saved(self, doc: Any, filename: str) -> None:
-        # "Save a copy" tells another file than the document's own.
+        # "Save a copy" names another file than the document's own.
         from silo.spelling import one_path  # late: FreeCAD's start waits for this module
 
         same = bool(doc.FileName) and one_path(filename) == one_path(doc.FileName)
@@ -86,7 +86,7 @@ class CommitHook:
             self.note(doc, committed=False)
 
     def _activated(self) -> None:
-        # The document is not the active one yet while FreeCAD tells it.
+        # The document is not the active one yet while FreeCAD reports it.
         self._later(0, self._wrap_origin)
 
     def _wrap_origin(self) -> None:
@@ -106,7 +106,7 @@ class CommitHook:
         try:
             origin.commitDocument = commit_document
         except (AttributeError, TypeError):
-            # An origin written in C++ takes no attributes; its command's QAction tells us.
+            # An origin written in C++ takes no attributes; its command's QAction signals us.
             return
 
     def note(self, doc: Any, *, committed: bool = True) -> None:

@@ -82,7 +82,7 @@ def error(text: str) -> None:
 
 
 def log(text: str) -> None:
-    """A line for those who look for the cause of a problem; hidden unless FreeCAD is told to show it."""
+    """A line for those who look for the cause of a problem; hidden unless FreeCAD is set to show it."""
     FreeCAD.Console.PrintLog(visible(text) + "\n")
 
 
@@ -244,7 +244,7 @@ def close_all() -> None:
 
 
 def add_document_observer(observer: Any) -> None:
-    """Have an object told of what happens to documents (``slotFinishSaveDocument`` and its like)."""
+    """Have an object notified of what happens to documents (``slotFinishSaveDocument`` and its like)."""
     FreeCAD.addDocumentObserver(observer)
 
 

@@ -40,7 +40,7 @@ ASSEMBLY_SINCE = (0, 22)
 
 
 def read(path: str, assembly: str | None = None, *, hardware: bool = True) -> Extraction:
-    """The BOM of a file, opened in this FreeCAD (or found open). DocumentError, InputError as told there."""
+    """The BOM of a file, opened in this FreeCAD (or found open). Raises DocumentError, InputError."""
     return extract_live(saving.open_fully(path), assembly, hardware=hardware)
 
 
@@ -184,7 +184,7 @@ class LinkInspector:
         return self._look(owner, file, name) if owner else LinkProblem(FindingCode.BROKEN_LINK, file, name)
 
     def _look(self, owner: str, file: str, name: str) -> LinkProblem:
-        """What the reader of files says of the target, for it knows more than FreeCAD tells."""
+        """What the reader of files says of the target, for it knows more than FreeCAD does."""
         from silo.fcstd import Library
         from silo.fcstd.values import Ref
 

@@ -24,7 +24,7 @@ def place(names: list[str], wanted: Callable[[], bool]) -> Any:
         return manipulator
     by_hand = ByHand(names, wanted)
     host.main_window().workbenchActivated.connect(by_hand.put)
-    # A reloaded workbench is not activated anew, so it does not tell.
+    # A reloaded workbench is not activated anew, so it sends no signal.
     qt.later(0, by_hand.put)
     return by_hand
 

@@ -30,7 +30,7 @@ class Account:
         modelled in the assembly's own file; suppressed, excluded or used up, as a finding says.
 
     unexplained
-        names of the members whose solids no line explains (the likeliest, where only the sum tells).
+        names of the members whose solids no line explains (the likeliest, where only the sum shows it).
     """
 
     doc_path: str

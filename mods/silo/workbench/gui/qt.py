@@ -65,7 +65,7 @@ class Relay(QtCore.QObject):  # type: ignore[misc]  # PySide has no types
         except Exception as error:  # noqa: BLE001  # an exception may not pass through Qt's event loop
             if self._on_error is not None:
                 self._on_error(error)
-        # Long work tells its progress through here, so garbage does not pile up while it goes on.
+        # Long work reports its progress through here, so garbage does not pile up meanwhile.
         collect_due()
 
 

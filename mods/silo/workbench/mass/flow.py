@@ -60,7 +60,7 @@ class MassFlow:
             # FreeCAD's own volume stands witness here; meshes are for pictures, and cost as much again.
             assembly = shapes.read_live(doc, ReadOptions(mesh_check=False), waiting.report)
         options = Options(step_density=True, unknown_is_zero=True, own_bom=True)
-        # Without anything placed there is nothing for a pattern to match, which would be told as a fault.
+        # Without anything placed there is nothing for a pattern to match, which would be reported as a fault.
         everything = Link(assembly.name or "assembly", ("**",))
         whole = LinkMap((everything,)) if assembly.instances else None
         task = Task(load_materials(freecad=False), options, whole, simulated=False)

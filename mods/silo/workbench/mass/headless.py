@@ -56,7 +56,7 @@ def _measure(job: dict[str, Any], out: TextIO) -> None:
     from silo.workbench.freecad import saving
     from silo.workbench.mass import shapes
 
-    # What could harm FreeCAD is not opened, and what is wrong with a file is told in our reader's words.
+    # What could harm FreeCAD is not opened, and what is wrong with a file is reported in our reader's words.
     Library().open(job["top"])
     assembly = shapes.read_live(
         saving.open_fully(job["top"]), ReadOptions.from_content(job["options"]), _teller(out)

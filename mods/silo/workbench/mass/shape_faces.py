@@ -45,13 +45,13 @@ def faces_of(shape: Any) -> Iterator[Any]:
 
 
 def face_of(face: Any) -> Face:
-    """A FreeCAD face as the integration takes it. ValueError where FreeCAD does not tell enough of it."""
+    """A FreeCAD face as the integration takes it. ValueError where FreeCAD does not give enough of it."""
     wires = [wire for wire in face.childShapes() if wire.ShapeType == "Wire"]
     return Face(_surface(face), [_curve(face, edge) for wire in wires for edge in _edges(face, wire)])
 
 
 def _edges(face: Any, wire: Any) -> Iterator[Any]:
-    """The edges, with the face's own orientation in them, which tells the two curves of a seam apart."""
+    """The edges, with the face's own orientation in them, which distinguishes the two curves of a seam."""
     listed = [edge for edge in wire.childShapes() if edge.Orientation in _BOUNDARY]
     yield from listed
     for edge in listed:

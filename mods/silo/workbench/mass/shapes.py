@@ -225,7 +225,7 @@ class _Product:
         return _Solid(solid, props, mesh)
 
     def _integrated(self, solid: Any, centre: Floats, radius: float) -> Moments:
-        """By our integration; not finite where FreeCAD does not tell the geometry in full."""
+        """By our integration; not finite where FreeCAD does not give the geometry in full."""
         faces = list(faces_of(solid))
 
         def told() -> Any:

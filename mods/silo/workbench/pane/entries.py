@@ -280,9 +280,7 @@ def commit_of_event(event: ServerEvent) -> tuple[str, Newer] | None:
 
 def of_gap(when: float) -> Entry:
     """The box for what was not heard: the server lost its log, or counts anew."""
-    text = translate(
-        "Silo", "The server cannot tell any more what happened since. Its own activity page shows what is so."
-    )
+    text = translate("Silo", "The server no longer knows what happened since. See its own activity page.")
     return Entry(
         key="gap",
         title=translate("Silo", "Some activity may be missing"),
@@ -310,7 +308,7 @@ def of_merge(merge: MergeEvent, page: Page, when: float, event_id: str | None = 
 def _moment(told: datetime | None, now: float) -> float:
     """When an event happened: as the server says where it is an old one, else now.
 
-    Servers tell whole seconds, and their clocks are a little off: just now, the order of arrival is truer.
+    Servers send whole seconds, and their clocks are a little off: just now, the order of arrival is truer.
     """
     stamp = told.timestamp() if told is not None else now
     return stamp if abs(stamp - now) > _JUST_NOW_S else now
@@ -321,7 +319,7 @@ def _event_words(kind: str, number: str, data: dict[str, Any]) -> tuple[str, str
     revision = data.get("revision_number", data.get("revision"))
     if kind == "revision.created" and isinstance(revision, int):
         if revision == 1 and _text(data, "comment") in ("", "created"):
-            return "", ""  # An item is born with it, and that is told already.
+            return "", ""  # An item is born with it, and that is shown already.
         text = translate("Silo", "Revision {n} of {number}").replace("{n}", str(revision))
         return text.replace("{number}", number), _revision_key(number, revision)
     words = {

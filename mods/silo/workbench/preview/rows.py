@@ -164,7 +164,7 @@ def rows(preview: Preview, most: int = MOST_ROWS) -> tuple[Row, ...]:
     """The table: the lines of the assembly, then what is left out and why.
 
     most
-        so many rows of sub-assemblies at most, each of which gets its share; the rest is told by one row.
+        so many rows of sub-assemblies at most, each of which gets its share; one row sums up the rest.
     """
     by_key = {one.resolved.assembly.key: one for one in preview.compared}
     base = os.path.dirname(preview.snapshot.path)
@@ -239,7 +239,7 @@ def _assembly_rows(
 
 
 def _below(entry: BomEntry, known: Known, names: Mapping[str, str], above: Keys, room: int) -> Iterator[Row]:
-    """The lines of a sub-assembly; none where it stands above itself (a loop is told as a finding)."""
+    """The lines of a sub-assembly; none where it stands above itself (a loop is reported as a finding)."""
     one = known.get(entry.key) if entry.is_assembly and entry.key not in above else None
     if one is None:
         return

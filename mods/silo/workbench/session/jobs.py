@@ -31,7 +31,7 @@ class Busy:
 
 
 class Control:
-    """A running job's way to the outside: tell progress, and learn that it should stop."""
+    """A running job's way to the outside: report progress, and learn that it should stop."""
 
     def __init__(self, tell: Callable[[str, float | None], None]) -> None:
         self.cancelled = threading.Event()

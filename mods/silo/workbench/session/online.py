@@ -33,7 +33,7 @@ class Online:
         called with a box to show, a commit that arrived (with lines for the report view), the connection
         (kind, reason), and a commit that the server announced (identity, commit); from any thread.
     make_client
-        makes the client of a server; :class:`SiloClient` unless told otherwise.
+        makes the client of a server; :class:`SiloClient` unless given.
     """
 
     def __init__(
@@ -180,7 +180,7 @@ class LastIds:
         self._known = self._read()
 
     def get(self, url: str) -> str | None:
-        """Where to go on; None for a server that was never listened to."""
+        """Where to resume; None for a server that was never listened to."""
         return self._known.get(url)
 
     def set(self, url: str, event_id: str) -> None:

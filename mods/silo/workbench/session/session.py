@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""What goes on between FreeCAD and the server while FreeCAD runs: workers, connection, and what is shown.
+"""What happens between FreeCAD and the server while FreeCAD runs: workers, connection, and what is shown.
 
 Methods are called in the GUI thread and return at once. Work is done by workers, so that a commit is on
 disk at once even while copies take long or the network hangs: for rows, for copies, for the server. Results
@@ -91,7 +91,7 @@ class Session:
     store
         the keyring; asked in a worker only.
     folder
-        where the outbox is; the user's data folder unless told otherwise.
+        where the outbox is; the user's data folder unless given.
     make_client
         makes the client of a server; for tests.
     """

@@ -48,7 +48,7 @@ def _hasher() -> PasswordHasher:
 
 @cache
 def _decoy() -> str:
-    # Verified against when there is no such user, so that the answer's time does not tell.
+    # Verified against when there is no such user, so that the answer's time gives nothing away.
     with _HASHING.enter():
         return _hasher().hash("a password that nobody has")
 

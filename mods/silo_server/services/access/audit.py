@@ -26,7 +26,7 @@ class AuditEntry:
 
 
 def note(tx: Tx, action: str, target: str = "", detail: str = "") -> None:
-    """Write one line, together with what it tells of."""
+    """Write one line, together with what it records."""
     tx.conn.execute(
         insert(audit).values(
             at=tx.stamp,

@@ -58,7 +58,7 @@ class LastSync:
         return in_words(self.gaps)
 
     def to_wire(self) -> dict[str, Any]:
-        """As the API tells it."""
+        """As the API sends it."""
         return {"at": wire(self.at), "left_out": self.gaps}
 
 

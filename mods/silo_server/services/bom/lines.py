@@ -221,7 +221,7 @@ def state_columns(state: LineState) -> dict[str, Any]:
 
 
 def line_to_wire(line: Line, parent_part_number: str) -> dict[str, Any]:
-    """A line as ``GET …/bom`` tells it: the contract's keys, and ours for overrides and newer revisions."""
+    """A line as ``GET …/bom`` sends it: the contract's keys, and ours for overrides and newer revisions."""
     return {
         "id": line.id,
         "parent_part_number": parent_part_number,

@@ -135,7 +135,7 @@ def _entry(index: int, raw: Any) -> tuple[OrderEntry | None, str | None]:
     if not is_text(name, 200) or not name.strip():
         missing = f"entries[{index}].child_part_number: wanted a part number, got {_shown(name)}"
         return None, missing if text is None else f"{missing}; {text}"
-    # An entry with a bad quantity is still looked up, so that an unknown number is told as well.
+    # An entry with a bad quantity is still looked up, so that an unknown number is reported as well.
     components, wrong = _components(index, raw.get("components"))
     entry = OrderEntry(index, name.strip(), 1.0 if text else float(quantity or 0), components)
     return entry, "; ".join(filter(None, (text, wrong))) or None

@@ -313,7 +313,7 @@ def _doubt(difference: Floats, value: Floats) -> Floats:
 def _clipped(pieces: Floats, ends: Floats) -> tuple[NDArray[np.intp], Floats, Floats]:
     """Rows, starts and ends of the pieces from the middle one of ``pieces`` to each of ``ends``.
 
-    Pieces to the left of the middle run backwards; the outermost go on for ever.
+    Pieces to the left of the middle run backwards; the outermost never end.
     """
     middle = len(pieces) // 2
     near = np.r_[pieces[1 : middle + 1], pieces[middle:-1]]

@@ -209,7 +209,7 @@ def basis_functions(
     """B-splines at ``t`` (n, m), each row between the knots around ``where`` (n,).
 
     Returns the first pole that counts (n,), and values and derivatives (n, m, degree + 1) of the functions
-    that are not 0. Cox and de Boor's recursion; outside of the knots the last piece goes on.
+    that are not 0. Cox and de Boor's recursion; outside of the knots the last piece continues.
     """
     span = np.clip(np.searchsorted(knots, where, side="right") - 1, degree, len(knots) - degree - 2)
     values = np.ones((*t.shape, 1))

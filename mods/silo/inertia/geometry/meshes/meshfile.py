@@ -91,7 +91,7 @@ def _scene(path: Path, kind: Kind) -> MeshScene:
         ) from error
     try:
         with path.open("rb") as stream:
-            # Unprocessed: what trimesh would mend in silence is what we have to tell.
+            # Unprocessed: what trimesh would mend in silence is what we have to report.
             loaded = trimesh.load_scene(stream, file_type=kind.value, process=False)
     except MemoryError:
         raise

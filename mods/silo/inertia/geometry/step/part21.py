@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The text of a STEP file (ISO 10303-21), as far as the geometry kernel does not tell what it says.
+"""The text of a STEP file (ISO 10303-21), as far as the geometry kernel does not pass it on.
 
 The kernel drops part numbers, drops densities that come without a material name, and turns the unit of the
 others into one of its own. So the few entities that carry them are read here, from the text: one pass of a

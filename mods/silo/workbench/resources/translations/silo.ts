@@ -849,7 +849,7 @@ They are installed in {folder}.</source>
         </message>
         <message>
             <location filename="../../pane/entries.py" />
-            <source>The server cannot tell any more what happened since. Its own activity page shows what is so.</source>
+            <source>The server no longer knows what happened since. See its own activity page.</source>
             <translation type="unfinished" />
         </message>
         <message>
