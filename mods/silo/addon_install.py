@@ -70,7 +70,7 @@ def ask_freecad(freecadcmd: str | None = None, data: Path | None = None) -> Plac
     shared = exchange_folder(command)
     if shared is not None:
         os.makedirs(shared, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix="silo-ask-", dir=shared) as folder:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True, prefix="silo-ask-", dir=shared) as folder:
         out = Path(folder) / "answer.json"
         try:
             run = subprocess.run(

@@ -194,7 +194,7 @@ def serve(
             _work(settings, sock, lambda: tell(greeting))
         else:
             tell(greeting)
-            with tempfile.TemporaryDirectory(prefix="silo-metrics-") as shared:
+            with tempfile.TemporaryDirectory(ignore_cleanup_errors=True, prefix="silo-metrics-") as shared:
                 os.environ[SHARED] = shared
                 _run_workers(settings, workers, sock)
 

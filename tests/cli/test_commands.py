@@ -307,6 +307,7 @@ def test_mass_does_not_pretend_to_leave_hardware_out(run: Any, gearbox: Path) ->
     assert (done.code, "--no-hardware" in done.err) == (2, True)
 
 
+@pytest.mark.usefixtures("needs_locks")
 def test_relink_leaves_alone_what_freecad_has_open(
     run: Any, gearbox: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -261,7 +261,7 @@ def test_no_edit_is_lost_without_a_choice(client: Client, block: int, tmp_path: 
     parts = {name: client.create_item("kindred-rd", "M01", name) for name in PARTS}
     revisions = asked = losses = 0
     for seed in seeds:
-        world = World(client, parts, tmp_path / str(seed), random.Random(seed), shared=seed % 4 > 1)
+        world = World(client, parts, tmp_path / str(seed), random.Random(seed), shared=seed % 8 > 3)
         for _ in range(STEPS):
             world.step()
         world.end()

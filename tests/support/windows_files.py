@@ -3,7 +3,7 @@
 
 - A file that this process has open can be neither replaced, renamed nor deleted (a sharing violation).
 - A virus scanner looks at every new file: the first try to replace or delete it fails, the next one works.
-- There is no ``fcntl``, no ``resource``, and ``os`` lacks what only POSIX has.
+- There is no ``fcntl`` and no ``resource``, but the locks of ``msvcrt``; ``os`` lacks what only POSIX has.
 
 What Windows does beyond that (paths, modes, processes) is not simulated.
 """
@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import os
 import sys
+import types
 from collections.abc import Callable
 from typing import Any
 
@@ -81,8 +82,25 @@ def _guarded(act: Callable[..., Any], places: int) -> Callable[..., Any]:
     return guarded
 
 
+def _lend_locks() -> None:
+    """``msvcrt`` with its locks, as far as they are used: one holder, also within a process."""
+    import fcntl
+
+    def locking(descriptor: int, mode: int, _bytes: int) -> None:
+        how = fcntl.LOCK_UN if mode == msvcrt.LK_UNLCK else fcntl.LOCK_EX | fcntl.LOCK_NB
+        try:
+            fcntl.flock(descriptor, how)
+        except BlockingIOError:
+            raise PermissionError(13, "Permission denied") from None
+
+    msvcrt: Any = types.ModuleType("msvcrt")
+    msvcrt.LK_UNLCK, msvcrt.LK_NBLCK, msvcrt.locking = 0, 2, locking
+    sys.modules["msvcrt"] = msvcrt
+
+
 def pytest_configure() -> None:
     """Put it in place before our modules are imported."""
+    _lend_locks()
     for name in _HIDDEN:
         sys.modules[name] = None  # type: ignore[assignment]
     for name in _POSIX_ONLY:

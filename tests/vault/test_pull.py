@@ -231,6 +231,7 @@ def test_without_what_the_commit_wrote_down_the_bom_says_it(project: Project, tm
     assert bom(pulled.top) == bom(project.arm)
 
 
+@pytest.mark.usefixtures("needs_symlinks")
 def test_a_hostile_path_leaves_the_folder_alone(project: Project, tmp_path: Path) -> None:
     """Absolute, on the network, a device, no FreeCAD file, and a folder that is a link to elsewhere."""
     bad = ("/etc/passwd.FCStd", "//host/x.FCStd", "C:/x.FCStd", "NUL.FCStd", "../.bashrc", "parts/run.py")

@@ -95,7 +95,7 @@ def _same_content(
     repacked = Path(sent.file_name).suffix.lower() in REPACKED
     if revision.file_size is not None and revision.file_size != sent.size and not repacked:
         return False
-    with tempfile.TemporaryDirectory(prefix="silo-") as folder:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True, prefix="silo-") as folder:
         try:
             stored = client.download_file(
                 part_number, Path(folder) / "file", revision.revision_number, cancelled=cancelled

@@ -82,7 +82,7 @@ def _two_folders(args: argparse.Namespace) -> Iterator[tuple[Path, Path, bool]]:
 
     top, below = top_of(args.folders[0] if args.folders else ".")
     chosen = parse_range(top, args.git)
-    with tempfile.TemporaryDirectory(prefix="silo-bom-diff-") as scratch:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True, prefix="silo-bom-diff-") as scratch:
         old, new = Path(scratch, "old"), Path(scratch, "new")
         for revision, target in ((chosen.old, old), (chosen.new, new)):
             if revision is not None:

@@ -7,7 +7,7 @@ import argparse
 import hashlib
 import json
 import os
-import platform
+import socket
 import sys
 import time
 from collections.abc import Iterable, Iterator, Mapping
@@ -133,7 +133,7 @@ def only_job(folder: str) -> Iterator[None]:
     with held:
         held.truncate(0)
         since = time.strftime("%Y-%m-%d %H:%M:%S")
-        held.write(f"process {os.getpid()} on {platform.node()} since {since}\n".encode())
+        held.write(f"process {os.getpid()} on {socket.gethostname()} since {since}\n".encode())
         held.flush()
         yield
 

@@ -65,7 +65,9 @@ def run(args: argparse.Namespace) -> int:
     if not (EXAMPLE / TOP).is_file():
         raise InputError(f"the example {EXAMPLE / TOP} is not there; install silo-mod again")
     with ExitStack() as stack:
-        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="silo-demo-")))
+        folder = Path(
+            stack.enter_context(tempfile.TemporaryDirectory(ignore_cleanup_errors=True, prefix="silo-demo-"))
+        )
         stack.enter_context(_private_data(folder / "data"))
         demo = stack.enter_context(_demo(folder, args.port))
         demo.play()

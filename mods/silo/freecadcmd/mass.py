@@ -35,7 +35,7 @@ def read_in_freecad(
     # FreeCAD is started in a folder of its own.
     top = str(Path(path).absolute())
     freecadcmd = find_freecadcmd(command)
-    with tempfile.TemporaryDirectory(prefix="silo-mass-") as folder:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True, prefix="silo-mass-") as folder:
         result = Path(folder) / "result.npz"
         content = {**options.content_options(), "root": None}
         job = {"top": top, "result": str(result), "options": content}

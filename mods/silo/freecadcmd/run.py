@@ -169,7 +169,9 @@ class FreeCADRun:
         shared = exchange_folder(self.freecadcmd)
         if shared is not None:
             os.makedirs(shared, exist_ok=True)
-        self._folder = tempfile.TemporaryDirectory(prefix="silo-freecad-", dir=shared)
+        self._folder = tempfile.TemporaryDirectory(
+            ignore_cleanup_errors=True, prefix="silo-freecad-", dir=shared
+        )
 
     @property
     def _results(self) -> Path:

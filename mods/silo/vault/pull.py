@@ -295,7 +295,7 @@ def fetched(
     Raises NotFoundError where the item has no such file.
     """
     item = client.get_item(part_number)
-    with tempfile.TemporaryDirectory(prefix="silo-pull-") as scratch:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True, prefix="silo-pull-") as scratch:
         yield _Fetch(client, Path(scratch), revision is not None, cancelled, progress).tree(item, revision)
 
 

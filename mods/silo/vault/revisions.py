@@ -73,7 +73,11 @@ class RevisionBoms:
     _stack: ExitStack = field(default_factory=ExitStack)
 
     def __enter__(self) -> RevisionBoms:
-        self._folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix="silo-revisions-")))
+        self._folder = Path(
+            self._stack.enter_context(
+                tempfile.TemporaryDirectory(ignore_cleanup_errors=True, prefix="silo-revisions-")
+            )
+        )
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -141,7 +141,9 @@ def restore(
     report("the backup is whole")
     try:
         settings.storage.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix="restore-", dir=settings.storage) as folder:
+        with tempfile.TemporaryDirectory(
+            ignore_cleanup_errors=True, prefix="restore-", dir=settings.storage
+        ) as folder:
             copy = Path(folder) / "silo.db"
             shutil.copyfile(source / "silo.db", copy)
             with _open(Settings(database_url=f"sqlite:///{copy}")) as old, _open(settings) as db:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""FreeCAD's own BOM beside ours, on the control cases and the example: measured, and told as a table."""
+"""FreeCAD's own BOM beside ours, on the control cases and the example: measured, and shown as a table."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def table(measured: Mapping[str, Answers]) -> str:
         for version in versions:
             rows = measured[version][name]
             cells.append(in_words(rows) if same(rows, right) else f"✗ {in_words(rows)}")
-        cells.append(in_words(right) + (f"; told: {told}" if told else ""))
+        cells.append(in_words(right) + (f"; reported: {told}" if told else ""))
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines)
 

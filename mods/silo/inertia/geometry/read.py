@@ -50,7 +50,7 @@ def read(path: str | Path, *, options: ReadOptions | None = None) -> Assembly:
         if known is not None:
             return known
         begin = time.time_ns()
-        with tempfile.TemporaryDirectory(prefix="silo-geometry-") as folder:
+        with tempfile.TemporaryDirectory(ignore_cleanup_errors=True, prefix="silo-geometry-") as folder:
             result = Path(folder) / "result.npz"
             isolate.run(path, options, result)
             assembly, extra = store.load(result)

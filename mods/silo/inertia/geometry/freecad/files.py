@@ -35,7 +35,10 @@ def read_freecad(path: Path, options: ReadOptions, report: Report, helpers: Help
     helpers = helpers or Helpers()
     entries = Entries()
     try:
-        with Library(options.root) as library, tempfile.TemporaryDirectory(prefix="silo-freecad-") as folder:
+        with (
+            Library(options.root) as library,
+            tempfile.TemporaryDirectory(ignore_cleanup_errors=True, prefix="silo-freecad-") as folder,
+        ):
             document = library.open(path)
             base = os.path.dirname(document.FileName).replace("\\", "/")
             walk = Walk(StoredFacts(entries), base)

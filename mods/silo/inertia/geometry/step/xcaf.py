@@ -90,7 +90,7 @@ def load(
     text
         what :func:`prepare` found, where somebody asked it already.
     """
-    with tempfile.TemporaryDirectory(prefix="silo-step-") as folder:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True, prefix="silo-step-") as folder:
         text = text or prepare(path, Path(folder), max_instances)
         document, reader = _transferred(text.source, path)
     return _Walk(path, prefix, document, reader, text.products).run()
