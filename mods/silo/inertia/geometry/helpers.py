@@ -86,9 +86,7 @@ class Helpers:
     def folder(self) -> Path:
         """A folder for what goes to and fro; taken away at the end."""
         if self._folder is None:
-            self._folder = tempfile.TemporaryDirectory(
-                ignore_cleanup_errors=True, prefix="silo-helpers-", ignore_cleanup_errors=True
-            )
+            self._folder = tempfile.TemporaryDirectory(prefix="silo-helpers-", ignore_cleanup_errors=True)
         return Path(self._folder.name)
 
     def start(self) -> bool:
