@@ -195,6 +195,8 @@ def test_beside_the_real_silos_workbench(version: str, place: str, tmp_path: Pat
     assert said["theirs"] == ["their Silo_BOM", "their Silo_Settings", "their Silo_Commit"]
     assert said["ours"] == [
         "Commit to Silo",
+        "Open from Silo…",
+        "History…",
         "Compare BOM with Silo…",
         "Register Parts…",
         "Mass of the Assembly…",

@@ -27,8 +27,9 @@ def story() -> None:
     doc = assembly("Top", ("P", part("Plate"), 0)).Document
     App.setActiveDocument(doc.Name)
     # FreeCAD looks now and then at what a command can do.
-    wait(actions[1].isEnabled)
-    actions[1].trigger()
+    compare = next(action for action in actions if "Compare BOM" in action.text().replace("&", ""))
+    wait(compare.isEnabled)
+    compare.trigger()
     tell(works=bool(wait(lambda: addon().previews._open)))
     Gui.activateWorkbench("SiloWorkbench")
     tell(theirs=[action.text().replace("&", "") for action in menu("Their Silo")])

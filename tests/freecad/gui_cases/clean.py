@@ -210,6 +210,18 @@ def help_page(one: Any) -> None:
     wait(lambda: shown("SiloHelp")).close()
 
 
+def history(one: Any) -> None:
+    Gui.runCommand("Silo_History")
+    window = one._window
+    wait(lambda: window.revisions.topLevelItemCount())
+    window.reject()
+
+
+def open_item(one: Any) -> None:
+    Gui.runCommand("Silo_Open")
+    one._window.reject()
+
+
 RUNS: dict[str, Callable[[Any], None]] = {
     "Origin_Commit": commit,
     "Silo_BOM": preview,
@@ -218,6 +230,8 @@ RUNS: dict[str, Callable[[Any], None]] = {
     "Silo_Activity": activity,
     "Silo_Settings": settings,
     "Silo_Help": help_page,
+    "Silo_History": history,
+    "Silo_Open": open_item,
 }
 
 run(story)

@@ -70,9 +70,8 @@ def unnamed(one: Any) -> None:
     """A document that has no file: FreeCAD asks for a name; cancelled, nothing happens."""
     doc = App.newDocument("Nameless")
     from silo.workbench.commit.plan import plan, refusal
-    from silo.workbench.freecad.live_desk import LiveDocuments
 
-    tell(unnamed=refusal(plan(doc, LiveDocuments())))
+    tell(unnamed=refusal(plan(doc, one.desk.documents)))
     close_all()
 
 
