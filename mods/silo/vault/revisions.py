@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
-from silo.api.arrived import checksum_of
+from silo.api.arrived import Downloads, checksum_of
 from silo.api.revisions import Standing, has_file
 from silo.api.transport import Cancel
 from silo.api.wire import Revision
@@ -29,21 +29,12 @@ from silo.fcstd import Library
 from silo.fcstd.library import Contents
 
 
-class RevisionsApi(Protocol):
+class RevisionsApi(Downloads, Protocol):
     """What is needed of a Silo; :class:`silo.api.client.SiloClient` has it."""
 
     def revisions(
         self, part_number: str, /, *, newest: int | None = None, after: int = 0
     ) -> list[Revision]: ...
-
-    def download_file(
-        self,
-        part_number: str,
-        path: Path | str,
-        revision: int | None = None,
-        *,
-        cancelled: Cancel | None = None,
-    ) -> str: ...
 
 
 def top_of(extraction: Extraction) -> Assembly:

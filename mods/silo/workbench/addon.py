@@ -242,7 +242,7 @@ class AddOn:
         return host.active_document() is not None
 
     def shown_everywhere(self) -> bool:
-        """True where Commit belongs into every workbench's File menu."""
+        """True where Commit belongs in every workbench's File menu."""
         return self.preferences.flag("ShowEverywhere")
 
     def preference_page(self) -> type:

@@ -59,7 +59,7 @@ class State(StrEnum):
 
 @dataclass(frozen=True)
 class Row:
-    """A document of the plan. ``document`` is alive and belongs into the GUI thread.
+    """A document of the plan. ``document`` is alive and belongs in the GUI thread.
 
     replaced
         somebody else has written the file since the document was opened: saving it would undo that.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """What a colleague did to a file since it was opened here: the look at Silo, and its words. No widgets.
 
-The look belongs into a worker; what it finds are values.
+The look belongs in a worker; what it finds are values.
 """
 
 from __future__ import annotations

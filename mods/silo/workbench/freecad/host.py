@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """FreeCAD, seen through plain functions: the only file that imports ``FreeCAD`` and ``FreeCADGui``.
 
-Everything here belongs into FreeCAD's main thread, except the console functions. Behaviour that differs
+Everything here belongs in FreeCAD's main thread, except the console functions. Behaviour that differs
 between FreeCAD 0.20, 1.0 and 1.1 was measured and is handled here, so that nobody else needs to know it.
 Imported at FreeCAD's start: what only some functions need, they import themselves.
 """

@@ -93,7 +93,7 @@ class InstallWindow(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         layout.addLayout(buttons)
 
     def begin(self) -> None:
-        """Install, in a thread; the window goes on living, and may be closed."""
+        """Install, in a thread; the window stays usable, and may be closed."""
         self.button.setEnabled(False)
         self.bar.show()
         self.text.setText(translate("Silo", "Installing. This takes a minute or two…"))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """The BOM preview as rows: the assembly against the server, level by level (the rows of ``silo-mod diff``).
 
-Pure, but for :func:`ask`, which reads from the server and belongs into the worker.
+Pure, but for :func:`ask`, which reads from the server and belongs in the worker.
 """
 
 from __future__ import annotations
