@@ -4,7 +4,7 @@
 The model knows per field what a person typed and saw. The law: a value on the server is replaced only by a
 sync (quantities of CAD's lines), by the person who typed another one over the value that stood on the form,
 by a choice between mine and theirs, or by an undo of the change that brought it. Nothing typed is lost: a
-form that is refused comes back with every text in it.
+form that is refused comes back with every text that the person changed, and for the rest with the line as it is.
 """
 
 from __future__ import annotations
@@ -18,19 +18,21 @@ from random import Random
 from urllib.parse import urlencode
 
 import pytest
-from server_testing import Answer, Api, Databases
+from server_testing import Answer, Api, Databases, bom
 from web_visitor import FORM, HTML, Visitor, enter
 
 from silo_server.run import running_server
 
 FIELDS = ("quantity", "unit", "notes", "find_number")
+GROUPS = (("quantity", "unit"), ("notes",), ("find_number",))
+UNUSABLE = ["many", "1,000"]
 TEXTS = {
-    "quantity": ["1", "2", "3", "5", "8"],
+    "quantity": ["1", "2", "3", "5", "8", *UNUSABLE],
     "unit": ["", "m", "kg"],
     "notes": ["", "glue", "two\nlines", "<b>\u202e"],
     "find_number": ["", "10", "20"],
 }
-STEPS = 60
+STEPS = 90
 
 
 class FormReader(HTMLParser):
@@ -105,12 +107,17 @@ class Editor:
         self.picked = picks
         return self.visitor.api.call("POST", path, body=urlencode(sent).encode(), headers=headers)
 
-    def refused(self, answer: Answer) -> None:
-        """Every text that was typed stands in the form that came back."""
-        typed = {name: self.open[name] for name in FIELDS}
+    def refused(self, answer: Answer, now: dict[str, str]) -> None:
+        """The form that came back has every text that was typed, and else the line as it is ``now``.
+
+        An old text of a field that nobody typed into would revert a colleague's with the next save.
+        """
+        wanted = dict(now)
+        for group in GROUPS:
+            if any(self.open[name] != self.open[f"was_{name}"] for name in group):
+                wanted |= {name: self.open[name] for name in group}
         self._take(answer)
-        if self.open:
-            assert {name: self.open[name] for name in FIELDS} == typed
+        assert {name: self.open[name] for name in FIELDS} == wanted
 
     def _take(self, answer: Answer) -> None:
         reader = form_of(answer)
@@ -139,6 +146,30 @@ def api(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Api]:
 def test_nothing_is_lost_or_reverted_without_a_choice(api: Api, seed: int) -> None:
     """Random interleavings of two forms, syncs and undos on two lines."""
     play(api, Random(seed), STEPS)
+
+
+@pytest.mark.parametrize("typed", ["many", "1,000", "8"])
+def test_a_form_that_was_refused_reverts_nobody(api: Api, typed: str) -> None:
+    """A colleague's note, while a quantity is refused, asked about, or clashes, survives the next save."""
+    parent, child = api.items(2)
+    api.merge(parent, {child: 2})
+    api.call("POST", "/api/users", {"username": "ann", "role": "editor"})
+    ann = Editor("ann", enter(api, "ann"), parent)
+    line_id = str(api.lines(parent)[child]["id"])
+    ann.begin(line_id)
+    api.good("PUT", bom(parent, child), {"notes": "mine to keep", **({"quantity": 6} if typed == "8" else {})})
+    ann.open |= {"quantity": typed, "why": "for this form alone"}
+    answer = ann.send(Random(0))
+    assert answer.status == (412 if typed == "8" else 400)
+    # The reason belongs to this form, not to the one for a new line.
+    assert answer.body.count(b"for this form alone") == 1
+    ann.refused(answer, shown(api.lines(parent)[child]))
+    ann.open["quantity"] = "9"
+    ann.radios = set()
+    ann.open |= {"pick_quantity": "mine"} if typed == "8" else {}
+    assert ann.send(Random(0)).status == 303
+    line = api.lines(parent)[child]
+    assert (line["quantity"], line["notes"]) == (9, "mine to keep")
 
 
 def play(api: Api, random: Random, steps: int) -> None:
@@ -192,12 +223,12 @@ def save(api: Api, editor: Editor, parent: str, before: dict[str, dict[str, obje
         return False
     now, became = shown(before[editor.line_id]), shown(after[editor.line_id])
     wanted = dict(form)
-    for group in (("quantity", "unit"), ("notes",), ("find_number",)):
+    for group in GROUPS:
         if editor.picked.get(f"pick_{group[0]}") == "theirs":
             wanted |= {name: form[f"was_{name}"] for name in group}
     clash = False
     expected = dict(now)
-    for group in (("quantity", "unit"), ("notes",), ("find_number",)):
+    for group in GROUPS:
         mine = [name for name in group if wanted[name] != form[f"was_{name}"]]
         theirs = [name for name in group if now[name] != form[f"was_{name}"]]
         if mine and theirs and any(wanted[name] != now[name] for name in group):
@@ -207,8 +238,14 @@ def save(api: Api, editor: Editor, parent: str, before: dict[str, dict[str, obje
     if clash:
         assert answer.status == 412, (form, now, answer.status)
         assert became == now
-        editor.refused(answer)
+        editor.refused(answer, now)
         assert editor.radios
+        return False
+    if expected["quantity"] in UNUSABLE:
+        assert answer.status == 400
+        assert became == now
+        editor.refused(answer, now)
+        assert not editor.radios
         return False
     assert answer.status == 303, re.findall(r'role="alert".*', answer.body.decode())
     assert became == expected, (form, now)

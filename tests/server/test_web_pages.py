@@ -231,6 +231,17 @@ def test_a_form_that_makes_no_sense(
     assert api.lines(parent) == before
 
 
+def test_a_choice_about_a_field_that_there_is_not(visitors: dict[str, Visitor], api: Api) -> None:
+    """A form that was tampered with gets an answer, not a fault."""
+    parent, child = api.items(2)
+    api.merge(parent, {child: 1})
+    line = api.lines(parent)[child]["id"]
+    fields = {"asked": "null quantity", "quantity": "2", "was_quantity": "1"}
+    answer = visitors[EDITOR].post(f"/items/{parent}/bom/lines/{line}", **fields)
+    assert answer.status == 400
+    assert "Choose yours or theirs" in answer.body.decode()
+
+
 def test_a_long_bom_has_pages(visitors: dict[str, Visitor], api: Api) -> None:
     """A thousand lines at once; the view survives in every link, and a line of another page can be edited."""
     parent, *children = (api.item(f"LONG-{n:04}") for n in range(1004))

@@ -76,7 +76,7 @@ def read(form: FormData) -> LineForm:
         typed,
         {name: _text(form, f"was_{name}") for name in FIELDS if f"was_{name}" in form},
         {name: _text(form, f"pick_{name}") for name in FIELDS if f"pick_{name}" in form},
-        _text(form, "asked").split(),
+        [name for name in _text(form, "asked").split() if name in FIELDS],
         text(form, "why"),
         int(at) if at.isascii() and at.isdigit() and len(at) < 16 else 0,
     )
@@ -92,6 +92,23 @@ def edit_of(sent: LineForm, now: LineState) -> Edit:
             for other in group_of(name):
                 typed[other] = sent.seen.get(other, typed.get(other, ""))
     return compared(shown(now), sent.seen, typed, together=TOGETHER, same=_same)
+
+
+def still_typed(
+    typed: Mapping[str, str], seen: Mapping[str, str], now: Mapping[str, str]
+) -> dict[str, str]:
+    """What a form that was refused shows: what the person changed, and for the rest the line as it is now.
+
+    The form is compared with ``now`` when it comes back, so an old text of a field that the person left alone
+    would revert what others wrote there.
+    """
+    mine = {
+        name
+        for name, text in typed.items()
+        if name not in seen or not _same(name, text, seen[name])
+        for name in group_of(name)
+    }
+    return {**now, **{name: text for name, text in typed.items() if name in mine or name not in now}}
 
 
 def unmade(sent: LineForm) -> list[str]:

@@ -45,8 +45,8 @@ class Asked:
     """What the page is asked to show besides the BOM: a problem, and the form that is being filled in.
 
     edit
-        the line whose form is open; ``typed`` and ``why`` are what stands in it, ``clashes`` the fields that
-        somebody else changed as well.
+        the line whose form is open; ``typed`` and ``why`` are what stands in it, ``seen`` what it showed before,
+        ``clashes`` the fields that somebody else changed as well.
     view
         the query of the page that the person came from, without ``edit``.
     chosen, reasons
@@ -61,6 +61,7 @@ class Asked:
     edit: str = ""
     view: str = ""
     typed: Mapping[str, str] = field(default_factory=dict)
+    seen: Mapping[str, str] = field(default_factory=dict)
     why: str = ""
     clashes: Sequence[str] = ()
     chosen: Collection[str] = ()
@@ -169,7 +170,7 @@ def change_line(
 ) -> Response:
     """Change what the person changed in the form of a line; what two people changed is asked about."""
     sent = line_form.read(form)
-    asked = Asked(edit=line_id, typed=sent.typed, why=sent.why)
+    asked = Asked(edit=line_id, typed=sent.typed, seen=sent.seen, why=sent.why)
 
     def work(tx: Tx) -> tuple[str, int]:
         parent = get_item(tx, part_number, lock=True)
@@ -200,7 +201,7 @@ def remove_line(
 ) -> Response:
     """Take a line out of the BOM, if it is as the person saw it."""
     sent = line_form.read(form)
-    asked = Asked(edit=line_id, typed=sent.typed, why=sent.why)
+    asked = Asked(edit=line_id, typed=sent.typed, seen=sent.seen, why=sent.why)
 
     def work(tx: Tx) -> tuple[str, int]:
         parent = get_item(tx, part_number, lock=True)
@@ -299,6 +300,7 @@ def _show(
     problem = asked.problem
     if asked.edit and editing is None and not problem:
         problem = "The line that you wanted to edit is not in this BOM any more."
+    now = line_form.shown(editing.state) if editing else {}
     table, table_at = table_of(lines, bom_path(item.part_number), asked.view)
     return page(
         request,
@@ -314,7 +316,8 @@ def _show(
         shows=SHOWS,
         editing=editing,
         editing_apart=editing is not None and editing.id not in {line.id for line in table.rows},
-        now=line_form.shown(editing.state) if editing else {},
+        now=now,
+        kept=line_form.still_typed(asked.typed, asked.seen, now),
         mark=mark_of(editing.state) if editing else "",
         marks=service.marks_of([*found.unreferenced, *(c.line for c in found.conflicts)], conflicts),
         asked=replace(asked, problem=problem),
