@@ -4,7 +4,8 @@
 The model knows per field what a person typed and saw. The law: a value on the server is replaced only by a
 sync (quantities of CAD's lines), by the person who typed another one over the value that stood on the form,
 by a choice between mine and theirs, or by an undo of the change that brought it. Nothing typed is lost: a
-form that is refused comes back with every text that the person changed, and for the rest with the line as it is.
+form that is refused comes back with every text that the person changed, and for the rest with the line as it
+is.
 """
 
 from __future__ import annotations
@@ -157,7 +158,9 @@ def test_a_form_that_was_refused_reverts_nobody(api: Api, typed: str) -> None:
     ann = Editor("ann", enter(api, "ann"), parent)
     line_id = str(api.lines(parent)[child]["id"])
     ann.begin(line_id)
-    api.good("PUT", bom(parent, child), {"notes": "mine to keep", **({"quantity": 6} if typed == "8" else {})})
+    api.good(
+        "PUT", bom(parent, child), {"notes": "mine to keep", **({"quantity": 6} if typed == "8" else {})}
+    )
     ann.open |= {"quantity": typed, "why": "for this form alone"}
     answer = ann.send(Random(0))
     assert answer.status == (412 if typed == "8" else 400)

@@ -94,9 +94,7 @@ def edit_of(sent: LineForm, now: LineState) -> Edit:
     return compared(shown(now), sent.seen, typed, together=TOGETHER, same=_same)
 
 
-def still_typed(
-    typed: Mapping[str, str], seen: Mapping[str, str], now: Mapping[str, str]
-) -> dict[str, str]:
+def still_typed(typed: Mapping[str, str], seen: Mapping[str, str], now: Mapping[str, str]) -> dict[str, str]:
     """What a form that was refused shows: what the person changed, and for the rest the line as it is now.
 
     The form is compared with ``now`` when it comes back, so an old text of a field that the person left alone

@@ -45,8 +45,8 @@ class Asked:
     """What the page is asked to show besides the BOM: a problem, and the form that is being filled in.
 
     edit
-        the line whose form is open; ``typed`` and ``why`` are what stands in it, ``seen`` what it showed before,
-        ``clashes`` the fields that somebody else changed as well.
+        the line whose form is open; ``typed`` and ``why`` are what stands in it, ``seen`` what it showed
+        before, ``clashes`` the fields that somebody else changed as well.
     view
         the query of the page that the person came from, without ``edit``.
     chosen, reasons
