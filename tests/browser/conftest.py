@@ -16,11 +16,14 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
 from server_testing import Api
+from settled import come_late
 
 from silo_server.run import RunningServer, running_server
 
 TOKEN = "silo_" + "browser0" * 5
 SECONDS = 20
+# Style sheets, scripts and pictures come so many seconds late: a hunt for tests that depend on time.
+LATE = float(os.environ.get("SILO_LATE_ASSETS", "0"))
 
 Visit = Callable[..., Page]
 
@@ -82,16 +85,20 @@ def visit(chromium: Browser, server: RunningServer, api: Api) -> Iterator[Visit]
         context = chromium.new_context(base_url=server.base_url, **options)
         context.set_default_timeout(SECONDS * 1000)
         contexts.append(context)
+        if LATE:
+            come_late(context, LATE)
         page = context.new_page()
         page.on("pageerror", lambda error: faults.append(str(error)))
         page.on("console", lambda message: _refused(message.text, faults))
         if role is not None:
             page.goto(login_path(api, role))
             page.get_by_role("button", name="Log in").click()
+            page.locator(".who").wait_for()
         return page
 
     yield open_page
     for context in contexts:
+        context.unroute_all(behavior="ignoreErrors")
         context.close()
     assert not faults
 

@@ -17,6 +17,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page
 from server_testing import Api, bom
+from settled import come_late, measured
 
 Visit = Callable[..., Page]
 
@@ -24,6 +25,7 @@ AXE = "axe-core@4.10.3"
 RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
 RUN = "tags => axe.run(document, { runOnly: tags })"
 OVERFLOW = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
+HEADER = "getComputedStyle(document.querySelector('.top')).display"
 WIDTHS = (1440, 390, 320)
 PAGES = (
     "/login",
@@ -156,7 +158,7 @@ def in_each_width(page: Page, axe: str, what: str) -> list[str]:
     for width in WIDTHS:
         page.set_viewport_size({"width": width, "height": 844})
         findings += [f"{what} at {width}: {finding}" for finding in violations(page, axe)]
-        if page.evaluate(OVERFLOW) > 0:
+        if measured(page, OVERFLOW) > 0:
             findings.append(f"{what} at {width}: it is wider than the window")
     page.set_viewport_size({"width": WIDTHS[0], "height": 844})
     return findings
@@ -164,9 +166,9 @@ def in_each_width(page: Page, axe: str, what: str) -> list[str]:
 
 def violations(page: Page, axe: str) -> list[str]:
     """What axe finds on the page as it is shown now: rule, weight, and where."""
-    if page.evaluate("typeof axe") == "undefined":
-        page.evaluate(axe)
-    found: dict[str, Any] = page.evaluate(RUN, RULES)
+    if measured(page, "typeof axe") == "undefined":
+        measured(page, axe)
+    found: dict[str, Any] = measured(page, RUN, RULES)
     return [
         f"{violation['id']} ({violation['impact']}): {node['target'][0]} {node['failureSummary']}"
         for violation in found["violations"]
@@ -222,3 +224,13 @@ def test_pages_of_an_edit_have_no_finding(
     page.goto(f"/items/{parent}/history")
     look("history")
     assert findings == []
+
+
+def test_a_page_is_measured_with_its_style_sheet(visit: Visit) -> None:
+    """Text comes before the style sheet; what tests measure waits for both."""
+    page = visit("viewer")
+    plain = measured(page, HEADER)
+    come_late(page.context, 1)
+    page.get_by_role("link", name="Activity").click()
+    page.get_by_role("heading", name="Activity").wait_for()
+    assert measured(page, HEADER) == plain

@@ -9,6 +9,7 @@ from pathlib import Path
 from openpyxl import load_workbook
 from playwright.sync_api import Page, expect
 from server_testing import Api, bom, merge_body
+from settled import measured
 
 Visit = Callable[..., Page]
 
@@ -56,8 +57,8 @@ def test_paper_has_all_of_it_and_nothing_else(api: Api, visit: Visit) -> None:
     expect(page.locator(".banner.warn")).to_contain_text("Incomplete: 1 missing")
     expect(page.locator("tbody th")).to_have_text([sub, part])
     style = "e => [getComputedStyle(e).color, getComputedStyle(document.body).backgroundColor]"
-    assert page.locator("h1").evaluate(style) == ["rgb(0, 0, 0)", "rgb(255, 255, 255)"]
-    assert page.locator("thead").evaluate("e => getComputedStyle(e).display") == "table-header-group"
+    assert measured(page.locator("h1"), style) == ["rgb(0, 0, 0)", "rgb(255, 255, 255)"]
+    assert measured(page.locator("thead"), "e => getComputedStyle(e).display") == "table-header-group"
     # The item's own page prints as well.
     page.goto(f"/items/{top}")
     for gone in (".top", "#view", ".twist"):

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, Page, expect
+from settled import box_of, picture_of
 
 pytest.importorskip("OCP.BRep")
 
@@ -59,7 +60,7 @@ def _opened(chromium: Browser, report: Path) -> Iterator[Callable[..., Page]]:
 
 
 def seen(page: Page) -> bytes:
-    return page.locator("#view canvas").screenshot()
+    return picture_of(page.locator("#view canvas"))
 
 
 def test_the_view_turns_and_hides_links(opened: Callable[..., Page]) -> None:
@@ -67,7 +68,7 @@ def test_the_view_turns_and_hides_links(opened: Callable[..., Page]) -> None:
     page: Any = opened()
     page.wait_for_selector("body[data-ready='35']")
     first = seen(page)
-    box = page.locator("#view canvas").bounding_box()
+    box = box_of(page.locator("#view canvas"))
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] * 0.8
     page.mouse.click(x, y)
     expect(page.locator("#picked")).to_contain_text("base_link: ")

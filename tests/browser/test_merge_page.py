@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import pytest
 from playwright.sync_api import Page, Route, expect
 from server_testing import Api, bom, wait_until
+from settled import measured
 
 from silo_server.run import RunningServer
 
@@ -65,7 +66,7 @@ def test_some_are_chosen_and_removed(case: Case, api: Api, visit: Visit) -> None
     page.goto(case.path)
     for child in case.gone[:2]:
         page.get_by_label(f"Choose {child}").check()
-    assert page.get_by_label("Choose all 3").evaluate("box => box.indeterminate")
+    assert measured(page.get_by_label("Choose all 3"), "box => box.indeterminate")
     page.get_by_role("button", name="Remove chosen").click()
     expect(page.locator(".notice")).to_contain_text("2 lines removed")
     assert set(api.quantities(case.parent)) == {case.used, case.gone[2]}
@@ -272,12 +273,13 @@ def test_a_viewer_sees_and_changes_nothing(case: Case, visit: Visit) -> None:
 
 def _pumped(page: Page, value: bool) -> bool:
     # Playwright's own events are only handled while one of its calls runs.
-    page.evaluate("1")
+    measured(page, "1")
     return value
 
 
 def _set_hidden(page: Page, hidden: bool) -> None:
-    page.evaluate(
+    measured(
+        page,
         """hidden => {
             Object.defineProperty(document, "hidden", { configurable: true, get: () => hidden });
             document.dispatchEvent(new Event("visibilitychange"));

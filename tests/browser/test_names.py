@@ -8,6 +8,7 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import Page, expect
 from server_testing import Api, bom, form_body
+from settled import measured
 
 Visit = Callable[..., Page]
 
@@ -86,9 +87,9 @@ def test_no_name_breaks_a_page_or_turns_its_words(
     findings: list[str] = []
     for path in PAGES:
         page.goto(path.format(**names))
-        if (wider := page.evaluate(WIDER)) > 0:
+        if (wider := measured(page, WIDER)) > 0:
             findings.append(f"{path}: {wider} px too wide")
-        findings += [f"{path}: {found}" for found in page.evaluate(LOOSE)]
+        findings += [f"{path}: {found}" for found in measured(page, LOOSE)]
     assert not findings, "\n".join(findings)
 
 
@@ -100,16 +101,16 @@ def test_a_notice_and_a_problem_do_not_turn(api: Api, visit: Visit, names: dict[
     page.get_by_label("Part number").fill("\u202eMARK" + "W" * 50)
     page.get_by_role("button", name="Add line").click()
     expect(page.get_by_role("alert")).to_contain_text("does not exist")
-    assert page.evaluate(LOOSE) == []
-    assert page.evaluate(WIDER) <= 0
+    assert measured(page, LOOSE) == []
+    assert measured(page, WIDER) <= 0
     page.goto(f"/items/{names['top']}/import")
     text = f"Part number,Quantity\n{names['part']},9\nMARK\u202e,1\n".encode()
     file = {"name": f"{TURNED}{LONG}.csv", "mimeType": "text/csv", "buffer": text}
     page.get_by_label("CSV file").set_input_files([file])  # type: ignore[list-item]
     page.get_by_role("button", name="Check the file").click()
     page.locator("#checked").wait_for()
-    assert page.evaluate(LOOSE) == []
-    assert page.evaluate(WIDER) <= 0
+    assert measured(page, LOOSE) == []
+    assert measured(page, WIDER) <= 0
 
 
 def test_a_line_s_source_is_no_type(api: Api, visit: Visit, names: dict[str, str]) -> None:

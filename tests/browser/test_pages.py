@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Locator, Page, Route, expect
 from server_testing import Api, bom, form_body
+from settled import measured
 
 Visit = Callable[..., Page]
 
@@ -26,13 +27,13 @@ def test_search_as_you_type(api: Api, visit: Visit) -> None:
     screw, nut = api.item("SRCH-1", name="Hex screw"), api.item("SRCH-2", name="Hex nut")
     page = visit("viewer")
     page.goto("/items")
-    page.evaluate("window.still = true")
+    measured(page, "window.still = true")
     page.get_by_label("Search").press_sequentially("hex screw")
     expect(page.get_by_role("rowheader", name=screw)).to_be_visible()
     expect(page.get_by_role("rowheader", name=nut)).to_have_count(0)
     expect(page.locator("#found")).to_have_text("1 item for “hex screw”")
     page.wait_for_url("**/items?q=hex+screw")
-    assert page.evaluate("window.still")
+    assert measured(page, "window.still")
     page.get_by_label("Search").fill("nothing like this")
     expect(page.locator("#shown")).to_contain_text("Nothing fits")
 
@@ -106,7 +107,7 @@ def test_the_tree_opens_and_closes(machine: dict[str, str], visit: Visit) -> Non
     """Several levels, each can be closed, all at once too, also from the keyboard; the address keeps up."""
     page = visit("viewer")
     page.goto(f"/items/{machine['machine']}")
-    page.evaluate("window.still = true")
+    measured(page, "window.still = true")
     screw = page.locator(".tree").get_by_role("link", name=machine["screw"])
     expect(screw).to_be_visible()
     page.get_by_label("Levels").get_by_role("link", name="1").click()
@@ -118,7 +119,7 @@ def test_the_tree_opens_and_closes(machine: dict[str, str], visit: Visit) -> Non
     expect(screw).to_be_visible()
     expect(twist).to_be_focused()
     expect(twist).to_have_attribute("aria-expanded", "true")
-    assert page.evaluate("window.still")
+    assert measured(page, "window.still")
     page.reload()
     expect(screw).to_be_visible()
     page.go_back()

@@ -9,6 +9,7 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import Locator, Page, expect
 from server_testing import Api
+from settled import measured
 
 Visit = Callable[..., Page]
 
@@ -177,4 +178,4 @@ def test_the_keyboard_is_enough(visit: Visit) -> None:
     page.keyboard.press("Enter")
     page.keyboard.press("Tab")
     expect(page.get_by_label("Search")).to_be_focused()
-    assert page.get_by_label("Search").evaluate("e => getComputedStyle(e).outlineStyle") == "solid"
+    assert measured(page.get_by_label("Search"), "e => getComputedStyle(e).outlineStyle") == "solid"
