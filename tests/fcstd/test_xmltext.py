@@ -12,6 +12,7 @@ import pytest
 from fcstd_writer import Doc, Local, Raw, Vector, XLink, container, locals_, part, save_xml
 
 from silo.bom.errors import DocumentError
+from silo.bom.walk.kinds import Kind, Survey, survey_of
 from silo.fcstd import FcstdDocument, FcstdObject, Library, Limits, open_document
 
 
@@ -107,13 +108,37 @@ def windows_lines(xml: str) -> str:
     return xml.replace("\n", "\r\n")
 
 
-@pytest.mark.parametrize(
-    "other",
-    [
-        *(reordered, single_quoted, spaced, commented, referenced, without_layout, expanded, instructed),
-        windows_lines,
-    ],
-)
+def hidden_group(xml: str) -> str:
+    """The name of a property that a search for its letters does not find."""
+    return xml.replace('name="Group"', 'name="Gro&#117;p"')
+
+
+FORMS = [
+    *(reordered, single_quoted, spaced, commented, referenced, without_layout, expanded, instructed),
+    windows_lines,
+]
+
+
+@pytest.mark.parametrize("other", [str, hidden_group, *FORMS])
+def test_a_survey_is_what_every_object_says_of_itself(tmp_path: Path, other: Callable[[str], str]) -> None:
+    """Which objects are of a kind, and which lie in a Group, is found without making them."""
+    doc = sample().add("Part::Box", "Inside").add("PartDesign::Body", "Body", Group=locals_("Inside", "Gone"))
+    doc.add("Future::Links", "Later", LinkedObject=XLink("x.FCStd", "Box"), ElementCount=2)
+    doc.add("Part::FeaturePython", "Copy", Objects=locals_("Box"), Fuse=False, Note="Group")
+    document = open_document(save_xml(tmp_path / "other.FCStd", other(doc.xml()), **doc.entries))
+    quick, plain = document.survey, Survey(document)
+    assert [type(quick), type(plain)] == [type(survey_of(document)), Survey]
+    assert quick.has_python()
+    assert plain.has_python()
+    assert {kind for _, kind in plain.of(set(Kind))} > {Kind.LOCAL, Kind.LINK, Kind.COPY, Kind.CONTAINER}
+    for kinds in [{kind} for kind in Kind] + [set(Kind)]:
+        assert quick.of(kinds) == plain.of(kinds)
+        assert quick.of(kinds, {"Box"}) == plain.of(kinds, {"Box"})
+        assert quick.grouped(kinds) - {"Gone"} == plain.grouped(kinds)
+    assert "Inside" in quick.grouped({Kind.LOCAL})
+
+
+@pytest.mark.parametrize("other", FORMS)
 def test_the_same_text_in_another_form_says_the_same(tmp_path: Path, other: Callable[[str], str]) -> None:
     """How a writer lays out its XML changes nothing."""
     doc = sample()

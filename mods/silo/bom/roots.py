@@ -22,11 +22,13 @@ from silo.bom.walk.kinds import (
     INLINE,
     REPEATERS,
     Kind,
+    Survey,
     flattened,
     is_assembly3,
     is_named_assembly,
     kind_of,
     sources,
+    survey_of,
 )
 from silo.bom.walk.notes import Notes
 from silo.bom.walk.targets import first_of, is_assembly_link
@@ -45,6 +47,9 @@ _BESIDE = COMPONENTS | REPEATERS | {Kind.LINK_GROUP, Kind.STANDARD, Kind.CONTAIN
 Whole = Callable[[Any], Any]
 _CONTAINERS = frozenset({Kind.CONTAINER, Kind.LINK_GROUP, Kind.ASSEMBLY_LINK})
 _FOLDERS = frozenset({Kind.FOLDER})
+# An Assembly3 container with further properties may be taken for an array or a foreign part.
+_RANKED = frozenset({Kind.CONTAINER, Kind.DRAFT_ARRAY, Kind.FOREIGN})
+_LOCAL = frozenset({Kind.LOCAL})
 
 
 class DocumentRoot:
@@ -62,25 +67,17 @@ class DocumentRoot:
         return False
 
 
-_Known = Sequence[tuple[Any, Kind]]
-
-
-def _known(document: Any) -> _Known:
-    """The objects of a document with their kinds."""
-    return [(obj, kind_of(obj)) for obj in getattr(document, "Objects", None) or ()]
-
-
-def _members_of(objects: _Known, kinds: frozenset[Kind]) -> set[str]:
+def _members_of(survey: Survey, kinds: Set[Kind]) -> set[str]:
     """Names of the objects that lie in some container of these kinds, or are copies such a container made.
 
     Also through folders: a part lists what lies in its folders, a link group does not.
     """
+    objects = survey.of(kinds | _FOLDERS)
     held = {
         object_name(obj): [
             object_name(one) for name in ("Group", "ElementList") for one in own(obj, name) or ()
         ]
-        for obj, kind in objects
-        if kind in kinds or kind is Kind.FOLDER
+        for obj, _ in objects
     }
     folders = {object_name(obj) for obj, kind in objects if kind is Kind.FOLDER}
     names: set[str] = set()
@@ -129,13 +126,15 @@ def _is_far(target: Any, container: Any) -> bool:
 
 def find_assemblies(document: Any) -> list[Any]:
     """The top-level containers of a document, the likeliest assembly first (document order within a rank)."""
-    return [obj for _, obj in _candidates(document)]
+    return [obj for _, obj in _candidates(survey_of(document))]
 
 
-def _candidates(document: Any) -> list[tuple[tuple[int, bool], Any]]:
-    objects = _known(document)
-    inner = _members_of(objects, _CONTAINERS)
-    in_folders = _members_of(objects, _FOLDERS)
+def _candidates(survey: Survey) -> list[tuple[tuple[int, bool], Any]]:
+    objects = survey.of(_RANKED)
+    if not objects:
+        return []
+    inner = _members_of(survey, _CONTAINERS)
+    in_folders = _members_of(survey, _FOLDERS)
     reader = silent_reader()
     found = []
     for obj, _ in objects:
@@ -173,15 +172,19 @@ def choose_assembly(document: Any, name: str | None = None) -> Any:
     """
     if name is not None:
         return _named(document, name)
-    likely = _likely(document)
+    survey = survey_of(document)
+    found = _candidates(survey)
+    likely = _likely(found)
     if len(likely) > 1:
         raise InputError(f"{_file(document)} holds {len(likely)} assemblies: {_told(likely)}. {NAME_ONE}")
-    return likely[0] if likely else _root_or_part(document)
+    return likely[0] if likely else _root_or_part(document, survey, found)
 
 
-def _likely(document: Any) -> list[Any]:
+_Candidates = list[tuple[tuple[int, bool], Any]]
+
+
+def _likely(found: _Candidates) -> list[Any]:
     """The containers that may be the assembly: real assemblies, and parts that hold components."""
-    found = _candidates(document)
     if not found or found[0][0][0] > _HOLDS_NOTHING - 2:
         return []
     reader = silent_reader()
@@ -189,18 +192,17 @@ def _likely(document: Any) -> list[Any]:
     return [obj for obj in best if _holds(obj, reader) == 2] or best
 
 
-def _root_or_part(document: Any) -> Any:
+def _root_or_part(document: Any, survey: Survey, found: _Candidates) -> Any:
     """The one part of a file that has nothing else to count, or the document itself."""
-    found = _candidates(document)
     best = [obj for standing, obj in found if standing == found[0][0]]
-    loose = _loose(document, _LOOSE)
+    loose = _loose(survey, _LOOSE)
     holds_hardware = bool(found) and found[0][0][0] < _HOLDS_NOTHING
     if best and not loose and (len(best) == 1 or not holds_hardware):
         return best[0]
     parts = best if holds_hardware else []
     if not loose and not parts:
         # A file with one body is that part; of several, each may be declared.
-        bodies = _loose(document, frozenset({Kind.LOCAL}))
+        bodies = _loose_local(survey)
         loose = bodies if len(bodies) > 1 else []
     return DocumentRoot(document, [*parts, *loose])
 
@@ -214,7 +216,7 @@ def _told(containers: Iterable[Any]) -> str:
 
 
 def _named(document: Any, name: str) -> Any:
-    containers = [obj for obj in getattr(document, "Objects", ()) or () if kind_of(obj) in INLINE]
+    containers = [obj for obj, _ in survey_of(document).of(INLINE)]
     for attribute in ("Name", "Label"):
         matching = [obj for obj in containers if getattr(obj, attribute, None) == name]
         if len(matching) == 1:
@@ -227,15 +229,19 @@ def _named(document: Any, name: str) -> Any:
     raise InputError(f"{_file(document)} has no assembly named {name!r}; it has: {_told(containers)}.")
 
 
-def _loose(document: Any, kinds: frozenset[Kind]) -> list[Any]:
-    """The objects of these kinds that lie in no container, no Body and no feature."""
-    objects = _known(document)
-    inner = _members_of(objects, _CONTAINERS)
-    local = [obj for obj, kind in objects if kind is Kind.LOCAL] if Kind.LOCAL in kinds else []
-    inner.update(object_name(one) for obj in local for one in own(obj, "Group") or ())
-    loose = [obj for obj, kind in objects if kind in kinds and object_name(obj) not in inner]
-    if local and len(loose) > 1:  # to ask every feature costs more than all the rest
-        eaten = consumed(local, object_name)
+def _loose(survey: Survey, kinds: Set[Kind]) -> list[Any]:
+    """The objects of these kinds that lie in no container."""
+    if not survey.of(kinds):
+        return []
+    return [obj for obj, _ in survey.of(kinds, _members_of(survey, _CONTAINERS))]
+
+
+def _loose_local(survey: Survey) -> list[Any]:
+    """The geometry that lies in no container, no Body and no feature."""
+    inner = _members_of(survey, _CONTAINERS) | survey.grouped(_LOCAL)
+    loose = [obj for obj, _ in survey.of(_LOCAL, inner)]
+    if len(loose) > 1:  # to ask every feature costs more than all the rest
+        eaten = consumed([obj for obj, _ in survey.of(_LOCAL)], object_name)
         loose = [obj for obj in loose if object_name(obj) not in eaten]
     return loose
 
@@ -245,16 +251,22 @@ def as_it_is(document: Any) -> Any:
     return document
 
 
-def _sources_of(objects: _Known) -> set[str]:
+def _spares(survey: Survey) -> set[str]:
+    """Names of what lies in Assembly4's folder ``Parts``."""
+    folders = [obj for obj, _ in survey.of(_FOLDERS) if object_name(obj) == "Parts"]
+    return {
+        object_name(one)
+        for obj in folders
+        for name in ("Group", "ElementList")
+        for one in own(obj, name) or ()
+    }
+
+
+def _sources_of(survey: Survey) -> set[str]:
     """Names of the objects that links, arrays and compounds of the document show."""
     names = set()
-    for obj, kind in objects:
-        if kind in COMPONENTS:
-            shown = [first_of(getattr(obj, "LinkedObject", None))]
-        elif kind in (Kind.DRAFT_ARRAY, Kind.COMPOUND):
-            shown = sources(obj)
-        else:
-            continue
+    for obj, kind in survey.of(COMPONENTS | {Kind.DRAFT_ARRAY, Kind.COMPOUND}):
+        shown = [first_of(getattr(obj, "LinkedObject", None))] if kind in COMPONENTS else sources(obj)
         names |= {
             object_name(one) for one in shown if one is not None and same_document(one.Document, obj.Document)
         }
@@ -269,22 +281,18 @@ def loose_hardware(container: Any, reader: Reader, whole: Whole = as_it_is) -> l
     """
     if isinstance(container, DocumentRoot) or getattr(container, "is_document_root", False):
         return []
-    document = whole(container.Document)
-    objects = list(getattr(document, "Objects", ()) or ())
-    if not any(getattr(obj, "TypeId", "").endswith("FeaturePython") for obj in objects):
+    survey = survey_of(whole(container.Document))
+    if not survey.has_python():
         return []
-    known = _known(document)
-    inner = _members_of(known, _CONTAINERS)
-    loose = [obj for obj, kind in known if kind in _HARDWARE and object_name(obj) not in inner]
+    loose = _loose(survey, _HARDWARE)
     if not loose:
         return []
-    spares = [(obj, kind) for obj, kind in known if kind is Kind.FOLDER and object_name(obj) == "Parts"]
-    aside = _members_of(spares, _FOLDERS) | _sources_of(known)
-    aside.update(consumed([obj for obj, kind in known if kind is Kind.LOCAL], object_name))
+    aside = _spares(survey) | _sources_of(survey)
+    aside.update(consumed([obj for obj, _ in survey.of(_LOCAL)], object_name))
     loose = [obj for obj in loose if object_name(obj) not in aside and _is_hardware(obj, reader)]
     if not loose:
         return []
-    likely = _likely(document)
+    likely = _likely(_candidates(survey))
     is_the_one = len(likely) == 1 and object_name(likely[0]) == object_name(container)
     return loose if is_the_one else []
 
@@ -304,18 +312,12 @@ def beside(top: Any, reader: Reader) -> list[Any]:
     """
     if isinstance(top, DocumentRoot) or is_assembly3(top):
         return []
-    objects = _known(getattr(top, "Document", None))
-    inside = _members_of(objects, _CONTAINERS | _FOLDERS)
-    loose = [
-        obj
-        for obj, kind in objects
-        if kind in _BESIDE
-        and object_name(obj) not in inside
-        and not (object_name(obj) == object_name(top) or is_named_assembly(obj))
-    ]
+    survey = survey_of(getattr(top, "Document", None))
+    inside = _members_of(survey, _CONTAINERS | _FOLDERS) | {object_name(top)}
+    loose = [obj for obj, _ in survey.of(_BESIDE, inside) if not is_named_assembly(obj)]
     if not loose:
         return []
-    shown = _sources_of(objects)
+    shown = _sources_of(survey)
     counted = {object_name(obj) for obj in loose_hardware(top, reader)}
     return [
         obj

@@ -6,21 +6,23 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Set
 from functools import cached_property
 from struct import Struct
 from typing import TYPE_CHECKING, Any, cast
 
 from silo.bom.document import LinkProblem
 from silo.bom.findings import FindingCode
+from silo.bom.walk.kinds import Kind, Survey, kind_by_type, kind_of
 from silo.fcstd.container import ContainerFile, Entry
 from silo.fcstd.inflate import Inflater
 from silo.fcstd.locate import Found
 from silo.fcstd.objects import FcstdObject
 from silo.fcstd.problem import FcstdError
 from silo.fcstd.properties import Properties
-from silo.fcstd.typetree import ancestors
-from silo.fcstd.values import ABSENT, Ref, Vector
+from silo.fcstd.typetree import ancestors, is_listed
+from silo.fcstd.values import ABSENT, LocalList, Ref, Vector
+from silo.fcstd.xmltext import XmlText
 
 if TYPE_CHECKING:
     from silo.fcstd.library import Content, Library
@@ -32,6 +34,43 @@ _SAID_OF_ITSELF = ("SiloItemId", "SiloUUID", "Type")
 _BREP_TEXT = (b"CASCADE Topology", b"DBRep_DrawableShape")
 _SIZE = Struct("<I")
 _DOUBLES, _FLOATS = Struct("<3d"), Struct("<3f")
+
+
+class _FileSurvey(Survey):
+    """Objects by kind, most of them known by their type alone."""
+
+    def __init__(self, document: FcstdDocument, xml: XmlText) -> None:
+        self._document, self._xml = document, xml
+        types = xml.head.types
+        known = {
+            type_id: kind_by_type(ancestors(type_id)) for type_id in set(types.values()) if is_listed(type_id)
+        }
+        self._types = set(types.values())
+        self._kinds = {
+            name: known.get(type_id) or kind_of(document.object_of(name, type_id))
+            for name, type_id in types.items()
+        }
+        self._there = set(self._kinds.values())
+
+    def of(self, kinds: Set[Kind], but: Set[str] = frozenset()) -> list[tuple[Any, Kind]]:
+        if self._there.isdisjoint(kinds):
+            return []
+        types, make = self._xml.head.types, self._document.object_of
+        return [
+            (make(name, types[name]), kind)
+            for name, kind in self._kinds.items()
+            if kind in kinds and name not in but
+        ]
+
+    def grouped(self, kinds: Set[Kind]) -> set[str]:
+        names: set[str] = set()
+        for obj, _ in self.of(kinds, self._kinds.keys() - self._xml.mentioning("Group")):
+            group = obj.properties.value("Group")
+            names.update(group.names if isinstance(group, LocalList) else ())
+        return names
+
+    def has_python(self) -> bool:
+        return any(type_id.endswith("FeaturePython") for type_id in self._types)
 
 
 class FcstdDocument:
@@ -94,6 +133,12 @@ class FcstdDocument:
         self.complete()
         return self.members(self._xml.head.types)
 
+    @cached_property
+    def survey(self) -> Survey:
+        """The objects by what they are; only those that somebody asks for are made."""
+        self.complete()
+        return _FileSurvey(self, self._xml)
+
     @property
     def PropertiesList(self) -> tuple[str, ...]:
         """The names of the document's own properties, as far as the file holds them."""
@@ -103,7 +148,7 @@ class FcstdDocument:
         """The object of this ``Name`` (never a label), None where there is none."""
         known = self._objects.get(name)
         if known is None and (kind := self._xml.head.types.get(name)) is not None:
-            known = self._object(name, kind)
+            known = self.object_of(name, kind)
         return known
 
     def getPropertyByName(self, name: str) -> Any:
@@ -162,7 +207,7 @@ class FcstdDocument:
     def members(self, names: Iterable[str]) -> tuple[FcstdObject, ...]:
         """The objects of these names, without those that are not there."""
         types = self._xml.head.types
-        return tuple(self._object(name, types[name]) for name in names if name in types)
+        return tuple(self.object_of(name, types[name]) for name in names if name in types)
 
     def resolve(self, ref: Ref) -> FcstdObject | None:
         """The object that a link means, None where it is unset or broken."""
@@ -222,7 +267,8 @@ class FcstdDocument:
         value = self._value(name)
         return value if isinstance(value, str) else ""
 
-    def _object(self, name: str, kind: str) -> FcstdObject:
+    def object_of(self, name: str, kind: str) -> FcstdObject:
+        """The object of this name and type."""
         known = self._objects.get(name)
         if known is None:
             known = self._objects[name] = FcstdObject(self, name, kind)

@@ -49,6 +49,8 @@ class FcstdObject:
 
     Name: str
     TypeId: str
+    ancestry: frozenset[str]
+    """The type and all that it is derived from."""
     Document: FcstdDocument
     properties: Properties
     """The table of what the file holds, for those that want to see more than values."""
@@ -59,10 +61,11 @@ class FcstdObject:
         self.Document = document
         self.Name = name
         self.TypeId = type_id
-        # A walker asks this most of all; so the set itself answers, in place of the method below.
-        self.__dict__["isDerivedFrom"] = ancestors(type_id).__contains__
+        self.ancestry = ancestors(type_id)
         if not is_listed(type_id) and self._looks_like_a_link():
-            self.__dict__["isDerivedFrom"] = (ancestors("App::Link") | {type_id}).__contains__
+            self.ancestry = ancestors("App::Link") | {type_id}
+        # A walker asks this most of all; so the set itself answers, in place of the method below.
+        self.__dict__["isDerivedFrom"] = self.ancestry.__contains__
 
     def _looks_like_a_link(self) -> bool:
         """A type that a later FreeCAD added, with the properties of a link array."""
@@ -75,7 +78,7 @@ class FcstdObject:
 
     def isDerivedFrom(self, type_name: str, /) -> bool:
         """As FreeCAD: the type of the object itself, never of a link's target; False for unknown names."""
-        return type_name in ancestors(self.TypeId)
+        return type_name in self.ancestry
 
     @cached_property
     def Label(self) -> str:

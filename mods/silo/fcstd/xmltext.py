@@ -12,8 +12,10 @@ checksum.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from bisect import bisect_right
+from collections.abc import Callable, Set
 from hashlib import sha256
+from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING
 
 from silo.fcstd import careful
@@ -36,6 +38,7 @@ _OBJECTS = re.compile(rb'<Objects Count="(\d{1,9})"' + _ATTRIBUTES + rb">")
 _OBJECT_TYPE = re.compile(rb'<Object type="([^"&]+)" name="([^"&]+)"')
 _OBJECT_DATA = re.compile(rb"</Objects>\s*<ObjectData" + _ATTRIBUTES + rb">")
 _OBJECT = re.compile(rb'\s*<Object name="([^"&]+)"' + _ATTRIBUTES + rb">")
+_CLOSING = b"</Object>"
 _TAIL = re.compile(rb"\s*</ObjectData>\s*</Document>\s*\Z")
 
 # The first step holds the head and the object of a small part; then bigger ones, since more was needed.
@@ -76,6 +79,7 @@ class XmlText:
         self._known = 0
         self._head: Head | None = None
         self._data: dict[str, Span] = {}
+        self._names: list[bytes] = []
         self._position = 0
         self._complete = False
         self._failure: FcstdError | None = None
@@ -215,8 +219,11 @@ class XmlText:
         if opening is None or not int(opening[1]) == len(found) == text.count(b"<Object ", begin, end):
             raise _Unexpected
         self._limit_objects(len(found))
+        self._names = [name for _, name in found]
         kinds = {kind: self.decode(kind) for kind in {kind for kind, _ in found}}
-        types = {self.decode(name): kinds[kind] for kind, name in found}
+        # No name holds a quotation mark.
+        names = self.decode(b'"'.join(self._names)).split('"') if found else ()
+        types = {name: kinds[kind] for name, (kind, _) in zip(names, found, strict=True)}
         if len(types) != len(found):
             raise _Unexpected
         return types
@@ -231,8 +238,11 @@ class XmlText:
             self._find_head(whole=until is None)
         if self._complete:
             return
+        if until is None and not self._data and self._inflater.finished and self._cut_at_once():
+            self._complete = True
+            return
         text, data, position = self.text, self._data, self._position
-        match, closing = _OBJECT.match, b"</Object>"
+        match, closing = _OBJECT.match, _CLOSING
         while True:
             opening = match(text, position)
             end = text.find(closing, opening.end()) if opening else -1
@@ -251,6 +261,43 @@ class XmlText:
         if self._head is None or data.keys() != self._head.types.keys():
             raise _Unexpected
         self._complete = True
+
+    def _cut_at_once(self) -> bool:
+        """Index the data of all objects where they stand in the order of the list; False where not."""
+        assert self._head is not None  # found before
+        pieces = self.text[self._position :].split(_CLOSING)
+        tail = pieces.pop()
+        if not pieces or len(pieces) != len(self._names) or not _TAIL.match(tail):
+            return False
+        indent = pieces[0].partition(b"<")[0]
+        for piece, name in zip(pieces, self._names, strict=True):
+            if not piece.startswith(b'%b<Object name="%b">' % (indent, name)):
+                opening = _OBJECT.match(piece)
+                if opening is None or opening[1] != name:
+                    return False
+        if not indent.isspace() and indent:
+            return False
+        ends = list(accumulate((len(piece) + len(_CLOSING) for piece in pieces), initial=self._position))
+        self._data = dict(zip(self._head.types, pairwise(ends), strict=True))
+        self._position = ends[-1]
+        return True
+
+    def mentioning(self, word: str) -> Set[str]:
+        """Names of the objects in whose data a word may stand, of a text that was read to its end."""
+        text, wanted = self.text, word.encode()
+        if b"&" in text and b"&#" in text:  # which may be a letter
+            return self.head.types.keys()
+        found, names, ends = set(), list(self._data), [end for _, end in self._data.values()]
+        if ends != sorted(ends):
+            return self.head.types.keys()
+        at = text.find(wanted, self._data[names[0]][0]) if names else -1
+        while at >= 0:
+            number = bisect_right(ends, at)
+            if number == len(names):
+                break
+            found.add(names[number])
+            at = text.find(wanted, ends[number])
+        return found
 
     def _read_carefully(self) -> None:
         text = self.text + self._inflater.rest()

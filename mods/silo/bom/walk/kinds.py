@@ -7,14 +7,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence, Set
 from enum import Enum, auto
 from functools import lru_cache
 from typing import Any, TypeVar
 
 from silo.bom.document import derived, object_name, own, property_names
 from silo.bom.walk.standard import fastener_type, is_tool
-from silo.bom.walk.targets import first_of, is_assembly_link, is_link
+from silo.bom.walk.targets import first_of
 
 T = TypeVar("T", bound=Hashable)
 
@@ -87,29 +87,50 @@ def has_own(obj: object, *names: str) -> bool:
 
 def kind_of(obj: object) -> Kind:
     """The role of a member of a container."""
-    if is_link(obj):
-        return Kind.LINK
-    if is_assembly_link(obj):
-        return Kind.ASSEMBLY_LINK
-    if derived(obj, "App::LinkGroup"):
-        return Kind.LINK_GROUP
-    if derived(obj, "App::Part"):  # also Assembly::AssemblyObject
-        return Kind.CONTAINER
-    if derived(obj, "App::DocumentObjectGroup"):
-        return Kind.NOTHING if any(derived(obj, name) for name in _NO_FOLDERS) else Kind.FOLDER
+    ancestry = getattr(obj, "ancestry", None)
+    if isinstance(ancestry, frozenset):
+        kind = kind_by_type(ancestry)
+    else:
+        kind = _kind_by_type(lambda name: derived(obj, name))
+    if kind is not None:
+        return kind
     if derived(obj, "Part::FeaturePython"):
         return _python_kind(obj)
-    if any(derived(obj, name) for name in _NO_GEOMETRY):
+    return _standard_kind(obj) or _geometry(lambda name: derived(obj, name))
+
+
+@lru_cache(maxsize=4096)
+def kind_by_type(ancestry: frozenset[str]) -> Kind | None:
+    """The role of an object of a type that is derived from these; None where its properties decide."""
+    return _kind_by_type(ancestry.__contains__)
+
+
+def _kind_by_type(is_a: Callable[[str], bool]) -> Kind | None:
+    if is_a("App::Link"):
+        return Kind.LINK
+    if is_a("Assembly::AssemblyLink"):
+        return Kind.ASSEMBLY_LINK
+    if is_a("App::LinkGroup"):
+        return Kind.LINK_GROUP
+    if is_a("App::Part"):  # also Assembly::AssemblyObject
+        return Kind.CONTAINER
+    if is_a("App::DocumentObjectGroup"):
+        return Kind.NOTHING if any(map(is_a, _NO_FOLDERS)) else Kind.FOLDER
+    if is_a("Part::FeaturePython"):
+        return None
+    if any(map(is_a, _NO_GEOMETRY)):
         return Kind.NOTHING
-    if derived(obj, "Part::Compound"):
+    if is_a("Part::Compound"):
         return Kind.COMPOUND
-    if derived(obj, "Part::Mirroring"):
+    if is_a("Part::Mirroring"):
         return Kind.COPY
-    if derived(obj, "App::LinkElement"):
+    if is_a("App::LinkElement"):
         return Kind.ELEMENT
-    if kind := _standard_kind(obj):
-        return kind
-    return Kind.LOCAL if any(derived(obj, name) for name in _GEOMETRY) else Kind.NOTHING
+    return None if is_a("PartDesign::FeaturePython") else _geometry(is_a)
+
+
+def _geometry(is_a: Callable[[str], bool]) -> Kind:
+    return Kind.LOCAL if any(map(is_a, _GEOMETRY)) else Kind.NOTHING
 
 
 def _python_kind(obj: object) -> Kind:
@@ -209,6 +230,34 @@ def flattened(
         yield name, obj, kind
         if kind in INLINE and not closed(obj, kind):
             open_containers.append(iter(members(obj)))
+
+
+class Survey:
+    """The objects of a document by what they are, each looked at once.
+
+    A document that knows more of its objects without making them has a ``survey`` of its own.
+    """
+
+    def __init__(self, document: Any) -> None:
+        self._objects = [(obj, kind_of(obj)) for obj in getattr(document, "Objects", None) or ()]
+
+    def of(self, kinds: Set[Kind], but: Set[str] = frozenset()) -> list[tuple[Any, Kind]]:
+        """The objects of these kinds in document order, without those of these names."""
+        return [(obj, kind) for obj, kind in self._objects if kind in kinds and object_name(obj) not in but]
+
+    def grouped(self, kinds: Set[Kind]) -> set[str]:
+        """Names of what objects of these kinds list in their ``Group``."""
+        return {object_name(one) for obj, _ in self.of(kinds) for one in own(obj, "Group") or ()}
+
+    def has_python(self) -> bool:
+        """True where an object is of a Python type, as standard parts are."""
+        return any(getattr(obj, "TypeId", "").endswith("FeaturePython") for obj, _ in self._objects)
+
+
+def survey_of(document: Any) -> Survey:
+    """The survey of a document, its own where it has one."""
+    found = getattr(document, "survey", None)
+    return found if isinstance(found, Survey) else Survey(document)
 
 
 def is_container(obj: object) -> bool:
