@@ -18,7 +18,7 @@ from silo.bom.errors import DocumentError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.merge import plan_merge
 from silo.bom.model import BomEntry, Extraction
-from silo.bom.report import relative
+from silo.bom.paths import relative
 from silo.bom.snapshot import from_plain, to_plain
 from silo.bom_sync import Status, blocking, resolve, sync
 from silo.fcstd import open_document, stamp

@@ -15,7 +15,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from silo.bom.report import relative
+from silo.bom.paths import relative
 from silo.platform import (
     child_options,
     copy_rights,

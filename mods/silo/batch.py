@@ -19,7 +19,8 @@ from silo.bom.diff import diff_findings
 from silo.bom.errors import SiloError
 from silo.bom.findings import Finding
 from silo.bom.model import BomEntry, Extraction
-from silo.bom.report import base_of, diff_json, entry_json, finding_json, project_folder, relative
+from silo.bom.paths import relative
+from silo.bom.report import base_of, diff_json, entry_json, finding_json, project_folder
 from silo.bom_sync import Outcome, Resolved, Status, SyncApi, blocking, resolve, sync_tree
 from silo.files import sha256_of
 

@@ -37,7 +37,7 @@ from silo.bom.left_out import LeftOut, components_of, left_out_of
 from silo.bom.links import extract, extract_bom_links
 from silo.bom.merge import MergePlan, plan_merge
 from silo.bom.model import BomDiff, BomEntry, Extraction
-from silo.bom.report import relative
+from silo.bom.paths import relative
 from silo.bom.resolve import (
     ItemLookup,
     Known,

@@ -60,14 +60,14 @@ def test_the_core_opens_nothing_and_asks_no_clock(source: Path) -> None:
 
 
 def test_all_is_what_is_exported() -> None:
-    """Each name is there, each public value of the package is named, in order."""
-    public = {
-        name
-        for name, value in vars(silo.bom).items()
-        if not name.startswith("_") and getattr(value, "__module__", "").startswith("silo.bom.")
-    }
-    assert set(silo.bom.__all__) == public
+    """Each name is there, in order, and an unknown one is refused; the errors alone load no walker."""
+    assert {getattr(silo.bom, name).__module__.partition(".")[0] for name in silo.bom.__all__} == {"silo"}
     assert silo.bom.__all__ == sorted(silo.bom.__all__)
+    with pytest.raises(AttributeError, match="no_such_name"):
+        _ = silo.bom.no_such_name
+    code = "import sys, silo.bom.errors; print(*(n for n in sys.modules if n.startswith('silo.bom.')))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["silo.bom.errors"]
 
 
 @pytest.mark.parametrize(

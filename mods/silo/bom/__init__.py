@@ -1,13 +1,32 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The pure core: values in, values out; no I/O, no clock, standard library only."""
+"""The pure core: values in, values out; no I/O, no clock, standard library only.
 
-from silo.bom.diff import diff_bom
-from silo.bom.findings import Finding, FindingCode, Place, Severity
-from silo.bom.links import extract, extract_bom_links
-from silo.bom.merge import MergePlan, apply_merge, plan_merge
-from silo.bom.model import BomChange, BomDiff, BomEntry, Extraction, QuantityChange
-from silo.bom.resolve import resolve_part_numbers
-from silo.bom.roots import choose_assembly
+Names are imported when they are first used: who needs the errors alone does not load the walker.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from silo.bom.diff import diff_bom
+    from silo.bom.findings import Finding, FindingCode, Place, Severity
+    from silo.bom.links import extract, extract_bom_links
+    from silo.bom.merge import MergePlan, apply_merge, plan_merge
+    from silo.bom.model import BomChange, BomDiff, BomEntry, Extraction, QuantityChange
+    from silo.bom.resolve import resolve_part_numbers
+    from silo.bom.roots import choose_assembly
+
+_HOME = {
+    "diff": ("diff_bom",),
+    "findings": ("Finding", "FindingCode", "Place", "Severity"),
+    "links": ("extract", "extract_bom_links"),
+    "merge": ("MergePlan", "apply_merge", "plan_merge"),
+    "model": ("BomChange", "BomDiff", "BomEntry", "Extraction", "QuantityChange"),
+    "resolve": ("resolve_part_numbers",),
+    "roots": ("choose_assembly",),
+}
 
 __all__ = [
     "BomChange",
@@ -28,3 +47,10 @@ __all__ = [
     "plan_merge",
     "resolve_part_numbers",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    for module, names in _HOME.items():
+        if name in names:
+            return getattr(import_module(f"{__name__}.{module}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -19,7 +19,8 @@ from typing import Any
 from silo.bom.findings import Finding
 from silo.bom.model import BomEntry
 from silo.bom.naming import display_name
-from silo.bom.report import relative, shorten
+from silo.bom.paths import relative
+from silo.bom.report import shorten
 from silo.bom.walk.standard import STANDARD_PARTS
 
 

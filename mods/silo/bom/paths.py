@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import os.path
 import re
+from contextlib import suppress
+from types import ModuleType
 from typing import Any
 
 # FreeCAD's names of geometry; ";" and "?" begin mapped and missing names (src/App/ElementNamingUtils.h).
@@ -22,6 +24,18 @@ def located(recorded: str, owner: str) -> str:
     if _ABSOLUTE.match(recorded) or not owner:
         return recorded
     return os.path.normpath(os.path.join(os.path.dirname(owner), recorded))
+
+
+def relative(path: str, base: str, rules: ModuleType = os.path) -> str:
+    """``path`` as seen from the folder ``base``, with ``/``; whole where it lies on another Windows drive.
+
+    ``rules``: ``ntpath`` or ``posixpath``, whatever the platform.
+    """
+    if not path or not base:
+        return path
+    with suppress(ValueError):  # there is no way from one drive to another
+        path = rules.relpath(path, base)
+    return path.replace(rules.sep, "/")
 
 
 def is_element_name(name: str) -> bool:

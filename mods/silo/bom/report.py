@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import os.path
 from collections.abc import Iterable, Sequence
-from contextlib import suppress
 from types import ModuleType
 from typing import Any
 
@@ -14,24 +13,13 @@ from silo.bom.findings import Finding
 from silo.bom.identity import walk_entries
 from silo.bom.model import BomDiff, BomEntry, Extraction, rows_as_dicts
 from silo.bom.naming import display_name
+from silo.bom.paths import relative
 
 # A CAD model counts pieces.
 PIECES = "pcs"
 
 # A line takes about 1 kB of memory on its way to JSON or to a terminal.
 MOST_LINES = 500_000
-
-
-def relative(path: str, base: str, rules: ModuleType = os.path) -> str:
-    """``path`` as seen from the folder ``base``, with ``/``; whole where it lies on another Windows drive.
-
-    ``rules``: ``ntpath`` or ``posixpath``, whatever the platform.
-    """
-    if not path or not base:
-        return path
-    with suppress(ValueError):  # there is no way from one drive to another
-        path = rules.relpath(path, base)
-    return path.replace(rules.sep, "/")
 
 
 def project_folder(path: str, top: str = "", rules: ModuleType = os.path) -> str:

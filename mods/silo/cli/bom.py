@@ -10,7 +10,8 @@ from dataclasses import replace
 
 from silo.bom.errors import InputError, SiloError
 from silo.bom.model import BomEntry, Extraction
-from silo.bom.report import base_of, bom_json, flat_json, relative
+from silo.bom.paths import relative
+from silo.bom.report import base_of, bom_json, flat_json
 from silo.bom.resolve import consolidation_findings
 from silo.bom_sync import assemblies, resolve, server_lines
 from silo.cli import common

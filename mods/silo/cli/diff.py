@@ -11,7 +11,8 @@ from typing import Any
 from silo.bom.diff import diff_findings
 from silo.bom.model import BomDiff
 from silo.bom.naming import display_name
-from silo.bom.report import base_of, diff_json, finding_json, relative
+from silo.bom.paths import relative
+from silo.bom.report import base_of, diff_json, finding_json
 from silo.bom_sync import Resolved, assemblies, blocking, names_of, resolve, server_lines
 from silo.cli import common
 from silo.cli.common import Commands

@@ -84,7 +84,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _push(args: argparse.Namespace, report: InertiaReport) -> int:
     """The documents' identities give the part numbers; the top assembly's own, unless --item says another."""
-    from silo.bom.report import base_of, relative
+    from silo.bom.paths import relative
+    from silo.bom.report import base_of
     from silo.bom_sync import resolve
 
     extraction = common.read_top(args)

@@ -14,7 +14,8 @@ from silo.bom.declare import Modelled
 from silo.bom.errors import ConflictError, DocumentError, InputError, SiloError
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.naming import Proposal, propose, propose_all
-from silo.bom.report import base_of, relative
+from silo.bom.paths import relative
+from silo.bom.report import base_of
 from silo.bom_sync import resolve
 from silo.cli import common
 from silo.cli.common import Commands

@@ -8,7 +8,7 @@ import os
 
 from silo.bom.errors import DocumentError, InputError, SiloError
 from silo.bom.identity import walk_entries
-from silo.bom.report import relative
+from silo.bom.paths import relative
 from silo.cli import common
 from silo.cli.common import Commands
 from silo.open_in_freecad import open_in_any

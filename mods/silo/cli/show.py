@@ -18,7 +18,8 @@ from silo.api.merging import unusual
 from silo.bom.findings import Finding, Severity
 from silo.bom.model import BomDiff, BomEntry, Extraction
 from silo.bom.naming import display_name
-from silo.bom.report import base_of, relative, shorten
+from silo.bom.paths import relative
+from silo.bom.report import base_of, shorten
 from silo.bom_sync import Outcome, Status
 
 _MARK = {

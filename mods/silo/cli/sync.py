@@ -272,7 +272,7 @@ def _show_summary(summary: Summary) -> None:
 
 def moved(before: dict[str, set[str]], now: set[tuple[str, str]], base: str) -> list[tuple[str, str, str]]:
     """Files that carry on the identity of one that is gone: (name, before, now)."""
-    from silo.bom.report import relative
+    from silo.bom.paths import relative
 
     here: dict[str, set[str]] = {}
     for uuid, path in now:

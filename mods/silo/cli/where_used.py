@@ -8,7 +8,7 @@ import os
 from collections.abc import Mapping
 
 from silo.bom.errors import InputError
-from silo.bom.report import relative
+from silo.bom.paths import relative
 from silo.cli import common
 from silo.cli.common import Commands
 from silo.files import documents_in

@@ -24,7 +24,7 @@ from step_writer import StepDocument, emptied, trsf_of
 from silo.inertia.geometry import ReadOptions, read
 from silo.inertia.geometry.freecad.files import read_freecad
 from silo.inertia.geometry.helpers import LEAST_MB, Helpers, helpers_for, processors
-from silo.inertia.geometry.kernel.brep import load_kernel, measure_all
+from silo.inertia.geometry.kernel.brep import measure_all
 from silo.inertia.geometry.step.read import read_step
 from silo.inertia.model import Assembly, GeometryCode
 
@@ -40,7 +40,7 @@ def _helpers() -> Iterator[Helpers]:
     """One helper that is ready."""
     with Helpers(1, 4000) as helpers:
         assert helpers.start()
-        helpers.prepare(load_kernel)
+        helpers.load_kernel()
         helpers.begin(os.getpid)()  # waits until it is ready
         yield helpers
 

@@ -68,10 +68,10 @@ def coincident_problems(instances: Sequence[Instance]) -> list[GeometryProblem]:
     """One problem for all parts that stand exactly where the same part stands already."""
     seen: dict[tuple[str, bytes], Instance] = {}
     twice = []
-    for instance in instances:
-        # 0.1 µm and 1e-7 of a turn; adding 0 makes -0 the 0 that it is.
-        place = (np.round(instance.transform, 7) + 0.0).tobytes()
-        if seen.setdefault((instance.prototype, place), instance) is not instance:
+    # 0.1 µm and 1e-7 of a turn; adding 0 makes -0 the 0 that it is.
+    places = np.round([instance.transform for instance in instances], 7) + 0.0
+    for instance, place in zip(instances, places, strict=True):
+        if seen.setdefault((instance.prototype, place.tobytes()), instance) is not instance:
             twice.append(instance.name)
     if not twice:
         return []

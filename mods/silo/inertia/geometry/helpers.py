@@ -101,10 +101,10 @@ class Helpers:
             helper.end()
         self._running.clear()
 
-    def prepare(self, function: Callable[[], Any]) -> None:
-        """What every helper does before it is asked anything more, such as loading the kernel."""
+    def load_kernel(self) -> None:
+        """Have every helper load the geometry kernel now, which takes it a second."""
         for helper in self._running:
-            helper.one(function, ())
+            helper.one(_load_kernel, ())
 
     def begin(self, function: Callable[..., T], *arguments: Any) -> Callable[[], T]:
         """Have one thing done by the first helper; gives the result when it is called."""
@@ -226,6 +226,12 @@ class _Helper:
         if noise:
             os.write(1, noise)  # what the kernel complains of is read there
         return (value,)
+
+
+def _load_kernel() -> None:
+    from silo.inertia.geometry.kernel import brep, occt  # noqa: F401 - brep is what measures
+
+    occt.quiet()
 
 
 def main() -> None:

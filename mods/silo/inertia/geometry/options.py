@@ -49,12 +49,15 @@ class Reading:
         product names for which a file was looked for in vain.
     absent
         files that were named and are not there.
+    kept
+        what the process that read may keep until it ends: freeing it takes long.
     """
 
     assembly: Assembly
     others: tuple[Path, ...] = ()
     missing: tuple[str, ...] = ()
     absent: tuple[Path, ...] = ()
+    kept: object = None
 
 
 Report = Callable[[str, int, int], None]

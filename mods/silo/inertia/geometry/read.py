@@ -12,10 +12,9 @@ from silo.bom.errors import CancelledError, DocumentError
 from silo.inertia.geometry import isolate, store
 from silo.inertia.geometry.cache import Cache, changed_since, default_folder, key_of
 from silo.inertia.geometry.detect import Kind, detect
-from silo.inertia.geometry.helpers import WORTH_HELP, Helpers
+from silo.inertia.geometry.helpers import Helpers
 from silo.inertia.geometry.options import Progress, Reading, ReadOptions, Report
-from silo.inertia.geometry.step.prepare import prepare
-from silo.inertia.materials.cards import cards_fingerprint
+from silo.inertia.geometry.step.prepare import begin
 from silo.inertia.model import Assembly
 
 ATTEMPTS = 3
@@ -42,7 +41,8 @@ def read(path: str | Path, *, options: ReadOptions | None = None) -> Assembly:
             from silo.inertia.geometry.kernel import occt
 
             occt.quiet()
-        return read_here(path, options, _reporter(path, options)).assembly
+        with Helpers() as helpers:
+            return read_here(path, options, _reporter(path, options), helpers).assembly
     cache = Cache(options.cache_dir or default_folder()) if options.cache else None
     for _ in range(ATTEMPTS):
         key = key_of(path, _content(kind, options))
@@ -67,18 +67,18 @@ def read(path: str | Path, *, options: ReadOptions | None = None) -> Assembly:
 def _content(kind: Kind, options: ReadOptions) -> dict[str, Any]:
     """What a result depends on besides the file: for FreeCAD documents also the cards that hold densities."""
     content = options.content_options()
-    return {**content, "cards": cards_fingerprint()} if kind is Kind.FREECAD else content
+    if kind is not Kind.FREECAD:
+        return content
+    from silo.inertia.materials.cards import cards_fingerprint
+
+    return {**content, "cards": cards_fingerprint()}
 
 
-def read_here(path: Path, options: ReadOptions, report: Report, helpers: Helpers | None = None) -> Reading:
+def read_here(path: Path, options: ReadOptions, report: Report, helpers: Helpers) -> Reading:
     """Read in this process, and in the helpers: what the child does."""
     kind = detect(path)
-    helpers = helpers or Helpers()
     if kind is Kind.STEP:
-        text = None
-        if path.stat().st_size >= WORTH_HELP and helpers.start():
-            # A helper looks through the text while the kernel loads here.
-            text = helpers.begin(prepare, path.resolve(), helpers.folder(), options.max_instances)
+        text = begin(path, options, helpers)
         from silo.inertia.geometry.step.read import read_step
 
         return read_step(path, options, report, helpers, text)

@@ -40,9 +40,6 @@ def main() -> None:
         except SiloError as error:
             reason = getattr(error, "reason", str(error))
             _say(parent, event="error", reason=reason, config=isinstance(error, ConfigError))
-        else:
-            _say(parent, event="done")
-    # Taking a large document of the kernel down again can take longer than reading it, and may crash.
     os._exit(0)
 
 
@@ -75,6 +72,9 @@ def _read(task: dict[str, Any], parent: IO[str], noise: IO[bytes]) -> None:
         reading = read_here(Path(task["path"]), options, report, helpers)
     reading = with_complaints(reading, _complaints(noise))
     store.save(reading.assembly, Path(task["result"]), provenance(reading, options))
+    _say(parent, event="done")
+    # Taking a large document of the kernel down can take longer than reading it, and may crash.
+    os._exit(0)
 
 
 def with_complaints(reading: Reading, lines: list[str]) -> Reading:

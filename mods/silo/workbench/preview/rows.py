@@ -16,7 +16,8 @@ from silo.bom.findings import Finding, FindingCode, Severity
 from silo.bom.identity import walk_entries
 from silo.bom.model import BomDiff, BomEntry, Extraction
 from silo.bom.naming import display_name
-from silo.bom.report import relative, shorten
+from silo.bom.paths import relative
+from silo.bom.report import shorten
 from silo.workbench.commit.snapshot import Snapshot
 from silo.workbench.session.jobs import Control
 from silo.workbench.words import plain, quantity, translate

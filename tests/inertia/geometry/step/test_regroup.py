@@ -47,8 +47,9 @@ def test_a_flat_assembly_is_read_as_it_is_written(flat: Path, read_in: Any) -> N
 def test_the_text_gets_groups_and_nothing_else_changes(flat: Path) -> None:
     """Uses keep their numbers, names and placements; the groups hold all of them."""
     data = flat.read_bytes()
-    before = read_products(scan(data, WANTED))
-    changed, added = regrouped(data, before)
+    text = scan(data, WANTED)
+    before = read_products(text)
+    changed, added = regrouped(text, before)
     assert changed is not None
     after = read_products(scan(changed, WANTED))
     assert after.count == before.count + added
@@ -65,8 +66,8 @@ def test_the_text_gets_groups_and_nothing_else_changes(flat: Path) -> None:
 
 def test_small_assemblies_and_odd_structures_are_left_alone(flat: Path, box: Any, step_part: Any) -> None:
     """No need, or a placement that cannot be found: the kernel gets the file as it is."""
-    small = step_part(box(1, 1, 1)).read_bytes()
-    assert regrouped(small, read_products(scan(small, WANTED))) == (None, 0)
+    small = scan(step_part(box(1, 1, 1)).read_bytes(), WANTED)
+    assert regrouped(small, read_products(small)) == (None, 0)
     placement, other = b"CONTEXT_DEPENDENT_SHAPE_REPRESENTATION", b"SOME_OTHER_REPRESENTATION"
-    odd = flat.read_bytes().replace(placement, other, 1)
-    assert regrouped(odd, read_products(scan(odd, WANTED))) == (None, 0)
+    odd = scan(flat.read_bytes().replace(placement, other, 1), WANTED)
+    assert regrouped(odd, read_products(odd)) == (None, 0)

@@ -23,7 +23,7 @@ from silo.inertia.geometry.freecad.places import Entries
 from silo.inertia.geometry.freecad.walk import Leaf, Walk
 from silo.inertia.geometry.graph import Floats
 from silo.inertia.geometry.helpers import WORTH_HELP, Helpers, Task
-from silo.inertia.geometry.kernel.brep import load_kernel, load_shape
+from silo.inertia.geometry.kernel.brep import load_shape
 from silo.inertia.geometry.kernel.solids import measure
 from silo.inertia.geometry.measured import Measured
 from silo.inertia.geometry.options import Reading, ReadOptions, Report
@@ -47,7 +47,7 @@ def read_freecad(path: Path, options: ReadOptions, report: Report, helpers: Help
 
             def measured(leaves: Sequence[Leaf], done: Callable[[int, int], Any]) -> list[Measured | str]:
                 if len(leaves) > 1 and unpacked.size(leaves) >= WORTH_HELP and helpers.start():
-                    helpers.prepare(load_kernel)
+                    helpers.load_kernel()
 
                 def task(leaf: Leaf) -> Task[Measured | str]:
                     try:

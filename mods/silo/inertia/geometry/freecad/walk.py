@@ -23,7 +23,7 @@ import numpy as np
 from silo.bom.document import derived, label_of, object_name, own, same_document
 from silo.bom.model import BomEntry
 from silo.bom.naming import display_name
-from silo.bom.report import relative
+from silo.bom.paths import relative
 from silo.bom.walk.kinds import REPEATERS, Kind, is_container, is_named_assembly, kind_of
 from silo.bom.walk.targets import is_assembly_link, is_link
 from silo.inertia.geometry.freecad.facts import Facts, element_places, file_of, link_placement, scale

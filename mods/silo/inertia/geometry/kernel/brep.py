@@ -17,7 +17,6 @@ from OCP.TopoDS import TopoDS_Compound, TopoDS_Iterator, TopoDS_Shape
 
 from silo.bom.errors import DocumentError
 from silo.inertia.geometry.helpers import Helpers
-from silo.inertia.geometry.kernel import occt
 from silo.inertia.geometry.kernel.solids import measure
 from silo.inertia.geometry.measured import Measured, no_solid
 from silo.inertia.geometry.options import Reading, ReadOptions, Report
@@ -59,11 +58,6 @@ def read_brep(path: Path, options: ReadOptions, report: Report) -> Reading:
     )
     instance = Instance((path.stem,), (path.stem,), "shape", np.eye(4))
     return Reading(Assembly(path.stem, {"shape": part}, (instance,), source=str(path), unit="mm"))
-
-
-def load_kernel() -> None:
-    """What a helper does first: this module's imports have done it."""
-    occt.quiet()
 
 
 def measure_all(

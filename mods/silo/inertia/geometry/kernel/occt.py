@@ -41,6 +41,7 @@ from OCP.GeomAbs import (
     GeomAbs_Torus,
 )
 from OCP.Message import Message
+from OCP.TCollection import TCollection_AsciiString
 from OCP.TDataStd import TDataStd_Name
 from OCP.TDF import TDF_Label, TDF_Tool
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SHAPE, TopAbs_SHELL, TopAbs_SOLID
@@ -80,8 +81,6 @@ def labels(sequence: Any) -> list[Any]:
 
 def entry(label: Any) -> str:
     """The label's address in its document, such as ``0:1:1:3``."""
-    from OCP.TCollection import TCollection_AsciiString
-
     text = TCollection_AsciiString()
     TDF_Tool.Entry_s(label, text)
     return str(text.ToCString())

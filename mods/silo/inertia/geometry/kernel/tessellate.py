@@ -147,12 +147,9 @@ def xyz(point: Any) -> tuple[float, float, float]:
 
 def trsf_matrix(trsf: Any) -> Floats:
     """A kernel transformation as (4, 4), lengths in mm as the kernel has them."""
-    matrix = np.eye(4)
     value = trsf.Value
-    for i in range(3):
-        for j in range(4):
-            matrix[i, j] = value(i + 1, j + 1)
-    return matrix
+    rows = [[value(i, j) for j in (1, 2, 3, 4)] for i in (1, 2, 3)]
+    return np.array([*rows, [0.0, 0.0, 0.0, 1.0]])
 
 
 def in_metres(matrix: Floats) -> Floats:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import mmap
 import re
+from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import TypeAlias
@@ -41,6 +42,7 @@ MAX_DEPTH = 60
 MAX_ENTITY_BYTES = 4_000_000
 
 _ENTITY = re.compile(rb"#(\d+)\s*=\s*([A-Z_0-9]*)\s*\(")
+_COMPLEX = re.compile(rb"UNIT|REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION")
 _BODY = re.compile(rb"(?:[^';]+|'[^']*')*")
 _REFERENCE = re.compile(rb"'(?:[^']|'')*'|#(\d+)")
 _TOKEN = re.compile(
@@ -59,6 +61,8 @@ class Part21:
         id → keyword ("" for a complex entity).
     ordinals
         id → position among all entities of the file, counted from 1: the kernel numbers them so.
+    ids
+        keyword → the ids that have it, in file order.
     count, highest
         how many entities there are, and the largest id.
     complete
@@ -69,15 +73,15 @@ class Part21:
     keywords: dict[int, str] = field(default_factory=dict)
     ordinals: dict[int, int] = field(default_factory=dict)
     starts: dict[int, int] = field(default_factory=dict)
+    ids: dict[str, list[int]] = field(default_factory=lambda: defaultdict(list))
     count: int = 0
     highest: int = 0
     complete: bool = False
 
     def of(self, *keywords: str) -> Iterator[tuple[int, tuple[Value, ...]]]:
-        """All wanted entities with one of these keywords, in file order: id and arguments."""
-        for number, keyword in self.keywords.items():
-            if keyword in keywords:
-                yield number, self.arguments(number)
+        """All wanted entities with one of these keywords: id and arguments."""
+        for number in self.listed(*keywords):
+            yield number, self.arguments(number)
 
     def arguments(self, number: int) -> tuple[Value, ...]:
         """The arguments of entity ``number``; of a complex one, its parts as Typed. () where unreadable."""
@@ -91,8 +95,8 @@ class Part21:
         return tuple(int(found) for found in _REFERENCE.findall(self.body(number)) if found)
 
     def listed(self, *keywords: str) -> Iterator[int]:
-        """The ids of all wanted entities with one of these keywords, in file order."""
-        return (number for number, keyword in self.keywords.items() if keyword in keywords)
+        """The ids of all wanted entities with one of these keywords, those of one in file order."""
+        return (number for keyword in keywords for number in self.ids.get(keyword, ()))
 
     def body(self, number: int) -> bytes:
         """The text of entity ``number`` from its bracket to before its semicolon; b"" where there is none."""
@@ -103,27 +107,31 @@ class Part21:
         return match[0] if match is not None else b""
 
 
-def scan(data: Buffer, wanted: frozenset[str], complex_hint: bytes = b"UNIT") -> Part21:
+def scan(data: Buffer, wanted: frozenset[str]) -> Part21:
     """Find the entities whose keyword is in ``wanted`` or ends in SHAPE_REPRESENTATION.
 
-    Of complex entities, those with ``complex_hint`` near their beginning: as it stands, the units.
+    Of complex entities: units, and relationships that place a part.
     """
     result = Part21(data)
-    wanted_bytes = frozenset(k.encode("ascii") for k in wanted)
+    names: dict[bytes, str | None] = {}
+    ordinal = 0
     for ordinal, match in enumerate(_ENTITY.finditer(data), start=1):
-        result.count = ordinal
-        result.highest = max(result.highest, int(match[1]))
-        keyword = match[2]
-        if keyword in wanted_bytes or keyword.endswith(b"SHAPE_REPRESENTATION"):
-            name = keyword.decode("ascii")
-        elif not keyword and complex_hint in data[match.end() : match.end() + 400]:
-            name = ""
-        else:
+        digits, keyword = match.groups()
+        if keyword not in names:
+            word = keyword.decode("ascii")
+            known = not word or word in wanted or word.endswith("SHAPE_REPRESENTATION")
+            names[keyword] = word if known else None
+        number = int(digits)
+        if number > result.highest:
+            result.highest = number
+        name = names[keyword]
+        if name is None or (not name and not _COMPLEX.search(data, match.end(), match.end() + 400)):
             continue
-        number = int(match[1])
         result.keywords[number] = name
+        result.ids[name].append(number)
         result.ordinals[number] = ordinal
         result.starts[number] = match.end() - 1
+    result.count = ordinal
     result.complete = data.rfind(_END) > 0
     return result
 

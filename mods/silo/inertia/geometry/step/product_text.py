@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 from silo.inertia.geometry.graph import IDENTITY, Child, Node, bottom_up, count_instances
+from silo.inertia.geometry.step.folder import bare_stem
 from silo.inertia.geometry.step.part21 import Part21, number, ref, refs, text
 from silo.inertia.geometry.step.stated_materials import names_of, stated_materials
 
@@ -60,6 +61,8 @@ WANTED = frozenset(
         "APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT",
         "CARTESIAN_TRANSFORMATION_OPERATOR_3D",
         "NEXT_ASSEMBLY_USAGE_OCCURRENCE",
+        "CONTEXT_DEPENDENT_SHAPE_REPRESENTATION",
+        "ITEM_DEFINED_TRANSFORMATION",
     )
 )
 
@@ -90,7 +93,7 @@ class Products:
 
     ``count`` is the number of entities: positions only mean something to a reader that counts as many.
     ``stretched`` counts the transformations that scale or mirror; ``uses`` are (assembly, part) as
-    PRODUCT_DEFINITION ids.
+    PRODUCT_DEFINITION ids; ``shaped`` are those that have geometry of their own.
     """
 
     facts: dict[int, ProductFacts] = field(default_factory=dict)
@@ -98,6 +101,18 @@ class Products:
     count: int = 0
     stretched: int = 0
     uses: tuple[tuple[int, int], ...] = ()
+    shaped: frozenset[int] = frozenset()
+
+    def elsewhere(self) -> set[str]:
+        """Names of the files that may hold products which have neither geometry nor parts here."""
+        full = self.shaped.union(assembly for assembly, _ in self.uses)
+        return {
+            name
+            for product, facts in self.facts.items()
+            if product not in full
+            for name in (*map(bare_stem, facts.documents), facts.name, facts.part_number)
+            if name
+        }
 
     def named(self, name: str) -> ProductFacts | None:
         """The facts of the only product with this name; None where there is none, or several."""
@@ -120,25 +135,23 @@ def read_products(source: Part21) -> Products:
     for pd, documents in _documents(source).items():
         if pd in facts:
             facts[pd] = replace(facts[pd], documents=documents)
+    items = [
+        (owner, item)
+        for representation, owner in _representation_owners(source).items()
+        for item in source.references(representation)
+        if source.keywords.get(item)
+    ]
     return Products(
         facts,
-        by_ordinal=_by_ordinal(source, facts),
+        by_ordinal={
+            **{source.ordinals[product]: product for product in facts},
+            **{source.ordinals[item]: owner for owner, item in items},
+        },
         count=source.count,
         stretched=_stretched(source),
         uses=tuple(_uses(source, facts)),
+        shaped=frozenset(owner for owner, item in items if source.keywords[item] in _ITEMS),
     )
-
-
-def _by_ordinal(source: Part21, facts: dict[int, ProductFacts]) -> dict[int, int]:
-    owner = _representation_owners(source)
-    result = {source.ordinals[pd]: pd for pd in facts}
-    for number_, keyword in source.keywords.items():
-        if keyword.endswith("SHAPE_REPRESENTATION") and number_ in owner:
-            arguments = source.arguments(number_)
-            for item in refs(arguments[1]) if len(arguments) > 1 else ():
-                if item in source.ordinals:
-                    result[source.ordinals[item]] = owner[number_]
-    return result
 
 
 def _representation_owners(source: Part21) -> dict[int, int]:
@@ -170,8 +183,9 @@ def _uses(source: Part21, facts: dict[int, ProductFacts]) -> Iterator[tuple[int,
 def count_placed(products: Products) -> int:
     """How many placed parts the file's structure amounts to. InputError where a product contains itself."""
     children: dict[int, list[Child]] = {pd: [] for pd in products.facts}
+    use = {pd: Child("", str(pd), IDENTITY) for pd in products.facts}
     for assembly, part in products.uses:
-        children[assembly].append(Child("", str(part), IDENTITY))
+        children[assembly].append(use[part])
     nodes = {
         str(pd): Node(str(pd), products.facts[pd].name, tuple(found), not found)
         for pd, found in children.items()

@@ -10,7 +10,7 @@ from silo.bom.errors import DocumentError, InputError
 from silo.inertia.geometry.checks import coincident_problems, implausible_size, name_problems, scaled_problems
 from silo.inertia.geometry.graph import unfold
 from silo.inertia.geometry.helpers import Helpers
-from silo.inertia.geometry.kernel.brep import load_kernel, measure_all
+from silo.inertia.geometry.kernel.brep import measure_all
 from silo.inertia.geometry.measured import no_solid
 from silo.inertia.geometry.options import Reading, ReadOptions, Report
 from silo.inertia.geometry.step.checks import against_stated, lost_stretches, split_problems, stated_totals
@@ -18,9 +18,6 @@ from silo.inertia.geometry.step.prepare import Prepared
 from silo.inertia.geometry.step.siblings import Siblings
 from silo.inertia.geometry.step.xcaf import StepFile, load
 from silo.inertia.model import Assembly, GeometryCode, GeometryProblem, Prototype
-
-MANY_FACES = 3000
-"""From so many on, measuring takes so long that a second processor is worth its start."""
 
 
 def read_step(
@@ -33,16 +30,11 @@ def read_step(
     """The assembly of a STEP file, with what belongs to it from beside it. Raises DocumentError.
 
     text
-        gives what :func:`prepare` found, where a helper was asked already.
+        gives what was found in the file's text, where that was begun already.
     """
     helpers = helpers or Helpers()
     report("reading", 0, 0)
-    prepared = text() if text is not None else None
-    if prepared is not None and prepared.faces >= MANY_FACES:
-        helpers.prepare(load_kernel)
-    elif prepared is not None:
-        helpers.end()
-    step = load(path, max_instances=options.max_instances, text=prepared)
+    step = load(path, max_instances=options.max_instances, text=text() if text is not None else None)
     siblings = Siblings(step, options, helpers, lambda name: report(f"reading {name}", 0, 0))
     siblings.resolve()
     try:
@@ -76,7 +68,7 @@ def read_step(
         unit=step.unit,
         frames=unfolded.frames,
     )
-    return Reading(assembly, others=tuple(siblings.used), missing=tuple(siblings.missing))
+    return Reading(assembly, tuple(siblings.used), tuple(siblings.missing), kept=step.kept)
 
 
 def _prototype(step: StepFile, key: str, known: GeometryProblem | None) -> Prototype:

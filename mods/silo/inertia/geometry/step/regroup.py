@@ -14,7 +14,7 @@ from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from silo.inertia.geometry.step.part21 import Buffer, Part21, ref, refs, scan
+from silo.inertia.geometry.step.part21 import Buffer, Part21, ref, refs
 from silo.inertia.geometry.step.product_text import Products
 
 GROUP_FROM = 1_000
@@ -23,20 +23,6 @@ MARK = "silo-mod:group:"
 """What the products of our groups are called; no file has it."""
 
 _USE = "NEXT_ASSEMBLY_USAGE_OCCURRENCE"
-_KEYWORDS = frozenset(
-    (
-        _USE,
-        "PRODUCT_DEFINITION",
-        "PRODUCT_DEFINITION_FORMATION",
-        "PRODUCT_DEFINITION_FORMATION_WITH_SPECIFIED_SOURCE",
-        "PRODUCT",
-        "PRODUCT_DEFINITION_SHAPE",
-        "SHAPE_DEFINITION_REPRESENTATION",
-        "CONTEXT_DEPENDENT_SHAPE_REPRESENTATION",
-        "SHAPE_REPRESENTATION",
-        "ITEM_DEFINED_TRANSFORMATION",
-    )
-)
 _REFERENCE = re.compile(rb"'(?:[^']|'')*'|#(\d+)")
 _TIED = re.compile(
     rb"(?<![A-Z_])REPRESENTATION_RELATIONSHIP\s*\((?:'(?:[^']|'')*'|[\s,$])*#(\d+)\s*,\s*#(\d+)"
@@ -67,7 +53,7 @@ class _Flat:
     uses: list[_Use] = field(default_factory=list)
 
 
-def regrouped(data: Buffer, products: Products) -> tuple[bytes | None, int]:
+def regrouped(source: Part21, products: Products) -> tuple[bytes | None, int]:
     """The text with groups in its flat assemblies, and how many entities were added at its end.
 
     (None, 0) where no assembly is flat, or nothing can be done.
@@ -78,7 +64,7 @@ def regrouped(data: Buffer, products: Products) -> tuple[bytes | None, int]:
     flat = [assembly for assembly, count in counts.items() if count >= GROUP_FROM]
     if not flat:
         return None, 0
-    source = scan(data, _KEYWORDS, b"REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION")
+    data = source.data
     found = [_flat(source, assembly) for assembly in flat]
     cuttable = [one for one in found if one is not None]
     end = _DATA_END.search(data)

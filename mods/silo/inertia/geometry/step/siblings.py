@@ -17,7 +17,6 @@ from pathlib import Path
 from silo.bom.errors import DocumentError, InputError
 from silo.inertia.geometry.graph import Child, bottom_up
 from silo.inertia.geometry.helpers import WORTH_HELP, Helpers
-from silo.inertia.geometry.kernel.brep import load_kernel
 from silo.inertia.geometry.kernel.solids import measure
 from silo.inertia.geometry.labels import file_key
 from silo.inertia.geometry.options import ReadOptions
@@ -70,7 +69,7 @@ class Siblings:
         sizes = {path: path.stat().st_size for path in paths if path.is_file()}
         paths.sort(key=lambda path: -sizes.get(path, 0))
         if len(paths) > 1 and sum(sizes.values()) >= WORTH_HELP and self._helpers.start():
-            self._helpers.prepare(load_kernel)
+            self._helpers.load_kernel()
         options = self._options
         rows = [
             (path, f"{path.relative_to(self._root).as_posix()}#", options.eps, options.mesh_check)
@@ -163,4 +162,5 @@ def part_file(path: Path, prefix: str, eps: float, mesh_check: bool) -> StepFile
         key: measure(shapes, eps=eps, mesh_check=mesh_check) for key, shapes in part.shapes.items()
     }
     part.shapes.clear()
+    part.kept = ()
     return part

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections import defaultdict
 
 from silo.inertia.geometry.step.part21 import Part21, Typed, Value, number, ref, refs, text
-from silo.inertia.materials.density import DENSEST, LIGHTEST
 
 _PREFIXES = {
     ".EXA.": 1e18, ".PETA.": 1e15, ".TERA.": 1e12, ".GIGA.": 1e9, ".MEGA.": 1e6, ".KILO.": 1e3,
@@ -73,6 +72,9 @@ def _density(source: Part21, item: tuple[Value, ...]) -> tuple[float | None, str
     if value is None or factor is None:
         return None, "a density is given, but its unit cannot be read; it is not used"
     density = value * factor
+    # Late: few files state a density, and this loads the tables.
+    from silo.inertia.materials.density import DENSEST, LIGHTEST
+
     if not LIGHTEST <= density <= DENSEST:
         return None, (
             f"a density of {density:.4g} kg/m3 is given, which no material has; its unit must be wrong, and "

@@ -50,6 +50,8 @@ class StepFile:
         of each product with a shape of its own: the kernel's, or what was measured of them already.
     empty
         products without children and without any edge: their geometry is somewhere else.
+    kept
+        the kernel's document. Taking a large one down takes longer than reading on.
     """
 
     path: Path
@@ -63,6 +65,7 @@ class StepFile:
     stated: dict[str, Stated] = field(default_factory=dict)
     unnamed: set[str] = field(default_factory=set)
     roots: list[Child] = field(default_factory=list)
+    kept: tuple[Any, ...] = ()
 
     def take_in(self, other: StepFile) -> None:
         """Add another file's products; its keys must be its own."""
@@ -93,7 +96,9 @@ def load(
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True, prefix="silo-step-") as folder:
         text = text or prepare(path, Path(folder), max_instances)
         document, reader = _transferred(text.source, path)
-    return _Walk(path, prefix, document, reader, text.products).run()
+    step = _Walk(path, prefix, document, reader, text.products).run()
+    step.kept = (document, reader)
+    return step
 
 
 def _transferred(source: Path, named: Path) -> tuple[Any, Any]:
@@ -110,6 +115,18 @@ def _transferred(source: Path, named: Path) -> tuple[Any, Any]:
     return document, reader
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class _Used:
+    """A product that others use. ``made_up``: the kernel made this leaf of a product's mixed bodies, and it
+    is no product itself."""
+
+    label: Any
+    key: str
+    name: str
+    facts: ProductFacts | None
+    made_up: bool
+
+
 class _Walk:
     """From the kernel's document to nodes; lives for one file."""
 
@@ -119,7 +136,7 @@ class _Walk:
         self._prefix = prefix
         self._products = products
         self._owners = _owners(reader, products)
-        self._known: dict[str, ProductFacts | None] = {}
+        self._known: dict[str, _Used] = {}
         self._file = StepFile(path, unit=_unit(reader), stretched=products.stretched)
         self._fallback = clean(path.stem) or "part"
 
@@ -127,8 +144,8 @@ class _Walk:
         free = occt.LabelSequence()
         self._tool.GetFreeShapes(free)
         for label in occt.labels(free):
-            key = self._key(label)
-            self._visit_all(label, self._fallback)
+            key = self._prefix + occt.entry(label)
+            self._visit_all(key, label)
             self._file.roots.append(Child(self._file.nodes[key].name, key))
         if not self._file.roots:
             raise DocumentError(str(self._file.path), "holds no product and no shape")
@@ -139,24 +156,19 @@ class _Walk:
         ]
         return self._file
 
-    def _key(self, label: Any) -> str:
-        return self._prefix + occt.entry(label)
-
-    def _visit_all(self, top: Any, fallback: str) -> None:
-        waiting = [(top, fallback)]
+    def _visit_all(self, top: str, label: Any) -> None:
+        waiting = [(top, label, self._fallback)]
         while waiting:
-            label, around = waiting.pop()
-            key = self._key(label)
-            if key in self._file.nodes:
-                continue
-            node, inside = self._node(label, key, around)
-            self._file.nodes[key] = node
-            waiting.extend((child, node.name) for child in inside)
+            key, label, around = waiting.pop()
+            if key not in self._file.nodes:
+                node, inside = self._node(label, key, around)
+                self._file.nodes[key] = node
+                waiting.extend((used.key, used.label, node.name) for used in inside)
 
-    def _node(self, label: Any, key: str, around: str) -> tuple[Node, list[Any]]:
+    def _node(self, label: Any, key: str, around: str) -> tuple[Node, list[_Used]]:
         children, inside, own, facts = self._inside(label)
         if not self._tool.IsAssembly_s(label):
-            own, facts = [self._tool.GetShape_s(label)], self._facts(label)
+            own, facts = [self._tool.GetShape_s(label)], self._used(label).facts
         name = clean(occt.name_of(label))
         if is_generic(name) and (facts is None or facts.name != name):
             name = around
@@ -167,23 +179,22 @@ class _Walk:
         self._file.stated[key] = _stated(label)
         return Node(key, name, tuple(children), has_geometry=bool(own)), inside
 
-    def _inside(self, label: Any) -> tuple[list[Child], list[Any], list[Any], ProductFacts | None]:
-        """Uses of products, the products' labels, the shapes that are the label's own, and their facts."""
+    def _inside(self, label: Any) -> tuple[list[Child], list[_Used], list[Any], ProductFacts | None]:
+        """Uses of products, the products, the shapes that are the label's own, and their facts."""
         children: list[Child] = []
-        inside: list[Any] = []
+        inside: dict[str, _Used] = {}
         own: list[Any] = []
         known: ProductFacts | None = None
-        for component, target in self._components(label):
-            facts = self._facts(target)
-            if self._is_made_up(target, facts):
+        for component, used in self._components(label):
+            if used.made_up:
                 own.append(self._tool.GetShape_s(component))
-                known = known or facts
+                known = known or used.facts
             else:
-                children.append(self._child(component, target))
-                inside.append(target)
-        return children, inside, own, known
+                children.append(self._child(component, used))
+                inside[used.key] = used
+        return children, list(inside.values()), own, known
 
-    def _components(self, label: Any) -> Iterator[tuple[Any, Any]]:
+    def _components(self, label: Any) -> Iterator[tuple[Any, _Used]]:
         """Uses and what they use; groups of our own making are seen through."""
         components = occt.LabelSequence()
         if self._tool.IsAssembly_s(label):
@@ -191,34 +202,31 @@ class _Walk:
         for component in occt.labels(components):
             target = occt.new_label()
             self._tool.GetReferredShape_s(component, target)
-            if occt.name_of(target).startswith(MARK):
+            used = self._used(target)
+            if used.name.startswith(MARK):
                 yield from self._components(target)
             else:
-                yield component, target
+                yield component, used
 
-    def _is_made_up(self, target: Any, facts: ProductFacts | None) -> bool:
-        """True for a leaf that the kernel made of a product's mixed bodies, and that is no product itself."""
-        name = clean(occt.name_of(target))
-        return (
-            is_generic(name) and not self._tool.IsAssembly_s(target) and (facts is None or facts.name != name)
-        )
+    def _used(self, target: Any) -> _Used:
+        # Asked once for every use of a product, and slow to answer.
+        entry = occt.entry(target)
+        if entry not in self._known:
+            name = clean(occt.name_of(target))
+            facts = self._facts(target) if not name.startswith(MARK) else None
+            leaf = is_generic(name) and not self._tool.IsAssembly_s(target)
+            made_up = leaf and (facts is None or facts.name != name)
+            self._known[entry] = _Used(target, self._prefix + entry, name, facts, made_up)
+        return self._known[entry]
 
-    def _child(self, component: Any, target: Any) -> Child:
+    def _child(self, component: Any, used: _Used) -> Child:
         name = clean(occt.name_of(component))
         if is_generic(name):
-            product = clean(occt.name_of(target))
-            name = self._fallback if is_generic(product) else product
+            name = self._fallback if is_generic(used.name) else used.name
         matrix = in_metres(trsf_matrix(self._tool.GetLocation_s(component).Transformation()))
-        return Child(name, self._key(target), matrix)
+        return Child(name, used.key, matrix)
 
     def _facts(self, label: Any) -> ProductFacts | None:
-        # Asked once for every use of a product, and slow to answer.
-        key = occt.entry(label)
-        if key not in self._known:
-            self._known[key] = self._found(label)
-        return self._known[key]
-
-    def _found(self, label: Any) -> ProductFacts | None:
         shape = self._tool.GetShape_s(label)
         if shape is None or shape.IsNull():
             return None
