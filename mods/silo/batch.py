@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import os
 import uuid
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from silo.api.wire import SourceDocument
@@ -21,7 +21,17 @@ from silo.bom.findings import Finding
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.paths import relative
 from silo.bom.report import base_of, diff_json, entry_json, finding_json, project_folder
-from silo.bom_sync import Outcome, Resolved, Status, SyncApi, blocking, resolve, sync_tree
+from silo.bom_sync import (
+    Outcome,
+    Resolved,
+    Status,
+    SyncApi,
+    assemblies,
+    blocking,
+    resolve,
+    server_lines,
+    sync_tree,
+)
 from silo.files import sha256_of
 
 _FINE = (Status.MERGED, Status.UNCHANGED, Status.DRY_RUN)
@@ -91,10 +101,54 @@ def sync_top(top: str, found: Extraction | SiloError, api: SyncApi, options: Opt
         return TopResult(top, base, skipped="only parts of its own, and no item: a library of parts")
     try:
         whole = resolve(found, api)
+        broken = [one for one in assemblies(whole) if any(entry.missing for entry in one.entries)]
+        whole = suggest_by_identity(whole, [(one, server_lines(one, api)) for one in broken])
         outcomes = tuple(_outcomes(whole, api, options))
     except SiloError as error:
         return TopResult(top, base, error=error)
     return TopResult(top, base, whole, outcomes)
+
+
+def _identities_before(
+    compared: Iterable[tuple[Resolved, Iterable[Mapping[str, Any]]]],
+) -> dict[tuple[str, str], str]:
+    """What the last syncs said of components: (file, object) → the Silo UUID of its item.
+
+    compared
+        assemblies, each with the server's lines.
+    """
+    found: dict[tuple[str, str], str] = {}
+    for one, lines in compared:
+        for line in lines:
+            for part in line.get("components") or ():
+                if line.get("child_id") and isinstance(part.get("file"), str):
+                    path = os.path.normpath(os.path.join(one.folder, part["file"]))
+                    found[path, str(part.get("object") or "")] = str(line["child_id"])
+    return found
+
+
+def suggest_by_identity(
+    whole: Resolved,
+    compared: Sequence[tuple[Resolved, Iterable[Mapping[str, Any]]]],
+    candidates: Callable[[Iterable[str]], Iterable[str]] | None = None,
+) -> Resolved:
+    """Findings of missing files, with the one that has the identity known from the last sync.
+
+    compared
+        assemblies, each with the server's lines.
+    candidates
+        UUIDs → the files that may carry one of them; None: any file of the project.
+    """
+    lacking = [(one, lines) for one, lines in compared if any(entry.missing for entry in one.entries)]
+    known = _identities_before(lacking)
+    if not known:
+        return whole
+    from silo.fcstd.suggest import with_suggestions
+
+    entries = (*whole.entries, *whole.unresolved)
+    files = None if candidates is None else tuple(candidates(known.values()))
+    told = with_suggestions(Extraction(whole.assembly, entries, whole.findings), known, files)
+    return replace(whole, findings=told.findings)
 
 
 def stopped_by(result: TopResult, api: object = None) -> SiloError | None:

@@ -61,7 +61,6 @@ __all__ = [
     "diff_bom",
     "extract",
     "extract_bom_links",
-    "identities_before",
     "plan_merge",
     "resolve",
     "resolve_part_numbers",
@@ -127,18 +126,32 @@ class Resolved:
         """What a merge into these lines of the server would do."""
         return plan_merge(self.entries, lines, self._missing())
 
-    def is_news(self, plan: MergePlan) -> bool:
-        """True where the server learns anything from this merge, if only that the BOM is (in)complete now."""
+    def is_news(self, plan: MergePlan, lines: Iterable[Mapping[str, Any]] = ()) -> bool:
+        """True where the server learns anything from this merge into these lines of its own: if only that the
+        BOM is (in)complete now, or that a component has another file."""
         if plan.news:
             return True
         last = self.last_syncs.get(self.assembly.silo_uuid or "")
         if last is None:
             return False
         known = LastSync.model_validate(last) if isinstance(last, Mapping) else last
-        return known.at is None or _texts(known.left_out) != _texts(_left_out(self))
+        if known.at is None or _texts(known.left_out) != _texts(_left_out(self)):
+            return True
+        before = {line["child_part_number"]: _places(line.get("components") or ()) for line in lines}
+        now: dict[str, set[tuple[str, str]]] = {}
+        for entry in self.entries:
+            if (number := entry.part_number or "") in before and not entry.missing:
+                now.setdefault(number, set()).update(_places(components_of(entry, self.folder)))
+        for change in plan.diff.kept:
+            now.pop(change.part_number, None)
+        return any(before[number] != places for number, places in now.items())
 
     def _missing(self) -> list[tuple[str, str]]:
         return [(relative(e.doc_path, self.folder), e.object_name) for e in self.entries if e.missing]
+
+
+def _places(components: Iterable[Mapping[str, Any]]) -> set[tuple[str, str]]:
+    return {(one.get("file") or "", one.get("object") or "") for one in components}
 
 
 def _left_out(resolved: Resolved) -> list[LeftOutPart]:
@@ -215,24 +228,6 @@ def plain_lines(lines: Iterable[Any]) -> tuple[Mapping[str, Any], ...]:
     return tuple(line if isinstance(line, Mapping) else line.model_dump() for line in lines)
 
 
-def identities_before(
-    compared: Iterable[tuple[Resolved, Iterable[Mapping[str, Any]]]],
-) -> dict[tuple[str, str], str]:
-    """What the last syncs said of components: (file, object) → the Silo UUID of its item.
-
-    compared
-        assemblies, each with the server's lines.
-    """
-    found: dict[tuple[str, str], str] = {}
-    for one, lines in compared:
-        for line in lines:
-            for part in line.get("components") or ():
-                if line.get("child_id") and isinstance(part.get("file"), str):
-                    path = os.path.normpath(os.path.join(one.folder, part["file"]))
-                    found[path, str(part.get("object") or "")] = str(line["child_id"])
-    return found
-
-
 def compare(resolved: Resolved, api: SyncApi) -> MergePlan:
     """What a merge would do, against the server's lines as they are now."""
     return resolved.plan(server_lines(resolved, api))
@@ -262,7 +257,9 @@ def decide(resolved: Resolved, lines: Sequence[Mapping[str, Any]], *, allow_miss
     plan, names = resolved.plan(lines), names_of(resolved, lines)
     if blocking(resolved) and not allow_missing:
         return Outcome(Status.BLOCKED, resolved, plan, names=names)
-    return Outcome(Status.MERGED if resolved.is_news(plan) else Status.UNCHANGED, resolved, plan, names=names)
+    return Outcome(
+        Status.MERGED if resolved.is_news(plan, lines) else Status.UNCHANGED, resolved, plan, names=names
+    )
 
 
 def sync(

@@ -349,13 +349,42 @@ def test_a_live_link_is_asked_by_the_callers_function(top: Doc) -> None:
     """For live objects, ``inspect`` finds out why there is no target."""
     asked = []
 
-    def inspect(link: Any) -> LinkProblem:
-        asked.append(link.Name)
-        return LinkProblem(FindingCode.MISSING_FILE, "parts/b.FCStd", "Box")
+    def inspect(obj: Any) -> LinkProblem | None:
+        asked.append(obj.Name)
+        return LinkProblem(FindingCode.MISSING_FILE, "parts/b.FCStd", "Box") if obj.Name == "L1" else None
 
     found = extract(top.assembly(top.link("L1", None)), inspect=inspect)
-    assert asked == ["L1"]
+    assert asked == ["Assembly", "L1"]
     assert found.findings_of(FindingCode.MISSING_FILE)
+
+
+def test_a_live_component_of_a_damaged_file_is_a_missing_line(top: Doc, bolt: Any) -> None:
+    """FreeCAD opens what it finds of a damaged file; the caller's function looks at the file itself."""
+
+    def inspect(obj: Any) -> LinkProblem | None:
+        damaged = LinkProblem(FindingCode.UNREADABLE_FILE, *key, "it is cut short")
+        return damaged if obj is bolt else None
+
+    key = (bolt.Document.FileName, bolt.Name)
+
+    found = extract(top.assembly(top.link("L1", bolt), top.link("L2", bolt, ElementCount=3)), inspect=inspect)
+    assert [(entry.key, entry.quantity, entry.missing) for entry in found.entries] == [(key, 4, True)]
+    (finding,) = found.findings
+    assert (finding.code, finding.severity) == (FindingCode.UNREADABLE_FILE, Severity.ERROR)
+    assert "it is cut short" in finding.message
+
+
+def test_a_damaged_live_assembly_is_not_read(top: Doc, bolt: Any) -> None:
+    """What FreeCAD opened of it may be a part of it only."""
+    assembly = top.assembly(top.link("L1", bolt))
+
+    def inspect(obj: Any) -> LinkProblem | None:
+        damaged = LinkProblem(FindingCode.UNREADABLE_FILE, top.FileName, obj.Name, "it is cut short")
+        return damaged if obj is assembly else None
+
+    found = extract(assembly, inspect=inspect)
+    assert (found.entries, found.blocked) == ((), True)
+    assert found.findings_of(FindingCode.UNREADABLE_FILE)
 
 
 def test_a_link_that_was_never_set_does_not_block(top: Doc, bolt: Any) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -192,6 +193,40 @@ def test_a_missing_file_never_reads_as_removed(run: Any, silo: Any, gearbox: Pat
     assert [(one.reason, one.file) for one in last.left_out] == [("missing", "parts/Cover.FCStd")]
     again = run("sync", gearbox, "--allow-missing", "--json").json()["results"][0]["assemblies"][0]
     assert again["status"] == "unchanged"
+
+
+@pytest.mark.parametrize("folder", [False, True], ids=["file", "folder"])
+def test_sync_names_the_moved_file_by_the_identity_that_the_server_knows(
+    run: Any, silo: Any, gearbox: Path, folder: bool
+) -> None:
+    """Renamed and moved, while an old copy without identity has the old name."""
+    cover = gearbox.parent / "parts" / "Cover.FCStd"
+    (gearbox.parent / "old").mkdir()
+    shutil.copy(cover, gearbox.parent / "old" / "Cover.FCStd")
+    run("register", gearbox, "--yes")
+    run("sync", gearbox, "--recursive")
+    (gearbox.parent / "stock").mkdir()
+    cover.rename(gearbox.parent / "stock" / "Lid.FCStd")
+    local = run("bom", gearbox, "--json").json()["findings"]
+    assert [one["did_you_mean"] for one in local if one["code"] == "missing_file"] == ["old/Cover.FCStd"]
+    ran = run("sync", gearbox.parent if folder else gearbox, "--json")
+    assert ran.code == 1
+    [cause] = [
+        cause
+        for result in ran.json()["results"]
+        for outcome in result["assemblies"]
+        for cause in outcome.get("blocked_by", ())
+    ]
+    assert "stock/Lid.FCStd (it carries the Silo identity)?" in cause["message"]
+    assert run("relink", gearbox, "--from", "parts/Cover.FCStd", "--to", "stock/Lid.FCStd").code == 0
+    # Nothing changes in the BOM, and the server hears where the component lies now: if it is missing again,
+    # its line must not read as removed.
+    for status in ("merged", "unchanged"):
+        again = run("sync", gearbox, "--json").json()["results"][0]["assemblies"][0]
+        assert (again["status"], again["diff"]["removed"]) == (status, [])
+    os.remove(gearbox.parent / "stock" / "Lid.FCStd")
+    allowed = run("sync", gearbox, "--allow-missing", "--json").json()["results"][0]["assemblies"][0]
+    assert (len(allowed["diff"]["kept"]), allowed["diff"]["removed"]) == (1, [])
 
 
 def test_a_component_that_is_back_makes_the_bom_complete_again(run: Any, silo: Any, gearbox: Path) -> None:

@@ -98,3 +98,33 @@ def test_a_broken_file_is_told_with_its_reason(session: dict[str, Any]) -> None:
     """Not in FreeCAD's words but in ours."""
     assert "truncated_zip/bad.FCStd: " in session["broken_file"]
     assert "opened" not in session["broken_file"]
+
+
+def test_a_damaged_part_is_a_missing_line_as_in_its_file(session: dict[str, Any]) -> None:
+    """FreeCAD opens a part that was cut short without a word, its shape missing."""
+    of_part = [answer for answer in session["damaged_files"] if answer["file"] == "bolt.FCStd"]
+    assert {answer["damage"] for answer in of_part if answer["live"]["blocked"]} >= {
+        *("_cut_behind_xml", "_without_directory", "_one_bit")
+    }
+    for answer in of_part:
+        assert answer["live"] == answer["from file"], answer["damage"]
+        if answer["live"]["blocked"]:
+            assert answer["live"] == {"bom": {"Bolt": 1}, "findings": ["unreadable_file"], "blocked": True}
+            assert "bolt.FCStd cannot be read" in answer["messages"][0]
+
+
+def test_a_damaged_assembly_blocks_whatever_freecad_opened_of_it(session: dict[str, Any]) -> None:
+    """As much of it as FreeCAD found must not read as the whole."""
+    of_top = [answer for answer in session["damaged_files"] if answer["file"] == "top.FCStd"]
+    for answer in of_top:
+        assert "refused" in answer["from file"], answer["damage"]
+        if "live" in answer:
+            assert answer["live"] == {"bom": {}, "findings": ["unreadable_file"], "blocked": True}
+    assert sum("live" in answer for answer in of_top) >= 3
+
+
+def test_a_damaged_file_is_not_saved_over(session: dict[str, Any]) -> None:
+    """Saving what FreeCAD opened of it would make the loss final."""
+    for answer in session["damaged_files"]:
+        assert answer["unchanged"], answer
+        assert answer["refused"], answer

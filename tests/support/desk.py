@@ -128,6 +128,9 @@ class Documents:
     def lost_assemblies(self, _doc: Any, /) -> list[str]:
         return []
 
+    def is_damaged(self, _doc: Any, /) -> bool:
+        return False
+
     def save(self, doc: Any, /) -> None:
         if doc.closed:
             raise ReferenceError("Cannot access attribute of deleted object")

@@ -61,7 +61,8 @@ def extract(
     """Walk an assembly.
 
     inspect
-        says why a live link has no target; links read from FCStd files know it themselves.
+        says what is wrong with a live object (see :func:`silo.bom.walk.targets.resolve_target`); links read
+        from FCStd files know it themselves.
     canonical
         makes one path of the several that may name one file (``os.path.realpath`` for live documents).
     whole

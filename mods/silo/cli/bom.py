@@ -8,6 +8,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import replace
 
+from silo.batch import suggest_by_identity
 from silo.bom.errors import InputError, SiloError
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.paths import relative
@@ -54,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
             resolved = resolve(extraction, client)
             broken = [one for one in assemblies(resolved) if any(e.missing for e in one.entries)]
             compared = [(one, server_lines(one, client)) for one in broken]
-            resolved = common.suggest_by_identity(extraction, resolved, compared)
+            resolved = suggest_by_identity(resolved, compared)
         known = {entry.key: entry for entry in resolved.unresolved}
         head = _whole(replace(resolved.assembly, children=resolved.entries), known)
         extraction = Extraction(resolved.assembly, head.children, resolved.findings)

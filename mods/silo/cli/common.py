@@ -10,7 +10,7 @@ import os
 import socket
 import sys
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -27,7 +27,6 @@ from silo.platform import hold_lock
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
-    from silo.bom_sync import Resolved
     from silo.vault.plan import Plan
     from silo.vault.reading import Reading
 
@@ -169,21 +168,6 @@ def read_assembly(top: str, assembly: str | None = None, *, hardware: bool = Tru
         found = extract(choose_assembly(document, assembly), hardware=hardware)
         told = respelt_findings(library.notes, document.FileName)
     return with_suggestions(replace(found, findings=(*found.findings, *told)))
-
-
-def suggest_by_identity(
-    extraction: Extraction,
-    whole: Resolved,
-    compared: Iterable[tuple[Resolved, Iterable[Mapping[str, Any]]]],
-) -> Resolved:
-    """Missing files with the one that carries the identity which the server knows from the last sync."""
-    from silo.bom_sync import identities_before
-    from silo.fcstd.suggest import with_suggestions
-
-    if not any(entry.missing for entry in walk_entries(extraction.entries)):
-        return whole
-    known = replace(extraction, findings=whole.findings)
-    return replace(whole, findings=with_suggestions(known, identities_before(compared)).findings)
 
 
 def read_top(args: argparse.Namespace) -> Extraction:

@@ -8,6 +8,7 @@ import os
 from itertools import chain
 from typing import Any
 
+from silo.batch import suggest_by_identity
 from silo.bom.diff import diff_findings
 from silo.bom.model import BomDiff
 from silo.bom.naming import display_name
@@ -44,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
         whole = resolve(extraction, client)
         chosen = list(assemblies(whole)) if args.recursive else [whole]
         lines = [server_lines(one, client) for one in chosen]
-        whole = common.suggest_by_identity(extraction, whole, zip(chosen, lines, strict=True))
+        whole = suggest_by_identity(whole, list(zip(chosen, lines, strict=True)))
     compared = [(one, one.diff(known)) for one, known in zip(chosen, lines, strict=True)]
     base = base_of(extraction)
     drifted = bool(whole.unresolved or whole.assembly.part_number is None) or any(

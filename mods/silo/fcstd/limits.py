@@ -45,3 +45,7 @@ class Limits:
     side_entry: int = 32 * _MB
     documents: int = 20_000
     resident: int = 48 * _MB
+
+
+# For a file that FreeCAD has opened: whatever its size, FreeCAD had the memory for it.
+ANY_SIZE = Limits(1 << 32, 1 << 32, 2000, entries=1 << 30, objects=1 << 30, side_entry=1 << 32)

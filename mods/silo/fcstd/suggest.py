@@ -43,19 +43,21 @@ class _Lost:
     stamps: set[str] = field(default_factory=set)
 
 
-def with_suggestions(extraction: Extraction, identities: Identities | None = None) -> Extraction:
+def with_suggestions(
+    extraction: Extraction, identities: Identities | None = None, files: Iterable[str] | None = None
+) -> Extraction:
     """The extraction, its findings of missing files with the file that was probably meant.
 
-    Reads the project's files; costs nothing where no file is missing.
+    Reads the project's files, or those of ``files``; costs nothing where no file is missing.
     """
     lost = _lost(extraction)
-    if not lost:
+    if not lost or (files is not None and not (files := list(files))):
         return extraction
     with Library() as library:
         _read_stamps(extraction, lost, library)
-        files = list(_project_files(extraction))
+        files = _project_files(extraction) if files is None else files
         used = {entry.doc_path for entry in walk_entries((extraction.assembly, *extraction.entries))}
-        project = _Project(library, files, used, identities or {})
+        project = _Project(library, list(files), used, identities or {})
         meant = {file: found for file, one in lost.items() if (found := project.meant(one))}
     findings = tuple(_told(finding, meant, extraction) for finding in extraction.findings)
     return replace(extraction, findings=findings)

@@ -19,7 +19,7 @@ from typing import Any
 
 from silo.api.policy import ends_run
 from silo.api.wire import SourceDocument
-from silo.batch import Options, TopResult, source_document
+from silo.batch import Options, TopResult, source_document, suggest_by_identity
 from silo.bom.errors import DocumentError, SiloError
 from silo.bom.findings import FindingCode
 from silo.bom.resolve import Known
@@ -100,6 +100,7 @@ class Job:
         several = [resolve_known(self.plan.extraction(node, self.reading), known) for node in nodes]
         numbers = [one.assembly.part_number for one in several]
         lines = self._lines([number for number in numbers if number is not None])
+        several = [self._meant(one, lines) for one in several]
         with ThreadPoolExecutor(self.senders, "silo-merge") as pool:
             asked = []
             for one in several:
@@ -116,6 +117,16 @@ class Job:
             outcome if outcome.resolved is one else _as_the_first(one, outcome)
             for one, outcome in zip(several, found, strict=True)
         ]
+
+    def _meant(self, one: Resolved, lines: Lines) -> Resolved:
+        """Missing files, with those that have the identity which the server knows from the last sync."""
+        known = lines.get(one.assembly.part_number or "", ())
+        return suggest_by_identity(one, [(one, known)], self._files_with if self.base else None)
+
+    def _files_with(self, identities: Iterable[str]) -> set[str]:
+        """The files of the folder that have one of these identities: all were read, none is read again."""
+        wanted = {identity.lower() for identity in identities}
+        return {path for identity, path in self.plan.places | self.plan.spares if identity in wanted}
 
     def _lines(self, numbers: Sequence[str]) -> Lines:
         many = getattr(self.api, "get_boms", None)

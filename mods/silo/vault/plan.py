@@ -63,6 +63,8 @@ class Plan:
         all that is to be looked up: identities, and the standard parts by theirs.
     places
         (identity, file) of every component.
+    spares
+        the same of files that hold no components of others, used or not.
     findings, shared
         what only the whole plan shows: of one assembly, and of none.
     """
@@ -75,6 +77,7 @@ class Plan:
     uuids: dict[str, None] = field(default_factory=dict)
     standards: dict[str, BomEntry] = field(default_factory=dict)
     places: set[tuple[str, str]] = field(default_factory=set)
+    spares: set[tuple[str, str]] = field(default_factory=set)
     findings: dict[Key, list[Finding]] = field(default_factory=dict)
     shared: list[Finding] = field(default_factory=list)
     _assemblies: dict[Key, bool] = field(default_factory=dict)
@@ -125,6 +128,7 @@ def make_plan(
         plan._files.setdefault(node.key[0], top)
         if skip_parts and _is_part(answer.plain):
             plan.parts += 1
+            plan.spares.add(((node.uuid or "").lower(), node.key[0]))
             plan._assemblies.setdefault(node.key, node.is_assembly)
         else:
             _add(plan, node, answer, wanted)

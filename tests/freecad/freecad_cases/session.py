@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import sys
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +20,10 @@ sys.path.insert(0, os.environ["SILO_MODS"])
 import FreeCAD as App  # noqa: E402
 
 from silo.bom.errors import SiloError  # noqa: E402
+from silo.bom.links import extract  # noqa: E402
 from silo.bom.model import Extraction  # noqa: E402
+from silo.bom.roots import choose_assembly  # noqa: E402
+from silo.fcstd import Library  # noqa: E402
 from silo.workbench.freecad import host, live, saving  # noqa: E402
 
 CASES = Path(os.environ["SILO_CASES"]) / "asm4"
@@ -102,6 +107,70 @@ def broken_file() -> str:
     return "opened"
 
 
+def _cut_behind_xml(path: Path) -> None:
+    """A copy that broke off: FreeCAD reads from the beginning, and finds all but the shapes."""
+    with zipfile.ZipFile(path) as whole:
+        end = whole.infolist()[1].header_offset
+    path.write_bytes(path.read_bytes()[:end])
+
+
+def _without_directory(path: Path) -> None:
+    with zipfile.ZipFile(path) as whole:
+        end = whole.start_dir
+    path.write_bytes(path.read_bytes()[: end + 20])
+
+
+def _one_bit(path: Path) -> None:
+    with zipfile.ZipFile(path) as whole:
+        first, second = whole.infolist()[:2]
+    content = bytearray(path.read_bytes())
+    content[(first.header_offset + 3 * second.header_offset) // 4] ^= 0x10
+    path.write_bytes(bytes(content))
+
+
+def _short_xml(path: Path) -> None:
+    with zipfile.ZipFile(path) as whole:
+        entries = {name: whole.read(name) for name in whole.namelist()}
+    text = entries["Document.xml"]
+    entries["Document.xml"] = text[: text.rindex(b"<Object name=")]
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as short:
+        for name, content in entries.items():
+            short.writestr(name, content)
+
+
+def _from_file(path: Path) -> dict[str, Any]:
+    try:
+        return told(extract(choose_assembly(Library().open(path))))
+    except SiloError as error:
+        return {"refused": str(error).partition(": ")[2]}
+
+
+def damaged_files() -> list[dict[str, Any]]:
+    """Each damage of the part, then of the assembly: what FreeCAD's objects and the file's say."""
+    answers = []
+    for damage in (_cut_behind_xml, _without_directory, _one_bit, _short_xml):
+        for name in ("bolt.FCStd", "top.FCStd"):
+            folder = CASES / f"damaged_{damage.__name__}_{name}"
+            shutil.copytree(CASES / "plain_link", folder)
+            damage(folder / name)
+            before = (folder / name).read_bytes()
+            answer: dict[str, Any] = {"damage": damage.__name__, "file": name, "from file": None}
+            answer["from file"] = _from_file(folder / "top.FCStd")
+            try:
+                doc = saving.open_fully(str(folder / "top.FCStd"))
+                found = live.extract_live(doc)
+                answer["live"] = told(found)
+                answer["messages"] = [finding.message for finding in found.findings]
+                damaged = doc if name == "top.FCStd" else saving.open_fully(str(folder / name))
+                saving.save(damaged)
+            except SiloError as error:
+                answer["refused"] = str(error)
+            answer["unchanged"] = (folder / name).read_bytes() == before
+            answers.append(answer)
+            host.close_all()
+    return answers
+
+
 def lost_original() -> dict[str, Any]:
     folder = CASES / "copy_on_change"
     (folder / "bolt.FCStd").unlink()
@@ -121,6 +190,7 @@ def main() -> None:
         lost_original,
         hostile_file,
         broken_file,
+        damaged_files,
     ):
         answers[step.__name__] = step()
         host.close_all()

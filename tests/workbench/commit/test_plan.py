@@ -59,6 +59,9 @@ class Documents:
     def lost_assemblies(self, doc: Any, /) -> list[str]:
         return ["Assembly"] if doc.marks.get("newer") else []
 
+    def is_damaged(self, doc: Any, /) -> bool:
+        return bool(doc.marks.get("damaged"))
+
     def save(self, doc: Any, /) -> None:
         if doc.marks.get("full_disk"):
             raise DocumentError(doc.FileName, "the disk is full")
@@ -133,6 +136,8 @@ def test_documents_that_link_to_each_other() -> None:
         (Doc("T", changed=True, recomputed=True, partial=True), State.SAVED, True),
         (Doc("fixed", changed=True, recomputed=True), State.SAVED, True),
         (Doc("T", newer=True), State.SAVED, True),
+        (Doc("T", damaged=True), State.DAMAGED, False),
+        (Doc("T", damaged=True, changed=True), State.DAMAGED, False),
     ],
     ids=lambda value: value.Name if isinstance(value, Doc) else str(value),
 )

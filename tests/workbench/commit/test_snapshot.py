@@ -54,7 +54,7 @@ def test_a_part_with_a_broken_link_is_no_part() -> None:
     from silo.bom.links import extract
 
     problem = LinkProblem(FindingCode.MISSING_FILE, "b.FCStd")
-    taken = take(doc, walk=lambda obj: extract(obj, inspect=lambda _link: problem))
+    taken = take(doc, walk=lambda obj: extract(obj, inspect=lambda obj: problem if obj.Name == "L" else None))
     assert taken.is_assembly
     assert taken.extraction is not None
     assert taken.extraction.blocked

@@ -122,11 +122,25 @@ def _scaled_negative(obj: object) -> bool:
 
 
 def resolve_target(link: object, inspect: Inspect | None = None) -> Target:
-    """Follow ``link`` to the real part or assembly; a broken link gives a ``problem``, no exception."""
+    """Follow ``link`` to the real part or assembly; a broken link gives a ``problem``, no exception.
+
+    inspect
+        says what is wrong with a live object: why a link has no target, or that FreeCAD opened a target from
+        a damaged file; None where nothing is.
+    """
     try:
-        return _resolve(link, _Trail(inspect))
+        found = _resolve(link, _Trail(inspect))
     except _EndlessError:
         return Target(None, problem=LinkProblem(FindingCode.CYCLE, obj=object_name(link)))
+    if inspect is not None and found.obj is not None and _is_elsewhere(found.obj, link):
+        problem = inspect(found.obj)
+        return found if problem is None else found._replace(obj=None, problem=problem)
+    return found
+
+
+def _is_elsewhere(target: Any, link: Any) -> bool:
+    """True for an object of another file, and for the assembly that was asked for."""
+    return target is link or not same_document(target.Document, link.Document)
 
 
 def _resolve(link: object, trail: _Trail) -> Target:

@@ -40,6 +40,8 @@ class Documents(Protocol):
 
     def lost_assemblies(self, doc: Any, /) -> list[str]: ...
 
+    def is_damaged(self, doc: Any, /) -> bool: ...
+
     def save(self, doc: Any, /) -> None: ...
 
     def base(self, doc: Any, /) -> Base: ...
@@ -55,6 +57,7 @@ class State(StrEnum):
     PARTIAL = "partial"  # has edits, but FreeCAD has loaded it only in part and cannot save it
     READ_ONLY = "read-only"  # has edits, but the file may not be written
     LOST = "lost"  # saving would destroy what this FreeCAD could not load
+    DAMAGED = "damaged"  # the file is damaged: FreeCAD has what it could read of it
 
 
 @dataclass(frozen=True)
@@ -109,6 +112,11 @@ def _words() -> dict[State, str]:
         State.READ_ONLY: translate("Silo", "the file is read-only: these edits are not saved"),
         State.LOST: translate(
             "Silo", "made by a newer FreeCAD: saving it here would destroy its assemblies, so it is not saved"
+        ),
+        State.DAMAGED: translate(
+            "Silo",
+            "the file is damaged, and FreeCAD has opened what it could read of it: fetch the file again, or "
+            "check that nothing is missing and save it in FreeCAD yourself",
         ),
     }
 
@@ -210,6 +218,8 @@ def _walked(top: Any) -> Iterator[Any]:
 def _state(doc: Any, documents: Documents, until: float) -> State:
     if not doc.FileName:
         return State.UNNAMED
+    if documents.is_damaged(doc):
+        return State.DAMAGED
     if not documents.is_modified(doc):
         return State.SAVED
     edited = documents.is_edited(doc, until)

@@ -23,6 +23,7 @@ from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.links import extract
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.roots import choose_assembly
+from silo.bom.walk.targets import is_assembly_link, is_link
 from silo.spelling import Spelling, one_path
 from silo.workbench.freecad import host, saving
 from silo.workbench.freecad.cached import CachedDocument, FactCache
@@ -154,16 +155,29 @@ def _stored(link: Any, name: str) -> dict[str, str] | None:
 
 
 class LinkInspector:
-    """Tells why links have no target, or only a changed copy of a lost original.
+    """Says why a link has no target, or only a changed copy of a lost original; and of what links show, that
+    FreeCAD opened it from a damaged file.
 
     For one walk, so that no file is looked at twice.
     """
 
     def __init__(self) -> None:
         self._library: Any = None
+        self._damage: dict[tuple[str, str], LinkProblem | None] = {}
 
-    def __call__(self, link: Any) -> LinkProblem | None:
+    def __call__(self, obj: Any) -> LinkProblem | None:
         """None where that is not known, or where nothing is missing."""
+        return self._of_link(obj) if is_link(obj) or is_assembly_link(obj) else self._of_target(obj)
+
+    def _of_target(self, obj: Any) -> LinkProblem | None:
+        path, name = obj.Document.FileName, object_name(obj)
+        if (path, name) not in self._damage:
+            found = saving.damage(path, name)
+            problem = None if found is None else LinkProblem(found.finding, path, name, found.reason)
+            self._damage[path, name] = problem
+        return self._damage[path, name]
+
+    def _of_link(self, link: Any) -> LinkProblem | None:
         if getattr(link, "LinkedObject", None) is None:
             stored = stored_target(link)
         elif getattr(link, "LinkCopyOnChangeSource", None) is None:

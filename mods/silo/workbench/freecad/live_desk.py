@@ -39,6 +39,10 @@ class LiveDocuments:
     def __init__(self, opened: Opened) -> None:
         self.base = opened.of
 
+    def is_damaged(self, doc: Any) -> bool:
+        """True where the document's file cannot be read to its end."""
+        return saving.damage(doc.FileName) is not None
+
 
 class LiveDesk:
     """One per FreeCAD. Widgets are imported when a person is to see one."""

@@ -13,10 +13,22 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from silo.workbench.freecad import host
 from silo.workbench.freecad.edits import EditWatch
+
+if TYPE_CHECKING:
+    from silo.fcstd.problem import FcstdError
+
+DAMAGED = (
+    "FreeCAD opens what it can of a damaged file, and saving that would make the loss final: fetch the file "
+    "again, or check that nothing is missing and save it in FreeCAD yourself"
+)
+
+# File and object → the file's state when all that the object needs could be read.
+_SOUND: dict[tuple[str, str], object] = {}
+_REMEMBERED = 20_000
 
 
 def is_modified(doc: Any) -> bool:
@@ -67,6 +79,41 @@ def open_fully(path: str) -> Any:
             raise DocumentError(path, f"FreeCAD cannot open it: {problem}") from problem
 
 
+def damage(path: str, name: str = "") -> FcstdError | None:
+    """Why a file cannot be read as far as an object in it needs ("": to its end); None where it can.
+
+    FreeCAD reads a file from its beginning and opens what it finds: objects without shapes where the file is
+    cut short, some of the objects where its Document.xml is damaged. It says so in the report view at most.
+    A file that is not there, or may not be read, is no damage: the session has what it had.
+    """
+    from silo.bom.findings import FindingCode
+    from silo.fcstd import Library
+    from silo.fcstd.container import FileState
+    from silo.fcstd.limits import ANY_SIZE
+    from silo.fcstd.problem import FcstdError
+
+    if not path or not os.access(path, os.R_OK):
+        return None
+    try:
+        state = FileState.of(os.stat(path))
+        if _SOUND.get((path, name)) == state:
+            return None
+        with Library(limits=ANY_SIZE) as library:
+            document = library.glance(path)
+            if not name:
+                document.complete()
+            elif (found := document.getObject(name)) is not None:
+                document.check(found)
+    except FcstdError as error:
+        return None if error.finding is FindingCode.MISSING_FILE else error
+    except OSError:
+        return None
+    if len(_SOUND) >= _REMEMBERED:
+        _SOUND.clear()
+    _SOUND[path, name] = state
+    return None
+
+
 def save(doc: Any, *, mark_parents: bool = False) -> None:
     """Save a document to its file; :class:`DocumentError` unless the file really was written.
 
@@ -82,6 +129,8 @@ def save(doc: Any, *, mark_parents: bool = False) -> None:
         raise DocumentError(path, "FreeCAD has loaded it only in part and cannot save it")
     if not is_writable(path):
         raise DocumentError(path, "the file is read-only")
+    if (damaged := damage(path)) is not None:
+        raise DocumentError(path, f"{damaged.reason}; {DAMAGED}")
     before = _stamp(path)
     try:
         with nullcontext() if mark_parents else others_unmarked(doc):

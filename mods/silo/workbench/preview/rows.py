@@ -13,7 +13,6 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 from silo.bom.findings import Finding, FindingCode, Severity
-from silo.bom.identity import walk_entries
 from silo.bom.model import BomDiff, BomEntry, Extraction
 from silo.bom.naming import display_name
 from silo.bom.paths import relative
@@ -126,7 +125,8 @@ class Preview:
 
 def ask(snapshot: Snapshot, api: Any, control: Control) -> Preview:
     """Compare a snapshot with the server, sub-assemblies included. Worker."""
-    from silo.bom_sync import assemblies, blocking, identities_before, names_of, resolve, server_lines
+    from silo.batch import suggest_by_identity
+    from silo.bom_sync import assemblies, blocking, names_of, resolve, server_lines
     from silo.fcstd.suggest import with_suggestions
 
     extraction = snapshot.extraction or Extraction(BomEntry(snapshot.path, label=snapshot.label))
@@ -137,10 +137,7 @@ def ask(snapshot: Snapshot, api: Any, control: Control) -> Preview:
         control.check()
         control.progress(one.assembly.part_number or one.assembly.label)
         lines.append(server_lines(one, api))
-    if any(entry.missing for entry in walk_entries(extraction.entries)):
-        before = identities_before(zip(assemblies(whole), lines, strict=True))
-        told = with_suggestions(replace(extraction, findings=whole.findings), before)
-        whole = replace(whole, findings=told.findings)
+    whole = suggest_by_identity(whole, list(zip(assemblies(whole), lines, strict=True)))
     compared = [_compared(one, known) for one, known in zip(assemblies(whole), lines, strict=True)]
     all_lines = [line for one in compared for line in one.lines]
     number = whole.assembly.part_number

@@ -350,6 +350,11 @@
         </message>
         <message>
             <location filename="../../commit/plan.py" />
+            <source>the file is damaged, and FreeCAD has opened what it could read of it: fetch the file again, or check that nothing is missing and save it in FreeCAD yourself</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/plan.py" />
             <source>{name} has no file yet. Save it under a name first.</source>
             <translation type="unfinished" />
         </message>
