@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
+import re
 import uuid
 from collections.abc import Callable
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Dialog, Page, Route, expect
 from server_testing import Api, bom
 
 Visit = Callable[..., Page]
@@ -210,3 +211,85 @@ def test_restoring_does_not_revert_what_came_meanwhile(api: Api, visit: Visit, u
     page.locator(".notice").get_by_role("button", name="Undo").click()
     expect(page.locator(".notice")).to_contain_text("Undone")
     assert api.lines(parent)[child]["notes"] == "a colleague's"
+
+
+def test_a_second_click_sends_nothing(visit: Visit, user: str) -> None:
+    """While the answer to the first is on its way."""
+    page = enter(visit, user, "/account")
+    sent: list[str] = []
+
+    def late(route: Route) -> None:
+        sent.append(route.request.url)
+        page.wait_for_timeout(300)
+        route.continue_()
+
+    page.route("**/account/tokens", late)
+    page.get_by_label("Name of a new token").fill("laptop")
+    page.locator("form[action$=tokens]").evaluate(
+        "form => { form.requestSubmit(); setTimeout(() => form.requestSubmit(), 100) }"
+    )
+    expect(page.get_by_label("The token")).to_be_visible()
+    assert len(sent) == 1
+    expect(page.get_by_role("rowheader", name="laptop")).to_have_count(1)
+
+
+def test_what_is_typed_in_another_form_is_not_left_without_a_question(
+    api: Api, visit: Visit, user: str
+) -> None:
+    """A form of the page is sent, or a link followed, while another one holds something unsaved."""
+    parent, child, gone = api.items(3)
+    api.merge(parent, {child: 1, gone: 1})
+    api.merge(parent, {child: 1})
+    page = enter(visit, user, f"/items/{parent}/bom?edit={child}")
+    asked: list[str] = []
+    stay = True
+
+    def answer(dialog: Dialog) -> None:
+        asked.append(dialog.type)
+        if stay:
+            dialog.dismiss()
+        else:
+            dialog.accept()
+
+    page.on("dialog", answer)
+    notes = page.locator("#edit").get_by_label("Notes")
+    notes.fill("an hour of work")
+    page.get_by_role("button", name=f"Keep as intentional {gone}").click()
+    expect(notes).to_have_value("an hour of work")
+    page.get_by_role("link", name="History").click()
+    expect(notes).to_have_value("an hour of work")
+    assert asked == ["beforeunload"] * 2
+    assert api.lines(parent)[gone]["unreferenced_since"]
+    # Its own form is sent without a question, after "Stay" too; refused, it is still unsaved.
+    page.locator("#edit").get_by_label("Quantity").fill("many")
+    page.locator("#edit").get_by_role("button", name="Save", exact=True).click()
+    expect(page.get_by_role("alert")).to_contain_text("wanted a number")
+    assert len(asked) == 2
+    page.get_by_role("button", name=f"Keep as intentional {gone}").click()
+    expect(notes).to_have_value("an hour of work")
+    assert len(asked) == 3
+    page.locator("#edit").get_by_role("link", name="Cancel").click()
+    expect(page.locator("#edit")).to_have_count(0)
+    assert len(asked) == 3
+    # A choice in a list, a box; and whoever wants to leave may.
+    page.goto("/account")
+    page.get_by_label("Ends").select_option("365")
+    stay = False
+    page.get_by_role("link", name="Items", exact=True).click()
+    expect(page).to_have_url(re.compile("/items$"))
+    assert len(asked) == 4
+
+
+def test_a_user_that_is_refused_stays_typed(visit: Visit) -> None:
+    """All but the password, which goes nowhere but where it was typed for."""
+    page = visit("admin")
+    page.goto("/users")
+    page.get_by_label("User name").fill("not a name")
+    page.get_by_label("Full name").fill("Nora")
+    new = page.locator("form[action$='/users']")
+    new.get_by_label("Role").select_option("editor")
+    page.get_by_role("button", name="Make user").click()
+    expect(page.get_by_role("alert")).to_contain_text("1 to 64 letters")
+    expect(page.get_by_label("User name")).to_have_value("not a name")
+    expect(page.get_by_label("Full name")).to_have_value("Nora")
+    expect(new.get_by_label("Role")).to_have_value("editor")

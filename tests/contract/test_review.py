@@ -97,13 +97,16 @@ def test_a_kept_quantity_is_asked_again_only_when_cad_says_something_else(api: A
     assert [w["assembly_quantity"] for w in api.merge(parent, {a: 5})["warnings"]] == [5]
 
 
-def test_undoing_keep_silo_asks_again(api: Api) -> None:
-    """The decision lives beside the line; undo takes it back too."""
+@pytest.mark.parametrize("renamed", [False, True])
+def test_undoing_keep_silo_asks_again(api: Api, renamed: bool) -> None:
+    """The decision lives beside the line; undo takes it back too, whatever the part's number is by now."""
     parent, a = api.items(2)
     api.merge(parent, {a: 4})
     api.good("PUT", bom(parent, a), {"quantity": 6})
     api.merge(parent, {a: 4})
     change = decide(api, parent, **{a: "keep_silo"})
+    if renamed:
+        a = api.good("PUT", f"/api/items/{a}", {"part_number": f"{a}-B"})["part_number"]
     api.good("POST", bom(parent, "undo"), {"change_id": change["change_id"]})
     assert [c["child_part_number"] for c in api.get(bom(parent, "review"))["conflicts"]] == [a]
     assert len(api.merge(parent, {a: 4})["warnings"]) == 1

@@ -3,13 +3,17 @@
 
 from __future__ import annotations
 
+import json
 import threading
 import uuid
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 import pytest
-from server_testing import Api, Databases, bom
+from server_testing import Answer, Api, Databases, bom
+from web_visitor import enter
 
 from silo.bom.errors import ConflictError
 from silo_server.bootstrap import prepare
@@ -162,3 +166,30 @@ def test_a_server_without_an_admin_starts_and_can_be_got_back(
         assert back.token
         assert back.login_secret
     db.close()
+
+
+def test_a_form_sent_twice_makes_one_token(api: Api) -> None:
+    """Also at once; the secret is that of the one token. Another form makes another, and nothing makes an
+    eternal one by accident."""
+    admin = enter(api, "admin")
+
+    def make(key: str, name: str = "laptop", days: str = "30") -> Answer:
+        return admin.post("/account/tokens", key=key, name=name, days=days, scope="read")
+
+    def tokens() -> list[str]:
+        return [one["name"] for one in api.get("/api/auth/tokens") if one["name"] in ("laptop", "phone")]
+
+    with ThreadPoolExecutor(4) as pool:
+        answers = list(pool.map(lambda _: make("k1"), range(4)))
+    assert {answer.status for answer in answers} == {303}
+    shown = {answer.headers["set-cookie"].partition(";")[0] for answer in answers}
+    assert len(shown) == 1
+    assert tokens() == ["laptop"]
+    name, secret = json.loads(unquote(shown.pop().partition("=")[2]))
+    assert name == "laptop"
+    assert api.as_(secret).get("/api/auth/me")["username"] == "admin"
+    make("k1", "phone")
+    make("k2")
+    assert sorted(tokens()) == ["laptop", "laptop", "phone"]
+    assert make("k3", days="abc").status == 400
+    assert len(tokens()) == 3

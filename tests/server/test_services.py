@@ -6,6 +6,7 @@ from __future__ import annotations
 import uuid
 from contextlib import suppress
 from dataclasses import fields, replace
+from datetime import timedelta
 from typing import Any
 
 import pytest
@@ -13,19 +14,25 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sqlalchemy import select
 
-from silo.bom.errors import RejectedError
+from silo.bom.errors import ConflictError, RejectedError
 from silo_server.clock import stamp, utc_now, wire
 from silo_server.db.bulk import insert_rows, one_of, update_rows
 from silo_server.db.engine import Database
-from silo_server.db.tables import bom_syncs, items
+from silo_server.db.tables import bom_syncs, items, users
 from silo_server.json_values import dumps
+from silo_server.services.access.credentials import (
+    Token,
+    create_own_token,
+    revoke_token,
+    secret_of_form,
+)
 from silo_server.services.bom.edits import check_state, edited_state
 from silo_server.services.bom.exports import _item_numbers, plain_cell, safe_cell
 from silo_server.services.bom.lines import state_to_json, stored_state
 from silo_server.services.bom.merge_json import quantity_problem, read_merge_order
 from silo_server.services.bom.rollup import positive_number
 from silo_server.services.items import NewItem, create_item
-from silo_server.values import LineState, Role, number
+from silo_server.values import Actor, LineState, Role, number
 
 text = st.text(max_size=20)
 states = st.builds(
@@ -234,6 +241,34 @@ def test_a_bulk_update_changes_only_its_rows(db: Database) -> None:
         names = {row.id: (row.name, row.sourcing_type) for row in tx.conn.execute(select(items))}
     assert names[ids[0]] == (f"n{ids[0]}", None if ids[0] % 2 else "purchased")
     assert names[ids[15]] == ("x", None)
+
+
+def test_the_secret_of_a_form_is_given_again_for_a_minute(db: Database) -> None:
+    """A repeat of the form is the same token; later, or after it was revoked, the secret stays unknown."""
+    with db.write() as tx:
+        user_id = tx.conn.scalar(select(users.c.id))
+    actor = Actor("admin", Role.ADMIN, user_id, auth_source="session", csrf_token="of the session")
+    other = replace(actor, csrf_token="of another session")
+    wanted = secret_of_form(actor, "key", "laptop")
+    assert wanted not in (secret_of_form(other, "key", "laptop"), secret_of_form(actor, "key", "phone"))
+    assert secret_of_form(replace(actor, csrf_token=None), "key") is None
+
+    def make(secret: str | None) -> tuple[Token, str]:
+        with db.write(actor) as tx:
+            return create_own_token(tx, "laptop", days=30, forever=False, secret=secret)
+
+    first, secret = make(wanted)
+    assert secret == wanted
+    assert make(wanted) == (first, secret)
+    now = db.clock
+    db.clock = lambda: now() + timedelta(minutes=2)
+    with pytest.raises(ConflictError, match="shown once"):
+        make(wanted)
+    fresh, secret = make(secret_of_form(actor, "key 2"))
+    with db.write(actor) as tx:
+        revoke_token(tx, fresh.id, user_id)
+    with pytest.raises(ConflictError, match="shown once"):
+        make(secret)
 
 
 def test_a_failed_transaction_leaves_nothing(db: Database) -> None:

@@ -9,6 +9,7 @@ import json
 import re
 import zlib
 from collections.abc import Iterator
+from html import unescape
 from html.parser import HTMLParser
 from itertools import pairwise
 from pathlib import Path
@@ -263,6 +264,45 @@ def test_a_long_bom_has_pages(visitors: dict[str, Visitor], api: Api) -> None:
         visitors[EDITOR].get(f"{path}?show=%3Cb%3E&sort=nope&page=9%3C").body.decode().count("<tr id=")
         == 1000
     )
+
+
+def test_a_decision_about_very_many_lines(visitors: dict[str, Visitor], api: Api) -> None:
+    """A thousand boxes at once are no form too large; what is shown of more is bounded."""
+    parent, *children = (api.item(f"MANY-{n:04}") for n in range(1103))
+    api.merge(parent, dict.fromkeys(children, 1))
+    api.merge(parent, {children[0]: 1})
+    page = visitors[EDITOR].get(f"/items/{parent}/bom").body.decode()
+    boxes = re.findall(r'name="chosen" form="bulk" value="([^"]+)"', page)
+    assert len(boxes) == 1000
+    assert "the first 1000; the others follow" in page
+    assert page.count("<form") < 10
+    lines = [line["id"] for line in api.lines(parent).values() if line["unreferenced_since"]]
+    answer = visitors[EDITOR].post(f"/items/{parent}/bom/decide", chosen=lines, action="keep", bulk="yes")
+    assert answer.status == 303
+    assert not any(line["unreferenced_since"] for line in api.lines(parent).values())
+    assert len(lines) == 1101
+
+
+def test_a_conflict_that_came_meanwhile_is_not_decided(visitors: dict[str, Visitor], api: Api) -> None:
+    """A sync that changes no line, and brings another number: nobody has seen it, so nobody has decided."""
+    parent, child = api.items(2)
+    api.merge(parent, {child: 4})
+    api.good("PUT", f"/api/items/{parent}/bom/{child}", {"quantity": 6})
+    api.merge(parent, {child: 5})
+    visitor = visitors[EDITOR]
+
+    def box() -> str:
+        page = visitor.get(f"/waiting?q={parent}").body.decode()
+        return unescape(re.findall(r'name="chosen" form="bulk" value="([^"]+)"', page)[0])
+
+    seen = box()
+    api.merge(parent, {child: 12})
+    answer = visitor.post("/waiting/decide", chosen=seen, action="keep_silo")
+    assert answer.status == 409
+    assert "it was changed meanwhile" in answer.body.decode()
+    assert [c["assembly_quantity"] for c in api.get(f"/api/items/{parent}/bom/review")["conflicts"]] == [12]
+    assert visitor.post("/waiting/decide", chosen=box(), action="keep_silo").status == 303
+    assert api.get(f"/api/items/{parent}/bom/review")["conflicts"] == []
 
 
 def test_a_carried_file_that_was_tampered_with(visitors: dict[str, Visitor], api: Api) -> None:

@@ -26,9 +26,9 @@ class Visitor:
         """A page."""
         return self.api.call("GET", path, headers={"Cookie": self.cookie, **HTML, **headers})
 
-    def post(self, path: str, *, csrf: str | None = None, **fields: str) -> Answer:
-        """A form, with the secret unless another is given."""
-        sent = urlencode({"csrf_token": self.csrf if csrf is None else csrf, **fields}).encode()
+    def post(self, path: str, *, csrf: str | None = None, **fields: str | list[str]) -> Answer:
+        """A form, with the secret unless another is given; a list is a field that stands there often."""
+        sent = urlencode({"csrf_token": self.csrf if csrf is None else csrf, **fields}, doseq=True).encode()
         return self.api.call("POST", path, body=sent, headers={"Cookie": self.cookie, **HTML, **FORM})
 
 

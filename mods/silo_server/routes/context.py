@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import anyio.to_thread
 import pydantic_core
 from fastapi import Depends, Request
+from starlette.datastructures import FormData
 from starlette.responses import Response
 
 from silo.api.wire import ErrorBody
@@ -29,6 +30,8 @@ from silo_server.values import Actor, Role
 SESSION_COOKIE = "silo_session"
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 FORM_TYPES = ("application/x-www-form-urlencoded", "multipart/form-data")
+# A decision about all lines of the largest BOM has a field for each.
+MOST_FIELDS = 25_000
 
 _SHAPE = {"model": ErrorBody}
 READ_ERRORS: dict[int | str, dict[str, Any]] = {
@@ -116,10 +119,15 @@ def client_address(request: Request) -> str:
 async def _check_csrf(request: Request, actor: Actor) -> None:
     sent: object = request.headers.get("x-csrf-token")
     if sent is None and request.headers.get("content-type", "").startswith(FORM_TYPES):
-        sent = (await request.form()).get("csrf_token")
+        sent = (await form_of(request)).get("csrf_token")
     wanted = actor.csrf_token or ""
     if not isinstance(sent, str) or not secrets.compare_digest(unmasked(sent), wanted.encode()):
         raise FormSecretError("the form's secret is missing or old; load the page again and repeat")
+
+
+async def form_of(request: Request) -> FormData:
+    """The request's form, which whoever asks first reads, and Starlette keeps."""
+    return await request.form(max_files=1, max_fields=MOST_FIELDS)
 
 
 def masked(secret: str) -> str:

@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
+import secrets
 from typing import Annotated
 
 from fastapi import APIRouter, Path, Request
 from starlette.datastructures import FormData
 from starlette.responses import Response
 
-from silo.bom.errors import RejectedError
+from silo.bom.errors import ConflictError, RejectedError
 from silo_server.errors import TooManyAttemptsError
 from silo_server.routes.context import SESSION_COOKIE, Server, ServerDep
 from silo_server.services.access import accounts, credentials, logins
@@ -21,14 +22,13 @@ from silo_server.web.forms import (
     secret_of,
     take_away_secret,
     text,
-    whole,
 )
 from silo_server.web.guard import Reader
 from silo_server.web.render import page
 
 router = APIRouter(include_in_schema=False)
 
-LIFETIMES = (30, 90, 365)
+LIFETIMES = {"30": 30, "90": 90, "365": 365, "": None}
 TokenId = Annotated[int, Path(ge=1, le=2**62)]
 
 
@@ -43,17 +43,25 @@ def account_page(request: Request, server: ServerDep, caller: Reader) -> Respons
 @router.post("/account/tokens")
 def create_token(request: Request, server: ServerDep, caller: Reader, form: Form) -> Response:
     """Make a token. Its secret is shown once, on the page that this leads to."""
-    name, days = text(form, "name"), whole(form, "days")
+    name, ends, wanted = text(form, "name"), text(form, "days"), text(form, "scope") or Scope.WRITE
     if not 0 < len(name) <= 200:
         return _show(request, server, caller, problem="A token needs a name of at most 200 characters.")
-    if days not in (None, *LIFETIMES):
+    if ends not in LIFETIMES:
         return _show(request, server, caller, problem="Choose one of the lifetimes.")
     try:
-        scope = Scope(text(form, "scope") or Scope.WRITE)
+        scope = Scope(wanted)
     except ValueError:
         return _show(request, server, caller, problem="Choose one of the scopes.")
-    with server.db.write(caller, even_when_read_only=True) as tx:
-        _, secret = credentials.create_own_token(tx, name, days=days, forever=days is None, scope=scope)
+    days, secret = LIFETIMES[ends], None
+    if key := text(form, "key"):
+        secret = credentials.secret_of_form(caller, key, name, ends, wanted)
+    try:
+        with server.db.write(caller, even_when_read_only=True) as tx:
+            _, secret = credentials.create_own_token(
+                tx, name, days=days, forever=days is None, scope=scope, secret=secret
+            )
+    except ConflictError as error:
+        return _show(request, server, caller, problem=str(error))
     return back_with_secret(request, "/account", name, secret)
 
 
@@ -108,10 +116,11 @@ def _show(
         tokens=tokens,
         now=now,
         user=user,
-        lifetimes=LIFETIMES,
+        lifetimes=[days for days in LIFETIMES.values() if days],
+        key=secrets.token_hex(16),
         scopes=[scope for scope in Scope if caller.role.covers(scope.role)],
         asks_password=not caller.by_link,
-        problem=problem,
+        problem=problem[:1].upper() + problem[1:],
         fresh=fresh,
         shortest=accounts.MIN_PASSWORD,
     )

@@ -19,7 +19,7 @@ from starlette.responses import RedirectResponse, Response
 
 from silo.bom.errors import RejectedError
 from silo.bom.numbers import parse_number, plain, read_quantity
-from silo_server.routes.context import server_of
+from silo_server.routes.context import form_of, server_of
 from silo_server.web.render import NOTICE_COOKIE
 
 NOTICE_SECONDS = 60
@@ -29,8 +29,7 @@ MOST_NOTICE = 300
 
 
 async def _form(request: Request) -> AsyncIterator[FormData]:
-    # The guard read the form for its secret already; Starlette keeps it.
-    form = await request.form(max_files=1)
+    form = await form_of(request)
     # For a page that says why it was refused: a handler of errors may get a request without its body.
     request.state.kept = kept_form(request.url.path, form)
     try:
@@ -68,7 +67,8 @@ def whole(form: FormData, name: str) -> int | None:
 _PASSWORDS = frozenset({"password", "again", "current"})
 # Fields that no person typed.
 _MACHINE = re.compile(
-    r"csrf_token|at|view|mark|asked|bulk|version|packed|child_id|change_id|next|from|was_.*"
+    r"csrf_token|at|view|mark|asked|bulk|version|packed|child_id|change_id|next|from|id|key|base_revision"
+    r"|was[_.].*"
 )
 MOST_KEPT = 4 * 1024 * 1024
 
@@ -103,9 +103,10 @@ class Kept:
 
 
 def _label(name: str) -> str:
-    return {"child": "Part number", "why": "Reason for the change"}.get(
-        name, name.replace("_", " ").capitalize()
-    )
+    known = {"child": "Part number", "why": "Reason for the change"}
+    # "p.mass_kg", and "o.1.name" with "o.1.value", are properties in the form of an item.
+    plain = re.sub(r"^p\.|^o\.\d+\.(?=value$)", "", re.sub(r"^o\.\d+\.name$", "property", name))
+    return known.get(name, plain.replace("_", " ").capitalize())
 
 
 def kept_form(path: str, form: FormData) -> Kept | None:

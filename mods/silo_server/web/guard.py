@@ -17,6 +17,7 @@ from silo_server.routes.context import (
     FormSecretError,
     Guard,
     find_actor,
+    form_of,
     server_of,
 )
 from silo_server.values import Actor, Role
@@ -66,7 +67,7 @@ async def _kept(request: Request) -> Kept | None:
     is_form = request.headers.get("content-type", "").startswith(FORM_TYPES)
     if request.method in SAFE_METHODS or not is_form or not small:
         return None
-    return kept_form(request.url.path, await request.form(max_files=1))
+    return kept_form(request.url.path, await form_of(request))
 
 
 Reader = Annotated[Actor, Depends(PageGuard(Role.VIEWER))]

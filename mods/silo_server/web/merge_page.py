@@ -37,6 +37,8 @@ from silo_server.web.words import FIELDS, by_whom, sentences
 router = APIRouter(include_in_schema=False)
 
 LATER_CHANGES = 5
+# So many open questions are shown; up to so many have a form each, more are decided by boxes.
+MOST_SHOWN, MOST_FORMS = 1000, 100
 KEPT = "kept on purpose, not in the CAD model"
 
 
@@ -330,6 +332,8 @@ def _show(
         last=last,
         gaps=in_sentences(last.gaps),
         unreferenced=found.unreferenced,
+        most_shown=MOST_SHOWN,
+        most_forms=MOST_FORMS,
         conflicts=found.conflicts,
         merge=merge,
         merged=sentences(merged),

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 from typing import Annotated
 
@@ -49,18 +50,19 @@ def users_page(request: Request, server: ServerDep, caller: Administrator) -> Re
 @router.post("/users")
 def create_user(request: Request, server: ServerDep, caller: Administrator, form: Form) -> Response:
     """Make a user; without a password a login link lets the user in."""
-    username = text(form, "username")
+    typed = {name: text(form, name, 200) for name in ("username", "display_name", "role")}
+    username = typed["username"]
     try:
         with server.db.write(caller, even_when_read_only=True) as tx:
             accounts.create_user(
                 tx,
                 username,
-                _role(text(form, "role")),
-                display_name=text(form, "display_name", 200),
+                _role(typed["role"]),
+                display_name=typed["display_name"],
                 password=password_of(form, "password") or None,
             )
     except SiloError as error:
-        return _show(request, server, caller, problem=str(error), status=error.status_hint)
+        return _show(request, server, caller, problem=str(error), status=error.status_hint, typed=typed)
     return back("/users", f"User {username} is made.")
 
 
@@ -140,6 +142,7 @@ def _show(
     problem: str = "",
     status: int = 200,
     link: tuple[str, str] | None = None,
+    typed: Mapping[str, str] | None = None,
 ) -> Response:
     with server.db.read(caller) as tx:
         users = accounts.list_users(tx)
@@ -160,6 +163,7 @@ def _show(
         roles=list(Role),
         problem=problem[:1].upper() + problem[1:],
         link=link,
+        typed=typed or {},
         minutes=int(server.settings.login_link_seconds // 60),
         shortest=accounts.MIN_PASSWORD,
     )

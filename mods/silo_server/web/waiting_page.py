@@ -76,13 +76,13 @@ def decide(request: Request, server: ServerDep, caller: Writer, form: Form) -> R
     lines = boms = 0
     problems: list[str] = []
     for value in dict.fromkeys(texts(form, "chosen")):
-        version, _, part_number = value.partition(" ")
-        if not (version.isascii() and version.isdigit() and len(version) < 12):
+        seen, _, part_number = value.partition(" ")
+        if not part_number:
             problems.append(f"{isolate(value[:80])}: this is no BOM of the table; load the page again")
             continue
         try:
             with server.db.write(caller) as tx:
-                count = decide_all(tx, part_number, action, reason, int(version))
+                count = decide_all(tx, part_number, action, reason, seen)
             lines, boms = lines + count, boms + bool(count)
         except VersionConflictError:
             problems.append(f"{isolate(part_number)}: it was changed meanwhile, so nothing was done there")

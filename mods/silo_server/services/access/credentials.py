@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 import hashlib
+import hmac
 import secrets
 from dataclasses import dataclass
 from datetime import timedelta
 
 from sqlalchemy import insert, select, update
 
-from silo.bom.errors import ForbiddenError, NotFoundError
+from silo.bom.errors import ConflictError, ForbiddenError, NotFoundError
 from silo_server.clock import stamp, wire
 from silo_server.db.bulk import update_rows
 from silo_server.db.engine import Database, Tx
@@ -21,6 +22,8 @@ from silo_server.values import Actor, Role, Scope
 PREFIX = "silo_"
 # Writing down the last use of a token on every request would make every read a write.
 LAST_USE_SECONDS = 60
+# A form that is sent twice comes twice within this time.
+REPEAT_SECONDS = 60
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,14 +46,35 @@ def secret_hash(secret: str) -> str:
     return hashlib.sha256(secret.encode("utf-8", "surrogatepass")).hexdigest()
 
 
+def secret_of_form(actor: Actor, *sent: str) -> str | None:
+    """The secret of the token that a form asks for: the same one where the same form is sent again.
+
+    sent
+        what the form holds, with a key that is new each time the form is shown. None for a caller without
+        a session.
+    """
+    if actor.csrf_token is None:
+        return None
+    digest = hmac.new(actor.csrf_token.encode(), repr(sent).encode("utf-8", "surrogatepass"), "sha256")
+    return PREFIX + digest.hexdigest()[:40]
+
+
 def create_own_token(
-    tx: Tx, name: str, *, days: float | None, forever: bool, scope: Scope | None = None
+    tx: Tx,
+    name: str,
+    *,
+    days: float | None,
+    forever: bool,
+    scope: Scope | None = None,
+    secret: str | None = None,
 ) -> tuple[Token, str]:
     """Make a token of the caller's. A token makes none that lives longer or may more than itself.
 
     days, forever
         its lifetime [days]; with neither it lives as long as the token that makes it.
-    Raises ForbiddenError.
+    secret
+        of :func:`secret_of_form`, whose token may have been made a moment ago.
+    Raises ForbiddenError, ConflictError where the form was sent long ago.
     """
     actor = tx.actor
     assert actor.user_id is not None  # every caller that a guard let in is a user
@@ -65,7 +89,22 @@ def create_own_token(
                 "log in in a browser for that"
             )
         expires = expires or actor.expires_at
-    return create_token(tx, actor.user_id, name, expires=expires, scope=scope or actor.scope)
+    if secret is not None and (known := _made_before(tx, actor.user_id, secret)) is not None:
+        return known, secret
+    return create_token(tx, actor.user_id, name, expires=expires, scope=scope or actor.scope, secret=secret)
+
+
+def _made_before(tx: Tx, user_id: int, secret: str) -> Token | None:
+    # A repeat that comes while the first request is under way waits for it.
+    hashed = secret_hash(secret)
+    tx.lock(int(hashed[:15], 16))
+    token_id = tx.conn.scalar(select(api_tokens.c.id).where(api_tokens.c.token_hash == hashed))
+    if token_id is None:
+        return None
+    token = next(one for one in list_tokens(tx, user_id) if one.id == token_id)
+    if token.revoked_at or token.created_at < stamp(tx.at - timedelta(seconds=REPEAT_SECONDS)):
+        raise ConflictError(f"this form made the token {token.name} before; its secret was shown once")
+    return token
 
 
 def check_may_change(actor: Actor) -> None:

@@ -29,7 +29,7 @@ from silo_server.services.bom.changes import (
 )
 from silo_server.services.bom.lines import lines_of, stored_state
 from silo_server.services.items import by_ids, get_item
-from silo_server.values import Item, LineState
+from silo_server.values import Item, Line, LineState
 
 
 @dataclass(frozen=True, slots=True)
@@ -264,7 +264,7 @@ def undo(tx: Tx, part_number: str, change_id: int, expected: int | None) -> tupl
         )
     check_no_cycle(tx, parent, [line.child.id for line in lines if line.after is None])
     changes = [LineChange(n.line_id, n.child.id, n.after, n.before, n.position) for n in lines]
-    _reopen(tx, parent, change)
+    _reopen(tx, parent, change, current)
     text = f"undone: {change.summary}"
     done = apply_changes(
         tx, parent, changes, ChangeNote(kind=ChangeKind.UNDO, summary=text, refers_to=change_id)
@@ -273,16 +273,18 @@ def undo(tx: Tx, part_number: str, change_id: int, expected: int | None) -> tupl
     return done
 
 
-def _reopen(tx: Tx, parent: Item, change: Change) -> None:
+def _reopen(tx: Tx, parent: Item, change: Change, current: Mapping[str, Line]) -> None:
     # "Keep Silo's quantity" lives beside the line; undoing it asks the question again.
-    for decision in change.decisions:
-        if decision["action"] == "keep_silo":
-            child = get_item(tx, decision["child_part_number"], include_archived=True)
-            tx.conn.execute(
-                bom_conflicts.update()
-                .where(bom_conflicts.c.parent_id == parent.id, bom_conflicts.c.child_id == child.id)
-                .values(accepted=False)
-            )
+    kept = [decision for decision in change.decisions if decision["action"] == "keep_silo"]
+    # Decisions of older versions name their line by its part number alone, which may be another by now.
+    ids = {decision.get("line_id") for decision in kept}
+    numbers = {decision["child_part_number"] for decision in kept if not decision.get("line_id")}
+    children = [n.child_id for n in current.values() if n.id in ids or n.child_part_number in numbers]
+    tx.conn.execute(
+        bom_conflicts.update()
+        .where(bom_conflicts.c.parent_id == parent.id, one_of(tx, bom_conflicts.c.child_id, children))
+        .values(accepted=False)
+    )
 
 
 def _changes(

@@ -133,10 +133,15 @@ def resolve(
         raise LinesChangedError(
             f"{len(stale)} of the lines were changed meanwhile; nothing was changed", stale
         )
+    named: dict[str, list[Line]] = {}
+    for line in lines:
+        named.setdefault(line.id, []).append(line)
+        named.setdefault(line.child_part_number.casefold(), []).append(line)
     for index, decision in enumerate(decisions):
         try:
             which = LineId(decision.line_id) if decision.line_id else decision.child_part_number
-            line = component_of(lines, which, parent)
+            near = named.get(decision.line_id or decision.child_part_number.casefold(), ())
+            line = component_of(near, which, parent)
             if line.id in seen:
                 raise RejectedError(f"{line.child_part_number} is decided twice")
             seen.add(line.id)
@@ -211,7 +216,12 @@ def _write(
         summary=text or "nothing decided",
         reason="; ".join(reasons) or None,
         decisions=[
-            {"child_part_number": d.child_part_number, "action": d.action.value, "reason": d.reason}
+            {
+                "child_part_number": d.child_part_number,
+                "action": d.action.value,
+                "reason": d.reason,
+                "line_id": d.line_id,
+            }
             for d in decisions
         ],
     )

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: LGPL-2.1-or-later
+// Forms that are sent: a second click sends nothing twice, and what somebody typed into another form of the page
+// is not lost without a question.
+
+const PATIENCE = 10000; // so long a form that was sent waits for its answer
+let sent = null;
+let given_up = null;
+
+function changed(field) {
+  if (field.type === "hidden" || field.type === "submit") return false;
+  if (field.type === "checkbox" || field.type === "radio") return field.checked !== field.defaultChecked;
+  if (field.type === "file") return field.files.length > 0;
+  if (field.options) {
+    const first = Math.max(0, [...field.options].findIndex((option) => option.defaultSelected));
+    return field.selectedIndex !== first;
+  }
+  return "defaultValue" in field && field.value !== field.defaultValue;
+}
+
+// A form that the server refused shows what was typed as if it had always stood there.
+const unsaved = (form) =>
+  form.method === "post" && (form.dataset.unsaved !== undefined || [...form.elements].some(changed));
+
+document.addEventListener("submit", (event) => {
+  const form = event.target;
+  if (event.defaultPrevented || form.method !== "post") return;
+  if (form === sent) return event.preventDefault();
+  sent = form;
+  setTimeout(() => (sent = null), PATIENCE);
+});
+
+// "Cancel" means it.
+document.addEventListener("click", (event) => {
+  given_up = event.target.closest("a[data-cancel]")?.closest("form") ?? null;
+});
+
+addEventListener("beforeunload", (event) => {
+  if (![...document.forms].some((form) => form !== sent && form !== given_up && unsaved(form))) return;
+  event.preventDefault(); // the browser asks
+  setTimeout(() => (sent = null)); // the person stays
+});
+
+addEventListener("pageshow", () => (sent = null));
