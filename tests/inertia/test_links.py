@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
@@ -17,7 +18,7 @@ from silo.bom.errors import ConfigError, InputError
 from silo.inertia.bodies import box, placement
 from silo.inertia.calculator import Task, calculate
 from silo.inertia.frames import FrameChoice, origin_frame
-from silo.inertia.links import claim, link_map, matches, read_link_map
+from silo.inertia.links import as_link_map, claim, link_map, matches, read_link_map
 from silo.inertia.materials import load_materials
 from silo.inertia.model import Instance
 from silo.inertia.output.urdf import frame_doubts, root_link
@@ -29,6 +30,29 @@ PART = box("p", 0.1, 0.1, 0.1)
 def instance(path: str, products: str = "") -> Instance:
     names = tuple(path.split("/"))
     return Instance(names, tuple(products.split("/")) if products else names, "p")
+
+
+@pytest.mark.parametrize(
+    ("links", "words"),
+    [
+        ({}, "list of patterns for each link"),
+        ({None: ["x"]}, "a link's name is a text, got None"),
+        ({"": ["x"]}, "a link's name is a text, got ''"),
+        ({"a": {"x"}}, "a: wanted a list of patterns, got {'x'}"),
+        ({"a": [["x"]]}, "a: wanted a list of patterns"),
+        ({"a": {"part": ["x"], 7: 1}}, "a: unknown key “7”; known are parts, frame, origin"),
+        ({"a": {"parts": ["x"], "frame": {"xyz": [0, 0, 0]}}}, "a: frame: wanted the name of a part"),
+        ({"a": {"parts": ["x"], "origin": 5}}, "a: origin: wanted {xyz"),
+        ({"a": {"parts": ["x"], "origin": {"xyz": "ab"}}}, "a: origin: wanted {xyz"),
+        (["x"], "got list"),
+        (7, "got int"),
+    ],
+)
+def test_plain_values_that_are_no_links_are_refused_with_a_sentence(links: Any, words: str) -> None:
+    """Links given in Python, not from YAML, may hold any type."""
+    with pytest.raises(ConfigError, match=re.escape(words)):
+        as_link_map(links)
+    assert as_link_map({"a": ("x", "y")}) is not None
 
 
 @pytest.mark.parametrize(

@@ -82,14 +82,15 @@ def add_reading_options(parser: argparse.ArgumentParser, *, jobs: bool = True) -
     group.add_argument("--no-index", action="store_true", help="read every file, and remember nothing")
     if jobs:
         group.add_argument(
-            "--jobs", type=_jobs, metavar="N", help="processes that read (default: the processors)"
+            "--jobs", type=job_count, metavar="N", help="processes that read (default: the processors)"
         )
         group.add_argument(
             "--dask", metavar="ADDRESS", help="read on a Dask cluster that sees the same files (extra: dask)"
         )
 
 
-def _jobs(text: str) -> int:
+def job_count(text: str) -> int:
+    """How many processes, as an argument."""
     if not text.isascii() or not text.isdigit() or not 1 <= int(text) <= 512:
         raise argparse.ArgumentTypeError(f"{text!r} is no number from 1 to 512")
     return int(text)
@@ -103,8 +104,8 @@ def reading_of(args: argparse.Namespace) -> Iterator[Reading]:
 
     given = getattr(args, "index", None)
     path = None if getattr(args, "no_index", False) else given or default_path()
-    jobs = getattr(args, "jobs", 1) or _processors()  # a command without the option reads one tree
-    with Index(path, given=given is not None) as index, pool_of(jobs, getattr(args, "dask", None)) as pool:
+    count = getattr(args, "jobs", 1) or _processors()  # a command without the option reads one tree
+    with Index(path, given=given is not None) as index, pool_of(count, getattr(args, "dask", None)) as pool:
         yield Reading(index, pool)
 
 

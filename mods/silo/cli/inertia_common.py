@@ -40,6 +40,14 @@ def add_geometry_options(parser: argparse.ArgumentParser) -> None:
         "--timeout", type=float, default=600.0, metavar="S", help="give up reading after S seconds"
     )
     group.add_argument(
+        "--jobs",
+        type=common.job_count,
+        dest="geometry_jobs",
+        default=0,
+        metavar="N",
+        help="processes that read one large file or split assembly (default: the processors)",
+    )
+    group.add_argument(
         "--no-siblings", action="store_true", help="do not look for the files of split assemblies"
     )
     group.add_argument(
@@ -186,11 +194,23 @@ def check_outputs(names: Sequence[str], previews: Sequence[str]) -> None:
             raise InputError(f"{name}: there is no folder {Path(name).parent}")
 
 
+def read_options(args: argparse.Namespace, **more: Any) -> ReadOptions:
+    """What the arguments say about reading geometry."""
+    from silo.inertia.geometry import ReadOptions
+
+    return ReadOptions(
+        mesh_unit=args.mesh_unit,
+        timeout_s=args.timeout,
+        processes=args.geometry_jobs,
+        siblings=not args.no_siblings,
+        cache=not args.no_cache,
+        **more,
+    )
+
+
 def read(path: str, args: argparse.Namespace, *, via: str = "files", **more: Any) -> Assembly:
     """The geometry, with progress on a terminal; Ctrl-C stops it at once. ``via``: who opens the file."""
     from dataclasses import replace
-
-    from silo.inertia.geometry import ReadOptions
 
     reader: Callable[[str, ReadOptions], Assembly]
     if via == "freecad":
@@ -198,13 +218,7 @@ def read(path: str, args: argparse.Namespace, *, via: str = "files", **more: Any
     else:
         from silo.inertia.calculator import read_geometry as reader
 
-    options: ReadOptions = ReadOptions(
-        mesh_unit=args.mesh_unit,
-        timeout_s=args.timeout,
-        siblings=not args.no_siblings,
-        cache=not args.no_cache,
-        **more,
-    )
+    options = read_options(args, **more)
     with _progress(Path(path).name) as told:
         return reader(path, replace(options, progress=told))
 

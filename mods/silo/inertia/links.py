@@ -161,20 +161,26 @@ def link_map(data: Any, source: str = "the link map") -> LinkMap:
     if not isinstance(links, dict) or not links:
         raise ConfigError(f"{source}: wanted “links:” with a list of patterns for each link")
     problems: list[str] = []
-    made = tuple(_link(str(name), value, problems) for name, value in links.items())
+    made = tuple(_link(name, value, problems) for name, value in links.items())
     if problems:
         raise ConfigError(f"{source}: " + "; ".join(problems))
     return LinkMap(made, source)
 
 
-def _link(name: str, value: Any, problems: list[str]) -> Link:
-    given: dict[str, Any] = value if isinstance(value, dict) else {"parts": value}
+def _link(name: Any, value: Any, problems: list[str]) -> Link:
+    if not isinstance(name, str) or not name.strip():
+        problems.append(f"a link's name is a text, got {name!r}")
+    given: dict[Any, Any] = value if isinstance(value, dict) else {"parts": value}
     parts = given.get("parts", [])
     patterns = [parts] if isinstance(parts, str) else parts
-    if not isinstance(patterns, list) or not patterns or not all(p and isinstance(p, str) for p in patterns):
+    if (
+        not isinstance(patterns, list | tuple)
+        or not patterns
+        or not all(p and isinstance(p, str) for p in patterns)
+    ):
         problems.append(f"{name}: wanted a list of patterns, got {parts!r}")
         patterns = []
-    for key in sorted(set(given) - {"parts", "frame", "origin"}):
+    for key in sorted(set(given) - {"parts", "frame", "origin"}, key=str):
         problems.append(f"{name}: unknown key “{key}”; known are parts, frame, origin")
     if "frame" in given and "origin" in given:
         problems.append(f"{name}: has both a frame and an origin; one of them")
@@ -182,12 +188,14 @@ def _link(name: str, value: Any, problems: list[str]) -> Link:
     if "origin" in given:
         try:
             origin = _origin(given["origin"])
-        except (TypeError, ValueError, KeyError) as error:
+        except (AttributeError, TypeError, ValueError) as error:
             problems.append(
                 f"{name}: origin: wanted {{xyz: [x, y, z], rpy: [r, p, y]}} in m and rad ({error})"
             )
     frame = given.get("frame")
-    return Link(name, tuple(patterns), None if frame is None else str(frame), origin)
+    if frame is not None and not isinstance(frame, str):
+        problems.append(f"{name}: frame: wanted the name of a part or sub-assembly, got {frame!r}")
+    return Link(str(name), tuple(patterns), None if frame is None else str(frame), origin)
 
 
 def _origin(value: Mapping[str, Any]) -> Floats:

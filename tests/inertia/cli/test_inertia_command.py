@@ -20,6 +20,9 @@ import jsonschema_rs
 import numpy as np
 import pytest
 
+from silo.cli.inertia_common import read_options
+from silo.cli.main import build_parser
+
 Run = Callable[..., Any]
 SCHEMA = Path(__file__).parents[3] / "docs" / "inertia-schema.json"
 
@@ -264,6 +267,17 @@ def test_mistakes_are_one_plain_sentence(
     assert ran.code == 2
     assert message in ran.err
     assert len(ran.err.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize("command", ["inertia", "links", "mass"])
+def test_jobs_say_how_many_processes_read(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """The processors by default; a number that is none is refused."""
+    parser = build_parser()
+    assert read_options(parser.parse_args([command, "arm.step"])).processes == 0
+    assert read_options(parser.parse_args([command, "arm.step", "--jobs", "3"])).processes == 3
+    with pytest.raises(SystemExit, match="2"):
+        parser.parse_args([command, "arm.step", "--jobs", "0"])
+    assert "no number from 1 to 512" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("data", [b"", b"not a step file", b"ISO-10303-21;\nHEADER;\n"])

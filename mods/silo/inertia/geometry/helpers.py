@@ -44,7 +44,7 @@ MOST = 7
 
 AHEAD = 2
 """Tasks that a helper has at once: the kernel keeps the interpreter while it works here, and a helper that
-waits for its next task would wait as long."""
+waits for its next task would wait as long. The last task of all is for who is free first."""
 
 _CODE = "from silo.inertia.geometry.helpers import main; main()"
 
@@ -183,7 +183,7 @@ class _Helper:
             taken: deque[int] = deque()
             while True:
                 with suppress(IndexError):
-                    while len(taken) < AHEAD:
+                    while not taken or (len(taken) < AHEAD and len(waiting) > 1):
                         taken.append(waiting.popleft())
                         self._send(*there(rows[taken[-1]]))
                 if not taken:
