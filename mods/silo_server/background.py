@@ -87,8 +87,9 @@ class Probe:
         """How the server is now, None where that does not turn out within ``seconds``."""
         if self._running is None or self._running.done():
             self._running = asyncio.get_running_loop().run_in_executor(self._executor, self._look)
-        done, _ = await asyncio.wait({self._running}, timeout=seconds)
-        return self._running.result() if done else None
+        running = self._running  # while this one waits, another caller may begin the next look
+        done, _ = await asyncio.wait({running}, timeout=seconds)
+        return running.result() if done else None
 
     def stop(self) -> None:
         """Take no more looks."""

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import json
 import os
@@ -18,7 +19,9 @@ import pytest
 from server_testing import Api, Databases, bom, wait_until
 from sqlalchemy import make_url
 
+from silo_server.background import Probe
 from silo_server.db.engine import WRITERS_WAITING, Database
+from silo_server.files import FileStore
 from silo_server.run import running_server
 from silo_server.services.access import credentials
 from silo_server.settings import Settings
@@ -83,6 +86,23 @@ def test_reads_and_health_go_on_while_writers_wait(url: str, tmp_path: Path) -> 
         assert {status for status, _ in statuses} <= {201, 409, 503}
         assert len(statuses) == count
         assert api.call("PUT", f"/api/items/{parent}", {"name": "free again"}).status == 200
+
+
+def test_many_may_ask_for_the_health_at_once(db: Database, tmp_path: Path) -> None:
+    """One look serves all who wait for it, while others begin the next."""
+    probe = Probe(db, FileStore(tmp_path))
+
+    async def ask() -> None:
+        for _ in range(20):
+            state = await probe.look(30)
+            assert state is not None
+            assert state.ready
+
+    async def ask_together() -> None:
+        await asyncio.gather(*(ask() for _ in range(8)))
+
+    asyncio.run(ask_together())
+    probe.stop()
 
 
 def test_the_last_use_of_a_token_is_noted_when_it_can_be(db: Database) -> None:
