@@ -61,7 +61,7 @@ def story() -> None:
     tell(register=total(registers[:1]))
     window.close()
     names = tuple(obj.Name for obj in doc.Objects if obj.TypeId == "App::Link")
-    tell(show=clocked(lambda: one.show_objects(doc.FileName, names)), shown=len(names))
+    tell(show=clocked(lambda: one.buttons.show_objects(doc.FileName, names)), shown=len(names))
 
 
 inside.LONGEST_S = 170

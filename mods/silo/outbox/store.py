@@ -196,9 +196,14 @@ class Store(Database):
             changed["request"] = ""
         self.update(entry_id, **changed)
 
-    def discard(self, entry_id: int) -> None:
-        """Forget an entry and its copy; the document itself is not touched."""
+    def discard(self, entry_id: int, *, keep: bool = False) -> None:
+        """Forget an entry and its copy; the document itself is not touched.
+
+        ``keep``: the copy is kept aside first.
+        """
         entry = self._known(entry_id)
+        if keep and entry.file_left:
+            self.save_copy(entry_id, self.aside(entry.file_name))
         with self.transaction() as db:
             db.execute("DELETE FROM entry WHERE id = ?", (entry_id,))
         self._drop_files(entry)
@@ -304,15 +309,22 @@ class Store(Database):
             row = (canonical(server), sha256, item, revision)
             db.execute("INSERT OR REPLACE INTO known VALUES (?, ?, ?, ?)", row)
 
+    def aside(self, path: str) -> Path:
+        """A new place for a copy of a file; its folder is there. DocumentError where it cannot be made."""
+        folder = self.path.parent / "kept-aside" / time.strftime("%Y-%m-%d")
+        try:
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        except OSError as error:
+            raise DocumentError(str(folder), f"cannot be made ({error.strerror or error})") from error
+        return folder / f"{time.strftime('%H%M%S')}-{time.monotonic_ns() % 10**6}-{os.path.basename(path)}"
+
     def keep_aside(self, path: str) -> Path | None:
         """Keep a copy of a file that is about to be replaced; where it is, None where there is no file.
 
         Raises DocumentError where the disk does not take it.
         """
-        folder = self.path.parent / "kept-aside" / time.strftime("%Y-%m-%d")
-        target = folder / f"{time.strftime('%H%M%S')}-{time.monotonic_ns() % 10**6}-{os.path.basename(path)}"
+        target = self.aside(path)
         try:
-            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             shutil.copy2(path, target)
         except FileNotFoundError:
             return None

@@ -4,10 +4,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from functools import cached_property
 from importlib import import_module
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from silo.workbench.commit.opened import Opened
@@ -20,13 +20,14 @@ from silo.workbench.words import plain, translate
 if TYPE_CHECKING:
     from silo.bom.model import BomEntry
     from silo.outbox.send import Sent
+    from silo.workbench.buttons import Buttons
     from silo.workbench.commit.flow import CommitFlow
     from silo.workbench.freecad.hooks import CommitHook
     from silo.workbench.freecad.live_desk import LiveDesk
-    from silo.workbench.pane.activity import Action
     from silo.workbench.preview.flow import PreviewFlow
     from silo.workbench.register.flow import RegisterFlow
     from silo.workbench.revisions.flow import RevisionFlow
+    from silo.workbench.session.colleagues import Newer
     from silo.workbench.session.session import Session, Shown
 
 # FreeCAD's window comes first; a server is not talked to before it stands.
@@ -44,19 +45,14 @@ class AddOn:
 
     def __init__(self) -> None:
         self.preferences = Preferences(host.parameters(GROUP))
-        self.dock = ActivityDock(host.main_window(), self.act)
+        self.dock = ActivityDock(host.main_window(), lambda action: self.buttons.act(action))
         self.relay = qt.Relay(self._bug)
         # From the start: what a document was made from is known only when it is opened.
         self.opened = Opened(lambda: self.session.outbox)
         host.add_document_observer(self.opened)
-        self._session: Session | None = None
-        self._desk: LiveDesk | None = None
-        self._commits: CommitFlow | None = None
-        self._revisions: RevisionFlow | None = None
-        self._previews: PreviewFlow | None = None
-        self._registrations: RegisterFlow | None = None
         self._hook: CommitHook | None = None
         self._drawn: Shown | None = None
+        self._present: tuple[Any, tuple[str, ...]] = (None, ())
         self._window: Any = None
         self._timer: Any = None
         self._watch: Any = None
@@ -93,88 +89,81 @@ class AddOn:
     def _closing(self) -> None:
         """FreeCAD's window is asked to close: what was committed is saved and held before its documents
         go."""
-        if self._commits is not None:
-            self._commits.finish()
+        if "commits" in vars(self):
+            self.commits.finish()
 
     def _end(self) -> None:
         from silo.workbench.gui.closing import wait_for_disk
 
         self.session.close(wait_for_disk)
 
-    @property
+    # Each is made when it is first needed, and so are its imports.
+
+    @cached_property
     def session(self) -> Session:
-        """The session; made when first needed."""
-        if self._session is None:
-            from silo.workbench.session.session import Listener, Session
-            from silo.workbench.settings.server import read_known
-            from silo.workbench.settings.tokens import Keyring
+        """What works beside the GUI thread."""
+        from silo.workbench.session.session import Listener, Session
+        from silo.workbench.settings.server import read_known
+        from silo.workbench.settings.tokens import Keyring
 
-            self._session = Session(
-                self.relay.post,
-                read_known(self.preferences),
-                Keyring(),
-                listener=Listener(shown=self._shown, console=host.warning, sent=self._sent, bug=self._bug),
-            )
-        return self._session
+        listener = Listener(shown=self._shown, console=host.warning, sent=self._sent, bug=self._bug)
+        return Session(self.relay.post, read_known(self.preferences), Keyring(), listener=listener)
 
-    @property
+    @cached_property
+    def buttons(self) -> Buttons:
+        """What the buttons of the pane do."""
+        from silo.workbench.buttons import Buttons
+
+        return Buttons(self)
+
+    @cached_property
     def desk(self) -> LiveDesk:
-        """FreeCAD as the flows see it; made when first needed."""
-        if self._desk is None:
-            from silo.workbench.freecad.live_desk import LiveDesk
+        """FreeCAD as the flows see it."""
+        from silo.workbench.freecad.live_desk import LiveDesk
 
-            self._desk = LiveDesk(self.opened, lambda: self.preferences.flag("CountHardware"))
-        return self._desk
+        return LiveDesk(self.opened, lambda: self.preferences.flag("CountHardware"))
 
-    @property
+    @cached_property
     def commits(self) -> CommitFlow:
-        """The commit flow; made when first needed."""
-        if self._commits is None:
-            from silo.workbench.commit.flow import CommitFlow
+        """The commit flow."""
+        from silo.workbench.commit.flow import CommitFlow
 
-            self._commits = CommitFlow(
-                self.session,
-                self.preferences,
-                self.desk,
-                register=self.register_path,
-                choose=lambda *wanted: self.revisions.choose(*wanted),
-            )
-        return self._commits
+        return CommitFlow(
+            self.session,
+            self.preferences,
+            self.desk,
+            register=self.buttons.register,
+            choose=lambda *wanted: self.revisions.choose(*wanted),
+        )
 
-    @property
+    @cached_property
     def revisions(self) -> RevisionFlow:
-        """Getting files from Silo; made when first needed."""
-        if self._revisions is None:
-            from silo.workbench.revisions.flow import RevisionFlow
+        """Getting files from Silo."""
+        from silo.workbench.revisions.flow import RevisionFlow
 
-            self._revisions = RevisionFlow(self.session, self.desk)
-        return self._revisions
+        return RevisionFlow(self.session, self.desk)
 
-    @property
+    @cached_property
     def previews(self) -> PreviewFlow:
-        """The previews; made when first needed."""
-        if self._previews is None:
-            from silo.workbench.preview.flow import PreviewFlow
+        """The previews."""
+        from silo.workbench.preview.flow import PreviewFlow
 
-            self._previews = PreviewFlow(
-                self.session,
-                self.commits,
-                self.desk,
-                register=self.register_path,
-                show=self.show_objects,
-                view=self.open_page,
-                known=self._show_numbers,
-            )
-        return self._previews
+        return PreviewFlow(
+            self.session,
+            self.commits,
+            self.desk,
+            register=self.buttons.register,
+            show=self.buttons.show_objects,
+            view=self.buttons.open_page,
+            known=self._show_numbers,
+        )
 
-    @property
+    @cached_property
     def registrations(self) -> RegisterFlow:
-        """The registering dialogs; made when first needed."""
-        if self._registrations is None:
-            from silo.workbench.register.flow import RegisterFlow
+        """The registering dialogs."""
+        from silo.workbench.register.flow import RegisterFlow
 
-            self._registrations = RegisterFlow(self.session, self.preferences, self.commits, self.desk)
-        return self._registrations
+        return RegisterFlow(self.session, self.preferences, self.commits, self.desk)
 
     def settings_changed(self) -> None:
         """The preference page was saved."""
@@ -194,35 +183,35 @@ class AddOn:
     def _draw(self) -> None:
         shown, self._drawn = self._drawn, None
         if shown is not None:
-            self.dock.update_shown(replace(shown, presence=self._presence()) if shown.newer else shown)
+            presence = self._presence(shown.newer) if shown.newer else ()
+            self.dock.update_shown(replace(shown, presence=presence))
 
-    def _presence(self) -> tuple[str, ...]:
+    def _presence(self, colleagues: Mapping[str, Newer]) -> tuple[str, ...]:
         """What colleagues committed of the documents that are open, since they were opened."""
-        told = []
-        for doc in host.documents():
-            identity = self.desk.identity(doc) if doc.FileName else None
-            newer = self.session.newer_than(identity, self.opened.of(doc).since) if identity else None
-            if newer is not None:
-                text = translate("Silo", "{who} committed {name} (revision {n}) since you opened it.")
-                for key, value in (
-                    ("{who}", newer.who or translate("Silo", "Somebody")),
-                    ("{name}", plain(f"{newer.part_number} {doc.Label}", 60)),
-                    ("{n}", str(newer.revision)),
-                ):
-                    text = text.replace(key, value)
-                told.append(text)
-        return tuple(told)
+        docs = [(doc, self.opened.of(doc).since) for doc in host.documents() if doc.FileName]
+        # To find the item of each document takes a while where there are hundreds.
+        asked = (colleagues, [(doc.Name, since) for doc, since in docs])
+        if asked != self._present[0]:
+            from silo.workbench.pane.banner import presence_text
+
+            found = []
+            for doc, since in docs:
+                newer = self.session.newer_than(self.desk.identity(doc) or "", since)
+                if newer is not None:
+                    found.append(presence_text(newer, str(doc.Label)))
+            self._present = (asked, tuple(found))
+        return self._present[1]
 
     def _sent(self, sent: Sent) -> None:
         """A commit of this FreeCAD arrived."""
         path = sent.entry.path
         if sent.resolved is not None:
             self._show_numbers(path, sent.resolved.entries)
-        if self._previews is not None:
-            self._previews.again(path)
+        if "previews" in vars(self):
+            self.previews.again(path)
         left = len(sent.resolved.unresolved) if sent.resolved is not None else 0
         if left and self.preferences.flag("AskRegister") and self.commits.was_asked_for(sent.entry.key):
-            self.register_path(path)
+            self.buttons.register(path)
 
     def _show_numbers(self, path: str, entries: Iterable[BomEntry]) -> None:
         from silo.workbench.freecad import silo_group
@@ -338,22 +327,6 @@ class AddOn:
         self._window.show()
         self.revisions.history(identity, self.opened.of(doc), self._window.fill, self._window.fail)
 
-    def register_path(self, path: str) -> None:
-        """Give part numbers to the components of this document, where it is open."""
-        doc = host.find_document(path)
-        if doc is None:
-            host.warning(translate("Silo", "[Silo] This document is not open: ") + plain(path))
-        else:
-            self.registrations.start(doc)
-
-    def preview_path(self, path: str) -> None:
-        """Compare this document with the server, where it is open."""
-        doc = host.find_document(path)
-        if doc is None:
-            host.warning(translate("Silo", "[Silo] This document is not open: ") + plain(path))
-        else:
-            self.previews.start(doc)
-
     def show_activity(self) -> None:
         """Show the pane."""
         self.dock.show_and_raise()
@@ -367,79 +340,3 @@ class AddOn:
         from silo.workbench.gui.help_window import HelpWindow
 
         HelpWindow(host.main_window()).show()
-
-    # -- the pane's buttons -----------------------------------------------------------------------------
-
-    def act(self, action: Action) -> None:
-        """Do what a button of the pane asks for."""
-        from silo.workbench.pane.activity import Do
-
-        if action.do is Do.VIEW:
-            self.open_page(action.target)
-        elif action.do is Do.SHOW:
-            self.show_objects(action.document, action.objects)
-        elif action.do is Do.RETRY:
-            if action.target:
-                self.session.retry(int(action.target))
-            else:
-                self.session.retry_all()
-        elif action.do is Do.SEND_HERE:
-            self.session.send_here(int(number) for number in action.target.split(","))
-        elif action.do is Do.SAVE_COPY:
-            self._save_copy(int(action.target), action.document)
-        elif action.do is Do.DISCARD:
-            self.session.discard(int(action.target))
-        elif action.do is Do.STOP:
-            self.session.cancel()
-        elif action.do is Do.PREVIEW:
-            self.preview_path(action.document)
-        elif action.do is Do.SAME:
-            self._same_part(action)
-        elif action.do in (Do.REGISTER, Do.DECIDE):
-            self.register_path(action.document)
-        elif action.do is Do.SETTINGS:
-            self.show_settings()
-
-    def _same_part(self, action: Action) -> None:
-        """These files are one part on purpose; the BOM is synced without the question."""
-        self.commits.decisions.accept(action.target, action.objects)
-        doc = host.find_document(action.document)
-        if doc is not None:
-            self.commits.sync_only(doc)
-
-    def _save_copy(self, entry_id: int, name: str) -> None:
-        """Ask where to, and write the file of something that waits."""
-        target = qt.ask_where_to_save(host.main_window(), translate("Silo", "Save a copy"), name)
-        if target:
-            self.session.save_copy(entry_id, Path(target))
-
-    def open_page(self, url: str) -> None:
-        """Open a page of the server in use; where no browser opens, the address is on the clipboard."""
-        from silo.api.address import ServerAddress
-        from silo.bom.errors import SiloError
-
-        try:
-            # A box may be older than the settings.
-            page = ServerAddress.parse(self.session.shown.server.url).web(url)
-        except SiloError:
-            text = translate("Silo", "[Silo] Not opened, for it is not on the Silo server in use: ")
-            host.warning(text + plain(url, 300))
-            return
-        if not qt.open_url(page):
-            qt.copy(page)
-            qt.tell_at_pointer(translate("Silo", "No browser could be opened. The address was copied."))
-            text = translate("Silo", "[Silo] No browser could be opened; the address was copied: ")
-            host.message(text + page)
-
-    def show_objects(self, path: str, names: tuple[str, ...]) -> None:
-        """Select objects of a document in the 3D view and the tree."""
-        doc = host.find_document(path)
-        if doc is None:
-            host.warning(translate("Silo", "[Silo] This document is not open: ") + plain(path))
-            return
-        found = host.select(doc, names)
-        if not found:
-            host.warning(translate("Silo", "[Silo] These objects are not in the document any more."))
-        elif found > host.MOST_SELECTED:
-            text = translate("Silo", "[Silo] The first {n} of {all} objects are selected.")
-            host.message(text.replace("{n}", str(host.MOST_SELECTED)).replace("{all}", str(found)))

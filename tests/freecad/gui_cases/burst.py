@@ -72,10 +72,10 @@ def page(one: Any) -> None:
 
     qt.open_url = no_browser
     clipboard = QtWidgets.QApplication.clipboard()
-    one.open_page("https://example.org/items/A01-0001/bom")
-    one.open_page("javascript:alert(1)//")
-    one.open_page("file:///etc/passwd")
-    one.open_page(os.environ["SILO_API_URL"] + "/items/A01-0001/bom")
+    one.buttons.open_page("https://example.org/items/A01-0001/bom")
+    one.buttons.open_page("javascript:alert(1)//")
+    one.buttons.open_page("file:///etc/passwd")
+    one.buttons.open_page(os.environ["SILO_API_URL"] + "/items/A01-0001/bom")
     tell(asked=asked, copied=clipboard.text())
 
 

@@ -67,3 +67,20 @@ def test_what_is_out_of_date_is_not_offered_again(entry: Entry) -> None:
     (row,) = rows([replace(entry, state=State.HELD, superseded=True, reason="x")], HERE)
     assert [a.do for a in row.actions] == [Do.SAVE_COPY, Do.DISCARD]
     assert "would undo it" in row.reason
+
+
+def test_a_held_commit_has_the_choices_of_the_dialog(entry: Entry) -> None:
+    """Open theirs, take theirs, mine on top; a commit without a path of its own can only go or be dropped."""
+    newer = {"revision_number": 2, "created_by": "alice", "comment": "less"}
+    held = replace(entry, state=State.HELD, reason="alice committed revision 2", newer=newer)
+    (row,) = rows([held], HERE)
+    assert [(a.do, a.text) for a in row.actions[:3]] == [
+        (Do.OPEN_THEIRS, "Open theirs beside mine"),
+        (Do.TAKE_THEIRS, "Take theirs"),
+        (Do.RETRY, "Commit mine on top"),
+    ]
+    assert [a.do for a in row.actions[3:]] == [Do.SAVE_COPY, Do.DISCARD]
+    (row,) = rows([replace(held, path="")], HERE)
+    assert [a.do for a in row.actions] == [Do.RETRY, Do.SAVE_COPY, Do.DISCARD]
+    (row,) = rows([replace(held, server="http://old.example:80")], HERE)
+    assert [a.do for a in row.actions] == [Do.SEND_HERE, Do.SAVE_COPY, Do.DISCARD]

@@ -19,6 +19,7 @@ from silo.workbench.words import plain, quantity, translate
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
+    from silo.outbox.entry import Entry
 
 
 class Choice(StrEnum):
@@ -74,6 +75,19 @@ class Theirs:
             base = translate("Silo", "revision {n}").replace("{n}", str(self.base))
         who = plain(self.who, 60) or translate("Silo", "Somebody")
         return text.replace("{base}", base).replace("{n}", str(self.revision)).replace("{who}", who)
+
+
+def of_held(entry: Entry) -> Theirs:
+    """The revision that a held commit of the outbox would undo, as it was when the commit was to be sent."""
+    newer = entry.newer
+    return Theirs(
+        entry.path,
+        entry.part_number,
+        newer["revision_number"],
+        newer.get("created_by") or "",
+        comment=newer.get("comment") or "",
+        newer=newer,
+    )
 
 
 def line_words(line: ThreeLines, *, known: bool = True) -> str:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Iterable
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from silo.workbench.freecad import host, saving
@@ -26,25 +27,33 @@ MOST, MOST_S, PAUSE_MS = 500, 0.005, 40
 _OUTPUT, _NO_PERSIST = 8, 32
 
 
+# Path of a document → what is still to be shown in it.
+_todo: dict[str, deque[tuple[str, str, str]]] = {}
+
+
 def show(path: str, entries: Iterable[BomEntry]) -> None:
     """Show the number and the state of the components of a document, where it is open; some in each turn."""
     in_silo = translate("Silo", "in Silo")
     left_out = translate("Silo", "not registered: left out of the BOM")
-    todo = deque(
+    wanted = (
         (name, entry.part_number or "", in_silo if entry.part_number else left_out)
         for entry in entries
         for name in entry.instances
     )
-    while len(todo) > MOST:
-        todo.pop()
-    _turn(path, todo)
+    is_under_way = path in _todo
+    _todo[path] = deque(islice(wanted, MOST))
+    if not is_under_way:
+        _turn(path)
 
 
-def _turn(path: str, todo: deque[tuple[str, str, str]]) -> None:
-    # Each change makes FreeCAD measure the whole assembly for its axis cross: 1000 links take 2 s.
-    doc = host.find_document(path)
+def _turn(path: str) -> None:
+    doc, todo = host.find_document(path), _todo[path]
+    while doc is not None and todo and _is_shown(doc, *todo[0]):
+        todo.popleft()
     if doc is None or not todo:
+        del _todo[path]
         return
+    # Each change makes FreeCAD measure the whole assembly for its axis cross: 1000 links take 2 s.
     until = time.thread_time() + MOST_S
     with saving.others_unmarked():
         while todo and time.thread_time() < until:
@@ -53,7 +62,17 @@ def _turn(path: str, todo: deque[tuple[str, str, str]]) -> None:
             if obj is not None:
                 _put(obj, SHOWN_NUMBER, number, translate("Silo", "Part number in Silo"))
                 _put(obj, SHOWN_STATE, state, translate("Silo", "What Silo knows of this component"))
-    qt.later(PAUSE_MS, lambda: _turn(path, todo))
+    qt.later(PAUSE_MS, lambda: _turn(path))
+
+
+def _is_shown(doc: Any, name: str, number: str, state: str) -> bool:
+    obj = doc.getObject(name)
+    if obj is None:
+        return True
+    # A link without them would answer with those of its part.
+    if SHOWN_STATE not in obj.PropertiesList:
+        return False
+    return (number, state) == (obj.getPropertyByName(SHOWN_NUMBER), obj.getPropertyByName(SHOWN_STATE))
 
 
 def _put(obj: Any, name: str, value: str, tip: str) -> None:

@@ -50,6 +50,8 @@ class Do(StrEnum):
     SAME = "same"  # these files are the same part, on purpose
     DECIDE = "decide"  # a new part: opens the Register Parts dialog
     RETRY = "retry"  # send what waits in the outbox
+    OPEN_THEIRS = "open theirs"  # open the colleague's revision that a held commit would undo
+    TAKE_THEIRS = "take theirs"  # and take it in the place of one's own
     SEND_HERE = "send here"  # send what waits for another address to the server in use
     SAVE_COPY = "save copy"  # write the file of what waits somewhere else
     DISCARD = "discard"  # drop what waits in the outbox

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from urllib.parse import urlsplit
 
 from silo.workbench.pane.activity import Action, Do, Tone
+from silo.workbench.session.colleagues import Newer
 from silo.workbench.session.session import Shown
 from silo.workbench.words import plain, translate
 
@@ -25,6 +26,18 @@ class Banner:
     ground: str = ""
     ink: str = ""
     actions: tuple[Action, ...] = ()
+
+
+def presence_text(newer: Newer, label: str) -> str:
+    """That a colleague committed a document since it was opened."""
+    text = translate("Silo", "{who} committed {name} (revision {n}) since you opened it.")
+    for key, value in (
+        ("{who}", newer.who or translate("Silo", "Somebody")),
+        ("{name}", plain(f"{newer.part_number} {label}", 60)),
+        ("{n}", str(newer.revision)),
+    ):
+        text = text.replace(key, value)
+    return text
 
 
 def banner(shown: Shown) -> Banner:

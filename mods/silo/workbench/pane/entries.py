@@ -22,7 +22,7 @@ from silo.bom.report import shorten
 from silo.bom_sync import Resolved, Status
 from silo.outbox.send import Sent
 from silo.workbench.pane.activity import Action, Batch, Do, Entry, Line, Tone, shortened
-from silo.workbench.session.session import Newer
+from silo.workbench.session.colleagues import Newer
 from silo.workbench.words import counted, plain, quantity, translate
 
 # Makes an absolute address of a page such as `resolve_url`; raises SiloError for another server's.

@@ -75,6 +75,12 @@ def _actions(entry: Entry, here: str, *, away: bool) -> Iterable[Action]:
     elif entry.state is State.HELD and not entry.superseded:
         asked = entry.renamed == ASKED
         text = translate("Silo", "Same part") if asked else translate("Silo", "Retry")
+        if entry.newer:
+            # The choices of the commit dialog.
+            if entry.path:
+                yield Action(Do.OPEN_THEIRS, translate("Silo", "Open theirs beside mine"), target=target)
+                yield Action(Do.TAKE_THEIRS, translate("Silo", "Take theirs"), target=target)
+            text = translate("Silo", "Commit mine on top")
         yield Action(Do.RETRY, text, target=target)
         if asked:
             yield Action(Do.DECIDE, translate("Silo", "New part…"), document=entry.path)

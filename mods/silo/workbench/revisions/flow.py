@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from silo.api.client import SiloClient
     from silo.api.wire import Item, Revision
     from silo.vault.pull import Pulled
+    from silo.workbench.commit.plan import Documents
     from silo.workbench.session.jobs import Control
 
 MOST_FOUND = 60
@@ -35,6 +36,9 @@ MOST_FOUND = 60
 
 class Desk(Protocol):
     """What is needed of FreeCAD (:class:`silo.workbench.freecad.live_desk.LiveDesk`)."""
+
+    @property
+    def documents(self) -> Documents: ...
 
     def find(self, path: str, /) -> Any | None: ...
 
@@ -74,10 +78,16 @@ class RevisionFlow:
 
     # -- a colleague's file -----------------------------------------------------------------------------
 
-    def choose(self, path: str, theirs: Theirs, choice: Choice) -> None:
-        """Carry out what a person chose in the commit dialog or in the pane."""
+    def choose(
+        self, path: str, theirs: Theirs, choice: Choice, *, taken: Callable[[], object] = lambda: None
+    ) -> None:
+        """Carry out what a person chose in the commit dialog or in the pane.
+
+        taken
+            called when theirs is in the place of mine.
+        """
         if choice is Choice.TAKE:
-            self._take(path, theirs)
+            self._take(path, theirs, taken)
         elif choice is Choice.OPEN:
             self._open_beside(path, theirs)
 
@@ -101,9 +111,13 @@ class RevisionFlow:
         shutil.copy2(path, target)
         self._desk.open(str(target))
 
-    def _take(self, path: str, theirs: Theirs) -> None:
+    def _take(self, path: str, theirs: Theirs, taken: Callable[[], object]) -> None:
+        def replace(content: Path | None) -> None:
+            self._replace(path, content, theirs)
+            taken()
+
         if not theirs.revision:
-            self._guarded(path, lambda: self._replace(path, None, theirs))
+            self._guarded(path, lambda: replace(None))
             return
         content = self._session.outbox.path.parent / "fetched" / f"{time.monotonic_ns()}.FCStd"
 
@@ -114,21 +128,24 @@ class RevisionFlow:
         self._session.ask(
             translate("Silo", "Fetching from Silo"),
             fetch,
-            done=lambda _none: self._guarded(path, lambda: self._replace(path, content, theirs)),
+            done=lambda _none: self._guarded(path, lambda: replace(content)),
             failed=lambda error: self._box_error(path, error),
         )
 
     def _replace(self, path: str, content: Path | None, theirs: Theirs) -> None:
         """Theirs in the place of mine, of which a copy is kept. ``content`` None: theirs is there already."""
         from silo.durable import replacing
+        from silo.files import content_hash
 
-        doc = self._desk.find(path)
-        kept = self._session.outbox.keep_aside(path)
+        doc, outbox, kept = self._desk.find(path), self._session.outbox, None
+        # The file on disk is mine, or it is a third person's.
+        is_mine = doc is not None and not self._desk.documents.base(doc).replaced
+        is_theirs = content is None or (os.path.exists(path) and content_hash(path) == content_hash(content))
+        if not is_mine and not is_theirs:
+            kept = outbox.keep_aside(path)
         if doc is not None:
-            mine = kept or _aside("mine", os.path.basename(path))
-            self._desk.save_copy(doc, mine)
-            kept = mine
-            self._desk.close(doc)
+            kept = outbox.aside(path)
+            self._desk.save_copy(doc, kept)
         if content is not None:
             try:
                 with content.open("rb") as read, replacing(path, mode=0o644) as write:
@@ -136,8 +153,10 @@ class RevisionFlow:
             except OSError as error:
                 raise DocumentError(path, f"cannot be written ({error.strerror or error})") from error
             content.unlink(missing_ok=True)
+        if doc is not None:
+            self._desk.close(doc)
         self._desk.open(path)
-        text = translate("Silo", "Yours is kept at {path}").replace("{path}", str(kept))
+        text = translate("Silo", "Yours is kept at {path}").replace("{path}", str(kept)) if kept else ""
         title = translate("Silo", "Took {who}'s revision {n}: {name}") if theirs.revision else ""
         title = title or translate("Silo", "Took the file on disk: {name}")
         for key, value in (("{who}", theirs.who), ("{n}", str(theirs.revision)), ("{name}", _name(path))):
@@ -166,7 +185,7 @@ class RevisionFlow:
             title=title,
             when=time.time(),
             tone=tone,
-            lines=(Line(text, tone),),
+            lines=(Line(text, tone),) if text else (),
             rank=1,
             icon="silo-open",
         )

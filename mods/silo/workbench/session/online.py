@@ -19,9 +19,9 @@ from silo.outbox.store import Store
 from silo.outbox.takeover import of_commit_folder
 from silo.workbench.pane import entries
 from silo.workbench.pane.activity import Entry
+from silo.workbench.session.colleagues import Newer
 from silo.workbench.session.gui_thread_gc import collection_off
 from silo.workbench.session.jobs import Control
-from silo.workbench.session.session import Newer
 from silo.workbench.settings.server import Known, Server, TokenStore, choose_server
 from silo.workbench.words import translate
 

@@ -15,10 +15,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from silo.bom.errors import ConfigError, SiloError
-from silo.outbox.entry import Commit
+from silo.outbox.entry import Commit, State
 from silo.outbox.entry import Entry as Waiting
 from silo.outbox.store import Store
 from silo.workbench.pane.activity import Activity, Entry
+from silo.workbench.session.colleagues import Colleagues, Newer
 from silo.workbench.session.jobs import Busy, Control, Deliver, Job, Worker
 from silo.workbench.settings.server import Known, Server, TokenStore
 from silo.workbench.words import translate
@@ -51,16 +52,6 @@ class Shown:
     activity: Activity = field(default_factory=Activity)
     newer: Mapping[str, Newer] = field(default_factory=dict)
     presence: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Newer:
-    """A commit that the server announced. ``at``: seconds of :func:`time.monotonic`."""
-
-    part_number: str
-    revision: int
-    who: str
-    at: float
 
 
 @dataclass(frozen=True)
@@ -120,7 +111,7 @@ class Session:
         self._looks = Worker("silo-looks", deliver, on_bug=bug)
         self._online: Online | None = None
         self._live = False
-        self._mine: set[tuple[str, int]] = set()
+        self._colleagues = Colleagues()
 
     # -- the server -------------------------------------------------------------------------------------
 
@@ -163,6 +154,8 @@ class Session:
 
     def _connected(self, result: tuple[Server, tuple[Waiting, ...]]) -> None:
         server, waiting = result
+        for entry in waiting:
+            self._colleagues.sending(entry.identity)
         self._show(server=server, waiting=waiting)
         if waiting and server.configured:
             self.send(force=False)
@@ -184,6 +177,7 @@ class Session:
         happens.
         """
         title = translate("Silo", "Keeping the commit")
+        self._colleagues.sending(commit.identity)
 
         def finish(_control: Control) -> None:
             made_from = base.origin if base is not None and commit.origin else ""
@@ -229,7 +223,8 @@ class Session:
 
     def _sent_all(self, result: Any) -> None:
         report, waiting = result
-        self._show(waiting=waiting)
+        self._colleagues.sent(entry.identity for entry in waiting if entry.state is not State.HELD)
+        self._show(waiting=waiting, newer=self._colleagues.newer)
         stopped = report.stopped_by if report is not None else None
         if stopped is not None and stopped.code != "cancelled":
             self._show(reason=str(stopped), connection=self._connection_after(stopped))
@@ -241,17 +236,13 @@ class Session:
         return self.shown.connection
 
     def _heard(self, identity: str, newer: Newer) -> None:
-        if (identity, newer.revision) not in self._mine:
-            self._show(newer={**self.shown.newer, identity: newer})
+        self._colleagues.heard(identity, newer)
+        self._show(newer=self._colleagues.newer)
 
     def _arrived(self, sent: Sent, lines: tuple[str, ...]) -> None:
         if sent.revision is not None:
-            # The server announces our own commit as well, before or after its answer.
-            identity = sent.entry.identity.lower()
-            self._mine.add((identity, sent.revision))
-            known = self.shown.newer.get(identity)
-            if known is not None and known.revision <= sent.revision:
-                self._show(newer={key: one for key, one in self.shown.newer.items() if key != identity})
+            self._colleagues.arrived(sent.entry.identity, sent.revision)
+            self._show(newer=self._colleagues.newer)
         for line in lines:
             self._listener.console(line)
         self._listener.sent(sent)
@@ -282,9 +273,9 @@ class Session:
             self._online.retry_now()
         self.send(force=True)
 
-    def discard(self, entry_id: int) -> None:
-        """Forget something that waits; the document is not touched."""
-        self._change(lambda: self.outbox.discard(entry_id))
+    def discard(self, entry_id: int, *, keep: bool = False) -> None:
+        """Forget something that waits; the document is not touched. ``keep``: a copy of its file stays."""
+        self._change(lambda: self.outbox.discard(entry_id, keep=keep))
 
     def save_copy(self, entry_id: int, target: Path) -> None:
         """Write the file of something that waits somewhere else."""

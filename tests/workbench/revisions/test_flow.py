@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""A commit that is held because of a colleague's: open theirs, take theirs. Without FreeCAD and Qt."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+from desk import Document, Documents, Office
+
+from silo.api.wire import Origin
+from silo.workbench.commit.flow import CommitFlow
+from silo.workbench.commit.theirs import Choice, of_held
+from silo.workbench.revisions.flow import RevisionFlow
+
+
+@dataclass
+class Cad:
+    """FreeCAD's documents and files."""
+
+    documents: Documents
+    docs: list[Document]
+    opened: list[Path] = field(default_factory=list)
+
+    def find(self, path: str, /) -> Document | None:
+        return next((doc for doc in self.docs if doc.FileName == path), None)
+
+    def open(self, path: str, /) -> None:
+        self.opened.append(Path(path))
+
+    def close(self, doc: Any, /) -> None:
+        self.docs.remove(doc)
+
+    def save_copy(self, doc: Any, path: Path, /) -> None:
+        path.write_bytes(doc.content)
+
+    def open_paths(self) -> tuple[str, ...]:
+        return tuple(doc.FileName for doc in self.docs)
+
+    def is_open_elsewhere(self, _path: str, /) -> bool:
+        return False
+
+
+@dataclass
+class Day:
+    """A held commit of "Plate", whose revision 2 is a colleague's."""
+
+    office: Office
+    doc: Document
+    cad: Cad
+    flow: RevisionFlow
+
+    @property
+    def held(self) -> Any:
+        return next(iter(self.office.session.shown.waiting), None)
+
+    def choose(self, choice: Choice) -> None:
+        entry_id = self.held.id
+        self.flow.choose(
+            self.doc.FileName,
+            of_held(self.held),
+            choice,
+            taken=lambda: self.office.session.discard(entry_id, keep=True),
+        )
+        self.office.settle()
+
+    def kept(self) -> list[bytes]:
+        return sorted(p.read_bytes() for p in (self.office.folder / "data" / "kept-aside").rglob("*.FCStd"))
+
+    def boxes(self) -> list[str]:
+        return [entry.title for entry in self.office.session.shown.activity.entries]
+
+
+@pytest.fixture(name="day")
+def _day(office: Office, monkeypatch: pytest.MonkeyPatch) -> Day:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(office.folder / "cache"))
+    commits = CommitFlow(office.session, office.preferences, office.desk, path=office.folder / "same.json")
+    doc = office.document("Plate", b"one")
+    commits.start(doc)
+    office.settle()
+    theirs = office.folder / "theirs" / "Plate.FCStd"
+    theirs.parent.mkdir()
+    theirs.write_bytes(b"theirs")
+    office.silo.user = "alice"
+    number = next(iter(office.silo.items.values())).item.part_number
+    office.silo.upload_file(number, theirs, "less", origin=Origin(base_revision=1))
+    office.silo.user = "designer"
+    doc.content, doc.changed = b"mine", True
+    commits.start(doc)
+    office.settle()
+    cad = Cad(office.desk.documents, [doc])
+    return Day(office, doc, cad, RevisionFlow(office.session, cad))
+
+
+def test_taking_theirs_ends_the_held_commit_and_keeps_mine(day: Day) -> None:
+    """What is open, with its newest edits, and what was committed; nothing of mine reaches the server."""
+    day.doc.content = b"mine, and edits since"
+    day.choose(Choice.TAKE)
+    assert Path(day.doc.FileName).read_bytes() == b"theirs"
+    assert (day.cad.opened, day.cad.docs) == ([Path(day.doc.FileName)], [])
+    assert day.kept() == [b"mine", b"mine, and edits since"]
+    assert day.held is None
+    assert day.office.files("Plate") == [b"one", b"theirs"]
+    assert day.boxes()[0] == "Took alice's revision 2: Plate.FCStd"
+
+
+def test_a_third_persons_file_is_kept_as_well(day: Day) -> None:
+    """Saved over the shared file, and in Silo nowhere."""
+    Path(day.doc.FileName).write_bytes(b"by a third person")
+    day.choose(Choice.TAKE)
+    assert Path(day.doc.FileName).read_bytes() == b"theirs"
+    assert day.kept() == [b"by a third person", b"mine", b"mine"]
+
+
+def test_a_file_that_is_not_open_is_kept(day: Day) -> None:
+    """Closed meanwhile, and edited by another program."""
+    day.cad.docs.clear()
+    Path(day.doc.FileName).write_bytes(b"later")
+    day.choose(Choice.TAKE)
+    assert day.kept() == [b"later", b"mine"]
+    assert day.held is None
+
+
+def test_theirs_cannot_be_written(day: Day) -> None:
+    """Nothing is closed, nothing is lost, and the commit still waits."""
+    folder = Path(day.doc.FileName)
+    folder.unlink()
+    folder.mkdir()
+    (folder / "in the way").touch()
+    day.cad.documents.base(day.doc).stamp = None
+    day.choose(Choice.TAKE)
+    assert day.cad.docs == [day.doc]
+    assert day.held.newer["revision_number"] == 2
+    assert day.boxes()[0] == "Not fetched: Plate.FCStd"
+
+
+def test_their_file_cannot_be_fetched(day: Day) -> None:
+    """The server has lost it."""
+    for stored in day.office.silo.items.values():
+        stored.files.pop(2, None)
+    day.choose(Choice.TAKE)
+    assert Path(day.doc.FileName).read_bytes() == b"mine"
+    assert day.held.newer["revision_number"] == 2
+    assert (day.cad.opened, day.boxes()[0]) == ([], "Not fetched: Plate.FCStd")
+
+
+def test_theirs_opens_beside_mine_and_the_question_stays(day: Day) -> None:
+    """In a folder of its own."""
+    day.choose(Choice.OPEN)
+    (opened,) = day.cad.opened
+    assert opened.read_bytes() == b"theirs"
+    assert opened.parent != Path(day.doc.FileName).parent
+    assert Path(day.doc.FileName).read_bytes() == b"mine"
+    assert day.held.newer["revision_number"] == 2
