@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -212,7 +211,7 @@ def _show_log(
     if here[0] is None:
         out.print(Text("This file is no revision in Silo, and it is not known which one it was made from."))
     for one in shown:
-        stamp = time.strftime("%Y-%m-%d %H:%M", one.created_at.timetuple()) if one.created_at else ""
+        stamp = one.created_at.astimezone().strftime("%Y-%m-%d %H:%M") if one.created_at else ""
         text = Text(f"{one.revision_number:>4}  ", "cyan")
         text.append(f"{stamp}  {show.plain(one.created_by or '')}  ", "dim")
         text.append(show.plain(one.comment) or "(no comment)")

@@ -385,8 +385,8 @@ class _Run:
             self.store.update(entry.id, renamed=ASKED)
             raise ConflictError(
                 f"{entry.file_name} carries the identity of {entry.part_number}, whose file in Silo is "
-                f"{before}. Is it the same part under a new name? Press Same part. Is it a copy that became a "
-                "new part? Press Discard, then choose Register Parts and in it: new part"
+                f"{before}. Is it the same part under a new name? Press Same part. Is it a copy that became "
+                "a new part? Press Discard, then choose Register Parts and in it: new part"
             )
 
     def _send_bom(self, sent: Sent, request: str) -> Sent:
