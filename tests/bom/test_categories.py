@@ -94,8 +94,40 @@ def test_the_sites_file_is_read_anew(tmp_path: Path) -> None:
         category_rules(schema, env)
     file.write_text('[[rules]]\nwords = ["frame"]\ncategory = "S05"\n')
     assert category_rules(schema, env) == [{"words": ["frame"], "category": "S05"}]
-    for wrong in ('[[rules]]\nwords = ["frame"]\ncategory = "Z99"\n', "[[rules", "rules = 3"):
-        file.write_text(wrong)
-        with pytest.raises(ConfigError, match=r"rules\.toml"):
-            category_rules(schema, env)
     assert category_rules(schema, {})
+
+
+GOOD = '[[rules]]\nwords = ["frame"]\ncategory = "S05"\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[[rules", "at end of document"),
+        (GOOD + "without = glass\n", "line 4"),
+        ("rules = 3", "wanted [[rules]] with words and a category, got rules = 3"),
+        (GOOD + "\n\n" + GOOD.replace("S05", "Z99"), "line 6: "),
+        ('rules = [{words = ["a"], category = "S05"}, 7]', "rule 2: category rule: wanted a table"),
+        (
+            GOOD.replace("S05", "Z9") + GOOD.replace("words", "word"),
+            "line 4: category rule: unknown keys: word",
+        ),
+        (GOOD.replace("S05", "Z9") + GOOD.replace("words", "word"), "line 1: "),
+    ],
+)
+def test_a_mistake_names_the_file_and_the_line(tmp_path: Path, text: str, said: str) -> None:
+    """All of them at once, and not the folder of the server's disk."""
+    file = tmp_path / "rules.toml"
+    file.write_text(text)
+    with pytest.raises(ConfigError) as wrong:
+        category_rules(find_schema(None), {RULES: str(file)})
+    assert f"{RULES} (rules.toml)" in str(wrong.value)
+    assert said in str(wrong.value)
+    assert str(tmp_path) not in str(wrong.value)
+
+
+def test_a_file_that_is_no_text(tmp_path: Path) -> None:
+    """An error with a reason, too."""
+    (tmp_path / "rules.toml").write_bytes(b"\xff\xfe")
+    with pytest.raises(ConfigError, match="utf-8"):
+        category_rules(find_schema(None), {RULES: str(tmp_path / "rules.toml")})

@@ -124,6 +124,20 @@ def test_register_twice_creates_nothing_twice(run: Any, silo: Any, gearbox: Path
 
 
 @pytest.mark.usefixtures("needs_locks")
+def test_a_mistake_in_the_sites_rules_is_said(
+    run: Any, silo: Any, gearbox: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With the line; the parts are registered all the same."""
+    rules = tmp_path / "rules.toml"
+    rules.write_text('[[rules]]\nwords = ["bolt"]\ncategory = "Z99"\n')
+    monkeypatch.setenv("SILO_CATEGORY_RULES", str(rules))
+    ran = run("register", gearbox, "--yes", "--json")
+    assert "not used until they are mended: SILO_CATEGORY_RULES (rules.toml): line 1: " in ran.err
+    assert len(ran.json()["registered"]) == 9
+    rules.write_text('[[rules]]\nwords = ["bolt"]\ncategory = "F02"\n')
+    assert run("register", gearbox, "--yes").err == ""
+
+
 def test_register_leaves_alone_what_freecad_has_open(
     run: Any, silo: Any, gearbox: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -82,6 +82,12 @@ def unregistered_text(count: int, translate: Translate = english) -> str:
     return (one if count == 1 else many).replace("{n}", str(count)) if count else ""
 
 
+def rules_text(problem: str, translate: Translate = english) -> str:
+    """That the site's category rules have a mistake, and which; "" where they have none."""
+    text = translate("Silo", "The category rules of this Silo are not used until they are mended: {problem}")
+    return text.replace("{problem}", problem) if problem else ""
+
+
 def activity_text(
     item: str, merge: MergeEvent | MergeResult, *, resolve_url: str = "", unregistered: int = 0
 ) -> ActivityText:

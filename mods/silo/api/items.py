@@ -213,7 +213,8 @@ class ItemCalls(Caller):
     def categories(self, name: str = "kindred-rd") -> Categories:
         """The categories of a schema: code → description, in the schema's order, with the site's rules."""
         schema = self.get_schema(name)
-        return Categories(categories_of(schema), rules_of(schema))
+        problem = schema.get("category_rules_problem")
+        return Categories(categories_of(schema), rules_of(schema), str(problem or ""))
 
     def get_schema_form(self, name: str = "kindred-rd", category: str | None = None) -> dict[str, Any]:
         """The form descriptor of a schema; from a server before February 2026 its properties instead."""

@@ -58,11 +58,16 @@ def _texts(raw: Mapping[str, object], key: str) -> frozenset[str]:
 
 
 class Categories(dict[str, str]):
-    """Code → description, in the schema's order, with the rules of the site."""
+    """Code → description, in the schema's order, with the rules of the site.
 
-    def __init__(self, known: Mapping[str, str], rules: Iterable[Rule] = ()) -> None:
+    problem
+        why the rules of the site are not used; "" where they are, or where there are none.
+    """
+
+    def __init__(self, known: Mapping[str, str], rules: Iterable[Rule] = (), problem: str = "") -> None:
         super().__init__(known)
         self.rules = tuple(rules)
+        self.problem = problem
 
 
 @dataclass(frozen=True)

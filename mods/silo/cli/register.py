@@ -27,6 +27,7 @@ from silo.standard_items import register_standard
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
+    from silo.bom.categories import Categories
 
 _MOST_MODELLED = 40
 _OPEN = (
@@ -114,7 +115,7 @@ def _declare(args: argparse.Namespace) -> int:
     done = []
     with common.client_of(args) as client:
         schema = client.find_schema(args.schema)
-        categories = client.categories(schema)
+        categories = _categories(client, schema)
         is_open = _never if args.even_if_open else _now
 
         def check(path: str) -> None:
@@ -155,7 +156,18 @@ def proposals_for(extraction: Extraction, client: SiloClient, schema: str) -> li
     """What to register: the components without an item, parts first, and the assembly itself last."""
     wanted = resolve(extraction, client).unregistered
     tree = (extraction.assembly, *extraction.entries)
-    return propose_all(wanted, tree, client.categories(schema)) if wanted else []
+    return propose_all(wanted, tree, _categories(client, schema)) if wanted else []
+
+
+def _categories(client: SiloClient, schema: str) -> Categories:
+    """A mistake in the site's rules costs proposals, no more; it is said on stderr."""
+    from silo.api.activity import rules_text
+    from silo.cli.show import plain
+
+    found = client.categories(schema)
+    if found.problem:
+        print(f"silo-mod: {plain(rules_text(found.problem))}", file=sys.stderr)
+    return found
 
 
 def _never(_path: str) -> bool:

@@ -171,17 +171,17 @@ def describe(schema: Schema) -> dict[str, Any]:
             {"name": "sequence", "type": "serial", "length": schema.serial_digits, "scope": "category"},
         ],
         "domains": dict(schema.domains),
-        "category_rules": _rules_or_none(schema),
+        **_described_rules(schema),
     }
 
 
-def _rules_or_none(schema: Schema) -> list[Mapping[str, Any]]:
-    """A wrong file costs the proposals, not the schema."""
+def _described_rules(schema: Schema) -> dict[str, Any]:
+    """A wrong file costs the proposals, not the schema; those who register parts read what is wrong."""
     try:
-        return category_rules(schema)
+        return {"category_rules": category_rules(schema)}
     except ConfigError as error:
         _log.warning("category rules are not used: %s", error)
-        return []
+        return {"category_rules": [], "category_rules_problem": str(error)}
 
 
 RULES = "SILO_CATEGORY_RULES"
@@ -191,24 +191,41 @@ RULES = "SILO_CATEGORY_RULES"
 def category_rules(schema: Schema, env: Mapping[str, str] = os.environ) -> list[Mapping[str, Any]]:
     """Which category a name of a part stands for: of the site's file, else of the one beside the schema.
 
-    Read anew each time, so that an edit counts at once. ConfigError where the site's file is wrong.
+    Read anew each time, so that an edit counts at once. ConfigError where the site's file is wrong, with all
+    that is wrong in it. It names the file without its folder, for every designer reads it.
     """
     path = env.get(RULES)
-    if path:
-        try:
-            text = Path(path).read_text("utf-8")
-        except OSError as error:
-            raise ConfigError(f"{RULES}: {path} cannot be read: {error.strerror}") from error
-    else:
-        path = "category_rules.toml"
-        text = resources.files("silo_server.schema").joinpath(path).read_text("utf-8")
+    name = f"{RULES} ({Path(path).name})" if path else "category_rules.toml"
     try:
+        source = Path(path) if path else resources.files("silo_server.schema").joinpath(name)
+        text = source.read_text("utf-8")
         rules = tomllib.loads(text).get("rules", [])
-        for rule in rules:
+    except OSError as error:
+        raise ConfigError(f"{name} cannot be read: {error.strerror or error}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{name}: {error}") from error
+    if not isinstance(rules, list):
+        raise ConfigError(f"{name}: wanted [[rules]] with words and a category, got rules = {rules!r}")
+    wrong = []
+    for rule, where in zip(rules, _places(text, len(rules)), strict=True):
+        try:
             schema.category(Rule.read(rule).category)
-    except (tomllib.TOMLDecodeError, InputError, RejectedError, TypeError) as error:
-        raise ConfigError(f"{path}: {error}") from error
-    return list(rules)
+        except (InputError, RejectedError) as error:
+            wrong.append(f"{where}: {error}")
+    if wrong:
+        raise ConfigError(f"{name}: {'; '.join(wrong)}")
+    return rules
+
+
+def _places(text: str, count: int) -> list[str]:
+    """Where each rule stands in the file."""
+    lines = [number for number, line in enumerate(text.splitlines(), 1) if _RULE.match(line)]
+    if len(lines) != count:
+        return [f"rule {number}" for number in range(1, count + 1)]
+    return [f"line {number}" for number in lines]
+
+
+_RULE = re.compile(r"\s*\[\[\s*[\"']?rules[\"']?\s*\]\]")
 
 
 def describe_form(schema: Schema) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from silo.api.activity import rules_text
 from silo.bom.errors import SiloError
 from silo.registration import Registration
 from silo.workbench.gui import widgets
@@ -144,6 +145,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
     def fill(self, offer: Offer) -> None:
         """Show what can be registered."""
         self._offer = offer
+        self.tell(rules_text(getattr(offer.categories, "problem", ""), translate))
         self._categories = {
             code: f"{code} {plain(text, 60)}".strip() for code, text in offer.categories.items()
         }

@@ -5,18 +5,6 @@
         <name>Silo</name>
         <message>
             <location filename="../../addon.py" />
-            <source>{who} committed {name} (revision {n}) since you opened it.</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../addon.py" />
-            <location filename="../../commit/dialog.py" />
-            <location filename="../../commit/theirs.py" />
-            <source>Somebody</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../addon.py" />
             <source>{name} has no Silo part number yet. Register it first.</source>
             <translation type="unfinished" />
         </message>
@@ -26,37 +14,37 @@
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../addon.py" />
-            <source>[Silo] This document is not open: </source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../addon.py" />
+            <location filename="../../buttons.py" />
             <source>Save a copy</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../addon.py" />
+            <location filename="../../buttons.py" />
+            <source>[Silo] This document is not open: </source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../buttons.py" />
             <source>[Silo] Not opened, for it is not on the Silo server in use: </source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../addon.py" />
+            <location filename="../../buttons.py" />
             <source>No browser could be opened. The address was copied.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../addon.py" />
+            <location filename="../../buttons.py" />
             <source>[Silo] No browser could be opened; the address was copied: </source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../addon.py" />
+            <location filename="../../buttons.py" />
             <source>[Silo] These objects are not in the document any more.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../addon.py" />
+            <location filename="../../buttons.py" />
             <source>[Silo] The first {n} of {all} objects are selected.</source>
             <translation type="unfinished" />
         </message>
@@ -266,6 +254,13 @@
         <message>
             <location filename="../../commit/dialog.py" />
             <source>… and {n} more lines</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/dialog.py" />
+            <location filename="../../commit/theirs.py" />
+            <location filename="../../pane/banner.py" />
+            <source>Somebody</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -680,6 +675,11 @@ They are installed in {folder}.</source>
         </message>
         <message>
             <location filename="../../pane/banner.py" />
+            <source>{who} committed {name} (revision {n}) since you opened it.</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/banner.py" />
             <location filename="../../pane/boxes.py" />
             <source>… and {n} more</source>
             <translation type="unfinished" />
@@ -906,6 +906,21 @@ They are installed in {folder}.</source>
         <message>
             <location filename="../../pane/waiting.py" />
             <source>Retry</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>Open theirs beside mine</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>Take theirs</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>Commit mine on top</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1912,6 +1927,11 @@ They are installed in {folder}.</source>
         <message>
             <location filename="../../../api/activity.py" />
             <source>{n} components have no Silo part number</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../../api/activity.py" />
+            <source>The category rules of this Silo are not used until they are mended: {problem}</source>
             <translation type="unfinished" />
         </message>
     </context>
