@@ -204,12 +204,20 @@ def test_files_of_other_spreadsheets(api: Api, encoding: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "data", [b"", b"\x00\xff\x00", b"a,b\r\n1,2", b'Part number,Quantity\r\n"broken', b"\xff\xfe\x00"]
+    ("data", "words"),
+    [
+        (b"", "Part number"),
+        (b"\x00\xff\x00", "Part number"),
+        (b"a,b\r\n1,2", "Part number"),
+        (b'Part number,Quantity\r\n"broken', "does not read as such"),
+        (b"\xff\xfe\x00", "Part number"),
+        (b"PK\x03\x04" + bytes(60), "save the sheet as CSV"),  # our own XLSX, for one
+    ],
 )
-def test_what_is_no_bom_is_refused(api: Api, data: bytes) -> None:
-    """400, whatever it is."""
+def test_what_is_no_bom_is_refused(api: Api, data: bytes, words: str) -> None:
+    """400, whatever it is, with what is wanted."""
     parent = api.item()
-    api.bad(400, "POST", bom(parent, "import"), body=data)
+    assert words in api.bad(400, "POST", bom(parent, "import"), body=data)["message"]
 
 
 @pytest.mark.parametrize(

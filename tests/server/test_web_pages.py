@@ -297,9 +297,10 @@ def test_a_conflict_that_came_meanwhile_is_not_decided(visitors: dict[str, Visit
 
     seen = box()
     api.merge(parent, {child: 12})
-    answer = visitor.post("/waiting/decide", chosen=seen, action="keep_silo")
+    answer = visitor.post("/waiting/decide", chosen=seen, action="keep_silo", reason="the drawing says so")
     assert answer.status == 409
     assert "it was changed meanwhile" in answer.body.decode()
+    assert 'name="reason" value="the drawing says so"' in answer.body.decode()
     assert [c["assembly_quantity"] for c in api.get(f"/api/items/{parent}/bom/review")["conflicts"]] == [12]
     assert visitor.post("/waiting/decide", chosen=box(), action="keep_silo").status == 303
     assert api.get(f"/api/items/{parent}/bom/review")["conflicts"] == []
@@ -327,12 +328,13 @@ def test_a_file_that_is_no_bom(visitors: dict[str, Visitor], api: Api) -> None:
     """No file, a picture, a table without the columns: a page that says what is wanted."""
     parent = api.item()
     visitor = visitors[EDITOR]
-    for content in (b"", b"\x89PNG\r\n\x1a\n\x00\x00", b"a,b\n1,2\n"):
+    wanted = {b"": "Part number", b"\x89PNG\r\n\x1a\n\x00": "Part number", b"a,b\n1,2\n": "Part number"}
+    for content, words in {**wanted, b"PK\x03\x04" + bytes(99): "save the sheet as CSV"}.items():
         body, headers = form_body({"csrf_token": visitor.csrf, "file": ("x.csv", content)})
         sent = {"Cookie": visitor.cookie, **HTML, **headers}
         answer = visitor.api.call("POST", f"/items/{parent}/import/check", body=body, headers=sent)
         assert answer.status == 400
-        assert "Part number" in answer.body.decode()
+        assert words in answer.body.decode()
     assert visitor.post(f"/items/{parent}/import/check").status == 400
 
 

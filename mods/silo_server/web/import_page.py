@@ -186,6 +186,7 @@ def _uploaded(form: FormData) -> Upload:
     data = file.file.read(MOST_BYTES + 1)
     if len(data) > MOST_BYTES:
         raise TooLargeError(f"The file is larger than {MOST_BYTES // 2**20} MiB; this cannot be a BOM.")
+    csv_file.refuse_workbook(data)
     return Upload(file.filename[:200], data)
 
 

@@ -94,7 +94,7 @@ def decide(request: Request, server: ServerDep, caller: Writer, form: Form) -> R
         said = "Nothing of this kind was open in what was chosen, so nothing was changed."
     view = dict(Address("/waiting", {n: text(form, n, 1024) for n in ("q", "folder", "kind", "sort")}).but())
     if problems:
-        return _show(request, server, caller, view, said, problems, 409)
+        return _show(request, server, caller, view, said, problems, text(form, "reason"), 409)
     return back(Address("/waiting", view).url(), said)
 
 
@@ -105,6 +105,7 @@ def _show(
     view: Mapping[str, str],
     said: str = "",
     problems: list[str] | None = None,
+    reason: str = "",
     status: int = 200,
 ) -> Response:
     with server.db.read(caller) as tx:
@@ -132,6 +133,7 @@ def _show(
         kinds=KINDS,
         totals={name: sum(count(row) for row in rows) for name, (_, count) in KINDS.items()},
         said=said,
+        reason=reason,
         problems=(problems or [])[:MOST_TOLD],
         more_problems=max(0, len(problems or []) - MOST_TOLD),
     )

@@ -59,6 +59,7 @@ def read_csv(data: bytes, max_rows: int, layout: Layout | None = None) -> list[R
 
     Needs no database: to be called before a transaction begins, which others would wait for.
     """
+    refuse_workbook(data)
     text = _decode(data)
     layout = layout or guess(text)
     missing = [role for role in NEEDED if role not in layout.columns]
@@ -82,6 +83,14 @@ def read_csv(data: bytes, max_rows: int, layout: Layout | None = None) -> list[R
         if any(record.values()) and (record.get("part_number") or not _cell(cells, gap_column)):
             records.append((number, record))
     return _with_exact_quantities(records, layout)
+
+
+def refuse_workbook(data: bytes) -> None:
+    """RejectedError for XLSX and other ZIP archives, which people take for a CSV as well."""
+    if data.startswith(b"PK\x03\x04"):
+        raise RejectedError(
+            "file: wanted CSV, got a workbook such as XLSX, or another ZIP archive; save the sheet as CSV"
+        )
 
 
 def first_lines(data: bytes, delimiter: str, count: int = 8) -> list[list[str]]:
