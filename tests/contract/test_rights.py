@@ -20,6 +20,7 @@ from silo_server.bootstrap import prepare
 from silo_server.db.engine import Database
 from silo_server.run import Greeting, RunningServer, running_server
 from silo_server.services.access import accounts
+from silo_server.services.access.credentials import shown_prefix
 from silo_server.settings import Settings
 from silo_server.values import SYSTEM, Role
 
@@ -87,6 +88,15 @@ def test_a_token_that_may_only_read_changes_nothing_at_all(api: Api) -> None:
     assert mine.get("/api/auth/me")["role"] == "viewer"
 
 
+def test_a_token_makes_one_of_its_own_scope_unless_asked_for_less(api: Api) -> None:
+    """Never a wider one, also where the request does not name a scope."""
+    writer = api.as_(token(api, scope="write")["token"])
+    same = api.as_(token(writer)["token"])
+    same.bad(403, "GET", "/api/users")
+    same.item()
+    api.as_(token(writer, scope="read")["token"]).bad(403, "POST", "/api/items", {"category": "F01"})
+
+
 def test_scopes_that_there_are_not(api: Api) -> None:
     """Refused, and no token is made."""
     for scopes in ([], ["king"], ["read", 1], "read"):
@@ -97,6 +107,7 @@ def test_the_first_characters_of_a_short_secret_are_not_most_of_it(api: Api, ser
     """A secret that somebody chose is not shown by its prefix, nor when the server starts."""
     given = next(t for t in api.get("/api/auth/tokens") if t["name"] == "SILO_API_TOKEN")
     assert len(given["prefix"]) <= len(server.token) // 4
+    assert [shown_prefix(secret) for secret in ("letmein", "a-longer-one", "x" * 80)] == ["l", "a-l", "x" * 9]
     assert server.token not in "".join(Greeting("u", given["prefix"], "l", "d", False).lines())
 
 

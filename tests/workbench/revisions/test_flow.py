@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from desk import Document, Documents, Office
+from other_disk import other_disk
 
 from silo.api.wire import Origin
 from silo.workbench.commit.flow import CommitFlow
@@ -154,3 +155,16 @@ def test_theirs_opens_beside_mine_and_the_question_stays(day: Day) -> None:
     assert opened.parent != Path(day.doc.FileName).parent
     assert Path(day.doc.FileName).read_bytes() == b"mine"
     assert day.held.newer["revision_number"] == 2
+
+
+def test_what_is_open_under_another_spelling_is_left_alone(day: Day, tmp_path: Path) -> None:
+    """On a disk that finds a name in any case: a link opened ``PLATE.fcstd``, the folder lists ``Plate.FCStd``."""
+    number = next(iter(day.office.silo.items.values())).item.part_number
+    with other_disk(tmp_path) as disk:
+        (disk / "Plate.FCStd").write_bytes(b"open, with edits")
+        day.doc.FileName = str(disk / "PLATE.fcstd")
+        pulled: list[Any] = []
+        day.flow.pull(number, None, disk, overwrite=True, done=pulled.append, failed=pulled.append)
+        day.office.settle()
+        assert (disk / "Plate.FCStd").read_bytes() == b"open, with edits"
+    assert "open" in str(pulled[0])

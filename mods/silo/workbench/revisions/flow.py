@@ -227,7 +227,10 @@ class RevisionFlow:
     ) -> None:
         """Fetch a file with all that it links to. What FreeCAD has open, and what has edits that are not in
         Silo, is left alone; ``overwrite`` replaces the latter and keeps copies."""
-        mine = {os.path.realpath(path) for path in self._desk.open_paths()}
+        from silo.spelling import Spelling  # late: FreeCAD's start waits for this module
+
+        real = Spelling().real  # a link may have opened the file under another spelling of its name
+        mine = {real(path) for path in self._desk.open_paths()}
         outbox = self._session.outbox
 
         def run(client: SiloClient, control: Control) -> Pulled:
@@ -239,7 +242,7 @@ class RevisionFlow:
             rules = Rules(
                 overwrite=overwrite,
                 keep=outbox.keep_aside,
-                is_open=lambda path: os.path.realpath(path) in mine or self._desk.is_open_elsewhere(path),
+                is_open=lambda path: real(path) in mine or self._desk.is_open_elsewhere(path),
                 learn=lambda sha256, item, number: outbox.learn(client.base_url, sha256, item, number),
             )
             with fetched(
