@@ -3,13 +3,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from enum import StrEnum
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from silo.bom.numbers import plain
+from silo_server.clock import wire
+
+T = TypeVar("T")
 
 
 class Role(StrEnum):
@@ -69,6 +72,12 @@ class Actor:
     @property
     def by_token(self) -> bool:
         return self.auth_source == "token"
+
+    @property
+    def own_id(self) -> int:
+        """The user's id; every caller that a guard let in is a user."""
+        assert self.user_id is not None
+        return self.user_id
 
 
 SYSTEM = Actor("system", Role.ADMIN, auth_source="system")
@@ -179,6 +188,30 @@ class Line(NamedTuple):
     child_current_revision: int
     child_archived: bool
     state: LineState
+
+
+def names_of(kind: Any) -> Iterable[str]:
+    """The names of the fields of a frozen value's class."""
+    names: Iterable[str] = kind.__dataclass_fields__  # dataclasses.fields() makes a new tuple for each row
+    return names
+
+
+def from_row(kind: type[T], row: Any, /, **given: Any) -> T:
+    """A frozen value from a row whose columns have the names of its fields; ``given`` wins over them."""
+    return kind(**given, **{name: getattr(row, name) for name in names_of(kind) if name not in given})
+
+
+def to_wire(value: Any, *left_out: str) -> dict[str, Any]:
+    """The fields of a frozen value, under their own names, as the API sends them."""
+    return {
+        name: wire(found) if name.endswith(_TIMES) else found
+        for name in names_of(type(value))
+        if name not in left_out
+        for found in (getattr(value, name),)
+    }
+
+
+_TIMES = ("at", "since")
 
 
 def number(value: float | Decimal | None) -> float | int | None:

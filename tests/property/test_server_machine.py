@@ -36,7 +36,7 @@ from silo_server.services.bom.merge_json import read_merge_order
 from silo_server.services.bom.review import Action, Decision, open_conflicts, resolve
 from silo_server.services.items import NewItem, create_item, get_item
 from silo_server.settings import Settings
-from silo_server.values import Actor, Role
+from silo_server.values import Actor, LineState, Role
 
 PARTS = ["P-1", "P-2", "P-3", "P-4", "P-5"]
 part = st.sampled_from(PARTS)
@@ -122,13 +122,13 @@ class Silo(RuleBasedStateMachine):
     @rule(number=part, amount=quantity, who=user)
     def add(self, number: str, amount: float, who: str) -> None:
         """A line by hand; refused where there is one."""
-        new = edits.NewLine(child_part_number=number, quantity=amount)
+        new = LineState(amount, "manual")
         before = copy.deepcopy(self.model)
         if number in self.model:
             with pytest.raises(DuplicateError):
-                self.do(who, lambda tx: edits.add_line(tx, self.parent, new))
+                self.do(who, lambda tx: edits.add_line(tx, self.parent, number, new))
             return
-        self.do(who, lambda tx: edits.add_line(tx, self.parent, new))
+        self.do(who, lambda tx: edits.add_line(tx, self.parent, number, new))
         self.model[number] = new_line(amount, "manual")
         self.changed(before)
 

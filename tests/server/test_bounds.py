@@ -23,7 +23,7 @@ from silo_server.db.engine import Database
 from silo_server.db.tables import bom_lines, items
 from silo_server.errors import TooLargeError
 from silo_server.run import running_server
-from silo_server.services.bom import csv_file, tree
+from silo_server.services.bom import imports, tree
 from silo_server.services.bom.lines import state_columns
 from silo_server.services.items import NewItem, create_item, get_item
 from silo_server.settings import Settings
@@ -136,11 +136,11 @@ def test_a_file_that_is_no_bom_is_not_read_to_its_end() -> None:
     """The header is looked for near the top; what stands at the end of such a file does not matter."""
     rows = b"a;b,c\td\n" * 5000
     with pytest.raises(RejectedError, match="found none"):
-        csv_file.read_csv(rows + b'"never closed', 20_000)
+        imports.read_csv(rows + b'"never closed', 20_000)
     with pytest.raises(TooLargeError):
-        csv_file.read_csv(b"Part number,Quantity\n" + b"A,1\n" * 21 + b'"never closed', 20)
-    late = b"x\n" * (csv_file.HEADER_WITHIN - 1) + b"Part number,Quantity\nA,1\n"
-    assert csv_file.read_csv(late, 20)[0][1]["part_number"] == "A"
+        imports.read_csv(b"Part number,Quantity\n" + b"A,1\n" * 21 + b'"never closed', 20)
+    late = b"x\n" * (imports.HEADER_WITHIN - 1) + b"Part number,Quantity\nA,1\n"
+    assert imports.read_csv(late, 20)[0][1]["part_number"] == "A"
 
 
 def test_guesses_that_come_at_once_are_all_counted(url: str, tmp_path: Path) -> None:

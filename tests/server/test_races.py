@@ -25,6 +25,7 @@ from silo_server.services.bom.merge import merge_bom
 from silo_server.services.bom.merge_json import read_merge_order
 from silo_server.services.items import NewItem, create_item, get_item
 from silo_server.settings import Settings
+from silo_server.values import LineState
 
 PARTS = ("TOP", "SUB", "A", "B")
 
@@ -98,7 +99,7 @@ def test_two_edges_of_a_ring_are_not_added_together(pg: Database) -> None:
     """TOP → SUB here and SUB → TOP there, at the same moment: one of them is refused."""
 
     def add(parent: str, child: str) -> Callable[[Tx], Any]:
-        return lambda tx: edits.add_line(tx, parent, edits.NewLine(child_part_number=child))
+        return lambda tx: edits.add_line(tx, parent, child, LineState(1.0, "manual"))
 
     raised = one_waits_for_the_other(pg, add("TOP", "SUB"), add("SUB", "TOP"))
     assert [type(error) for error in raised] == [CycleError]

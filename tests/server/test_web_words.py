@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import pytest
 
-from silo_server.services.events import DatedEvent
+from silo_server.services.events import LoggedEvent
 from silo_server.values import LineState
 from silo_server.web.activity_page import entry_of
 from silo_server.web.render import bdi, closed, isolate, mass, money, plural, quantity, segment, size, when
@@ -128,7 +129,7 @@ def test_a_line_that_comes_back() -> None:
 )
 def test_events_in_words(name: str, data: dict[str, object], words: str) -> None:
     """Each kind of event has its words; an unknown one shows its name."""
-    entry = entry_of(DatedEvent(1, name, "2026-02-08T22:15:00.000000Z", data))
+    entry = entry_of(LoggedEvent(1, name, json.dumps(data), "2026-02-08T22:15:00.000000Z"))
     assert (entry.words, entry.item_name) == (words, data.get("name", ""))
 
 
@@ -140,7 +141,7 @@ def test_a_merge_has_its_counts() -> None:
         "diff": {"added": [1], "quantity_changed": [1, 2], "removed": [1]},
         "warnings": [{"type": "unreferenced"}, {"type": "conflict"}],
     }
-    entry = entry_of(DatedEvent(1, "bom_merge", "2026", data))
+    entry = entry_of(LoggedEvent(1, "bom_merge", json.dumps(data), "2026"))
     assert [(mark, count) for mark, count, _ in entry.counts] == [
         ("added", 1),
         ("changed", 2),
@@ -148,4 +149,4 @@ def test_a_merge_has_its_counts() -> None:
         ("conflict", 1),
     ]
     assert (entry.link, entry.user) == ("/items/A%2F1/bom", "designer")
-    assert entry_of(DatedEvent(1, "bom_merge", "2026", {"item": "A", "diff": {}})).counts[0][1] == 0
+    assert entry_of(LoggedEvent(1, "bom_merge", '{"item": "A", "diff": {}}', "2026")).counts[0][1] == 0

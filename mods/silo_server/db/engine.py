@@ -23,7 +23,7 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import Connection, Engine, create_engine, event, func, insert, select
+from sqlalchemy import Connection, Engine, create_engine, event, func, insert, select, update
 
 from silo.bom.errors import ReadOnlyError
 from silo_server.clock import Clock, stamp, utc_now
@@ -142,8 +142,19 @@ def mode_of(tx: Tx) -> str:
     """``normal`` or ``read-only``; kept in the database, so that all processes agree."""
     if tx.settings.read_only:
         return "read-only"
-    mode = tx.conn.scalar(select(server_state.c.value).where(server_state.c.key == "mode"))
-    return mode or "normal"
+    return get_state(tx, "mode") or "normal"
+
+
+def get_state(tx: Tx, key: str) -> str | None:
+    """The value kept under ``key``, None where there is none."""
+    return tx.conn.scalar(select(server_state.c.value).where(server_state.c.key == key))
+
+
+def put_state(tx: Tx, key: str, value: str) -> None:
+    """Keep ``value`` under ``key``."""
+    done = tx.conn.execute(update(server_state).where(server_state.c.key == key).values(value=value))
+    if done.rowcount == 0:
+        tx.conn.execute(insert(server_state).values(key=key, value=value))
 
 
 def _flush_events(tx: Tx) -> None:

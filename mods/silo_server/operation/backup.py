@@ -33,9 +33,8 @@ from silo.bom.errors import ConfigError
 from silo.durable import replacing, sync_folder
 from silo_server.clock import stamp, utc_now
 from silo_server.db.bulk import insert_rows
-from silo_server.db.engine import EVENT_CHANNEL, MIGRATION_LOCK, Database, Tx, mode_of
+from silo_server.db.engine import EVENT_CHANNEL, MIGRATION_LOCK, Database, Tx, mode_of, put_state
 from silo_server.db.migrate import check_revision, upgrade
-from silo_server.db.state import put_state
 from silo_server.db.tables import events, items, metadata, revisions
 from silo_server.errors import cause_of
 from silo_server.files import FileStore

@@ -23,8 +23,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from silo.bom.errors import SiloError
 from silo_server.clock import stamp
-from silo_server.db.engine import Database, Tx
-from silo_server.db.state import get_state, put_state
+from silo_server.db.engine import Database, Tx, get_state, put_state
 from silo_server.db.tables import (
     api_tokens,
     audit,

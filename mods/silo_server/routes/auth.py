@@ -10,13 +10,13 @@ from pydantic import Field, StrictBool, WithJsonSchema
 from starlette.responses import Response
 
 from silo.api.wire import ErrorBody
-from silo_server.clock import wire
 from silo_server.routes import document
 from silo_server.routes.context import (
     READ_ERRORS,
     SESSION_COOKIE,
     WRITE_ERRORS,
     Admin,
+    PageFrom,
     Server,
     ServerDep,
     Viewer,
@@ -25,7 +25,7 @@ from silo_server.routes.context import (
 )
 from silo_server.routes.models import Body, Short, Text
 from silo_server.services.access import accounts, audit, credentials, logins
-from silo_server.values import Actor, Role, Scope
+from silo_server.values import Role, Scope, to_wire
 
 router = APIRouter(prefix="/api", tags=["auth"])
 
@@ -126,7 +126,7 @@ def set_password(server: ServerDep, caller: Viewer, body: PasswordBody) -> Respo
 def list_tokens(server: ServerDep, caller: Viewer) -> list[dict[str, Any]]:
     """The own tokens; never their secrets."""
     with server.db.read(caller) as tx:
-        return [_token(token) for token in credentials.list_tokens(tx, _user_id(caller))]
+        return [_token(token) for token in credentials.list_tokens(tx, caller.own_id)]
 
 
 @router.post("/auth/tokens", status_code=201, responses=WRITE_ERRORS)
@@ -147,7 +147,7 @@ def revoke_token(
 ) -> Response:
     """Revoke a token: one's own, or anybody's for an admin."""
     credentials.check_may_change(caller)
-    owner = None if caller.role is Role.ADMIN else _user_id(caller)
+    owner = None if caller.role is Role.ADMIN else caller.own_id
     with server.db.write(caller, even_when_read_only=True) as tx:
         credentials.revoke_token(tx, token_id, owner)
     return Response(status_code=204)
@@ -194,23 +194,12 @@ def list_audit(
     server: ServerDep,
     caller: Admin,
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
-    before: Annotated[int | None, Query(ge=0, le=2**62)] = None,
+    before: PageFrom = None,
 ) -> list[dict[str, Any]]:
     """Who did what, newest first."""
     with server.db.read(caller) as tx:
         entries = audit.list_entries(tx, limit, before)
-    return [
-        {
-            "id": e.id,
-            "at": wire(e.at),
-            "username": e.username,
-            "action": e.action,
-            "target": e.target,
-            "detail": e.detail,
-            "address": e.address,
-        }
-        for e in entries
-    ]
+    return [to_wire(entry) for entry in entries]
 
 
 def set_session_cookie(
@@ -227,30 +216,12 @@ def set_session_cookie(
     )
 
 
-def _user_id(caller: Actor) -> int:
-    assert caller.user_id is not None  # every caller that a guard let in is a user
-    return caller.user_id
-
-
 def _token(token: credentials.Token) -> dict[str, Any]:
     return {
-        "id": token.id,
-        "name": token.name,
-        "prefix": token.prefix,
+        **to_wire(token, "username", "scope"),
         "scopes": [scope.value for scope in Scope if token.scope.covers(scope)],
-        "created_at": wire(token.created_at),
-        "expires_at": wire(token.expires_at),
-        "last_used_at": wire(token.last_used_at),
-        "revoked_at": wire(token.revoked_at),
     }
 
 
 def _user(user: accounts.User) -> dict[str, Any]:
-    return {
-        "username": user.username,
-        "display_name": user.display_name,
-        "role": user.role.value,
-        "active": user.active,
-        "has_password": user.has_password,
-        "created_at": wire(user.created_at),
-    }
+    return to_wire(user, "id")

@@ -43,7 +43,7 @@ from silo_server.services.bom.merge import MergeOutcome, merge_bom, preview_merg
 from silo_server.services.bom.merge_json import MergeOrder, read_merge_order
 from silo_server.services.bom.review import told_quantities
 from silo_server.services.items import get_by_numbers, get_item
-from silo_server.values import Actor, Item, number
+from silo_server.values import Actor, Item, LineState, number
 
 router = APIRouter(prefix="/api/items/{part_number}/bom", tags=["bom"])
 several = APIRouter(prefix="/api", tags=["bom"])
@@ -103,9 +103,10 @@ def add_line(
     server: ServerDep, caller: Editor, part_number: str, body: NewLineBody, expected: ExpectedVersion
 ) -> Response:
     """Add a line by hand."""
-    values = {**body.model_dump(), "reference_designators": tuple(body.reference_designators)}
+    values = body.model_dump(exclude={"child_part_number"})
+    state = LineState(**{**values, "reference_designators": tuple(body.reference_designators)})
     with server.db.write(caller) as tx:
-        edited = edits.add_line(tx, part_number, edits.NewLine(**values), expected)
+        edited = edits.add_line(tx, part_number, body.child_part_number, state, expected)
         return _edited(edited, 201)
 
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import anyio.to_thread
 import pydantic_core
-from fastapi import Depends, Request
+from fastapi import Depends, Query, Request
 from starlette.datastructures import FormData
 from starlette.responses import Response
 
@@ -199,3 +199,5 @@ def expected_version(request: Request) -> int | None:
 
 
 ExpectedVersion = Annotated[int | None, Depends(expected_version)]
+# The id of a row, to page a list from.
+PageFrom = Annotated[int | None, Query(ge=0, le=2**62)]

@@ -8,37 +8,16 @@ from typing import Any
 
 import pydantic_core
 
-from silo_server.clock import wire
 from silo_server.services.bom.last_sync import LastSync
 from silo_server.services.bom.lines import child_to_wire, line_state_to_wire, revisions_to_wire
 from silo_server.services.bom.tree import Occurrence
-from silo_server.values import Item, LineState, number
+from silo_server.values import Item, LineState, number, to_wire
 
 
 def item_to_wire(item: Item, last_sync: LastSync | None = None) -> dict[str, Any]:
     """An item, under the contract's names; ``last_sync`` where it was looked up."""
     told = {} if last_sync is None else {"last_sync": last_sync.to_wire()}
-    return told | {
-        "id": item.uuid,
-        "part_number": item.part_number,
-        "name": item.name,
-        "description": item.description,
-        "item_type": item.item_type,
-        "schema": item.schema,
-        "category": item.category,
-        "sourcing_type": item.sourcing_type,
-        "long_description": item.long_description,
-        "thumbnail_key": item.thumbnail_key,
-        "properties": dict(item.properties),
-        "current_revision": item.current_revision,
-        "bom_version": item.bom_version,
-        "version": item.version,
-        "created_at": wire(item.created_at),
-        "created_by": item.created_by,
-        "updated_at": wire(item.updated_at),
-        "updated_by": item.updated_by,
-        "archived_at": wire(item.archived_at),
-    }
+    return told | {"id": item.uuid} | to_wire(item, "id", "uuid", "created_as")
 
 
 def render_expanded(rows: Sequence[Occurrence]) -> bytes:

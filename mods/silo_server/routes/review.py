@@ -19,6 +19,7 @@ from silo_server.routes.context import (
     WRITE_ERRORS,
     Editor,
     ExpectedVersion,
+    PageFrom,
     ServerDep,
     Viewer,
     etag_of,
@@ -27,9 +28,9 @@ from silo_server.routes.context import (
 from silo_server.routes.models import Body, Short, Text
 from silo_server.services.bom import history
 from silo_server.services.bom import review as service
-from silo_server.services.bom.lines import line_to_wire, state_to_json
+from silo_server.services.bom.lines import line_state_to_wire, line_to_wire, state_to_json
 from silo_server.services.items import get_item
-from silo_server.values import Item, LineState, number
+from silo_server.values import Item, LineState, number, to_wire
 
 router = APIRouter(prefix="/api/items/{part_number}/bom", tags=["bom review"])
 
@@ -117,7 +118,7 @@ def list_history(
     caller: Viewer,
     part_number: str,
     limit: Annotated[int, Query(ge=1, le=500)] = 50,
-    before: Annotated[int | None, Query(ge=0, le=2**62)] = None,
+    before: PageFrom = None,
 ) -> list[dict[str, Any]]:
     """The changes, newest first: who, when, why, from which file."""
     with server.db.read(caller) as tx:
@@ -243,18 +244,9 @@ def change_to_wire(change: history.Change) -> dict[str, Any]:
         "revision": change.document_revision,
     }
     return {
-        "id": change.id,
-        "version": change.version,
-        "kind": change.kind.value,
-        "at": wire(change.at),
+        **to_wire(change, "username", "document_file", "document_sha256", "document_revision"),
         "user": change.username,
-        "summary": change.summary,
-        "reason": change.reason,
         "document": document if any(v is not None for v in document.values()) else None,
-        "sync_id": change.sync_id,
-        "refers_to": change.refers_to,
-        "decisions": [dict(decision) for decision in change.decisions],
-        "line_count": change.line_count,
     }
 
 
@@ -262,13 +254,8 @@ def state_to_wire(state: LineState | None) -> dict[str, Any] | None:
     """A line's state; only what is set."""
     if state is None:
         return None
-    told = state_to_json(state)
-    told["quantity"] = number(state.quantity)
-    if "cad_quantity" in told:
-        told["cad_quantity"] = number(state.cad_quantity)
-    if "unreferenced_since" in told:
-        told["unreferenced_since"] = wire(state.unreferenced_since)
-    return told
+    told = line_state_to_wire(state)
+    return {name: told[name] for name in state_to_json(state)}
 
 
 def _changed(change_id: int, version: int) -> Response:

@@ -15,7 +15,6 @@ from starlette.responses import Response
 from silo.bom.errors import RejectedError
 from silo_server.background import HEALTH_SECONDS, READY_SECONDS, State
 from silo_server.db.engine import mode_of
-from silo_server.db.state import put_state
 from silo_server.events.stream import EventStream
 from silo_server.operation.housekeeping import last_run
 from silo_server.operation.metrics import CONTENT_TYPE
@@ -28,7 +27,6 @@ from silo_server.routes.context import (
     json_answer,
 )
 from silo_server.services import events
-from silo_server.services.access import audit
 
 router = APIRouter(tags=["system"])
 EVENT_ID = re.compile(r"(?P<number>[0-9]{1,18})(?:-(?P<tag>[0-9a-f]{8}))?")
@@ -140,11 +138,7 @@ def get_housekeeping(server: ServerDep, caller: Admin) -> dict[str, Any]:
 def set_mode(server: ServerDep, caller: Admin, body: ModeBody) -> dict[str, Any]:
     """Take changes, or take none (503) until set otherwise; all processes follow at once."""
     with server.db.write(caller, even_when_read_only=True) as tx:
-        put_state(tx, "mode", body.mode)
-        audit.note(tx, "mode.set", body.mode)
-        mode = mode_of(tx)
-        events.server_state(tx, mode)
-        return {"mode": mode}
+        return {"mode": events.set_mode(tx, body.mode)}
 
 
 def _event_id(text: str | None) -> events.Mark | None:

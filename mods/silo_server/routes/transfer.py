@@ -27,7 +27,7 @@ from silo_server.routes.context import (
     json_answer,
 )
 from silo_server.routes.review import state_to_wire
-from silo_server.services.bom import csv_file, exports, imports
+from silo_server.services.bom import exports, imports
 from silo_server.services.bom.exports import View
 
 router = APIRouter(prefix="/api/items/{part_number}/bom", tags=["bom transfer"])
@@ -124,7 +124,7 @@ async def import_csv(
     data, name = await _uploaded(request)
 
     def work() -> Response:
-        records = csv_file.read_csv(data, server.settings.max_merge_entries)
+        records = imports.read_csv(data, server.settings.max_merge_entries)
         if dry_run:
             with server.db.read(caller) as tx:
                 return json_answer(plan_to_wire(imports.plan_import(tx, part_number, records), dry_run))

@@ -7,7 +7,6 @@ Names: the spec's ``bom_merge``; the real Silo's ``item.created``, ``item.update
 
 from __future__ import annotations
 
-import json
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,33 +16,26 @@ from sqlalchemy import ColumnElement, LargeBinary, Select, cast, delete, func, s
 
 from silo_server.clock import spec_time
 from silo_server.db.bulk import newest_first
-from silo_server.db.engine import Tx
-from silo_server.db.state import get_state, put_state
+from silo_server.db.engine import Tx, get_state, mode_of, put_state
 from silo_server.db.tables import events, items
 from silo_server.json_values import dumps
-from silo_server.values import Item, NewEvent, Revision
+from silo_server.services.access import audit
+from silo_server.values import Item, NewEvent, Revision, from_row
 
 HORIZON = "event_horizon"
-LOGGED = (
-    events.c.id,
-    events.c.name,
-    events.c.data,
-    events.c.item_uuid,
-    events.c.part_number_key,
-    events.c.at,
-)
 
 
 @dataclass(frozen=True, slots=True)
 class LoggedEvent:
-    """An event of the log. ``item_uuid`` and ``part_number_key`` are what filters look at."""
+    """An event of the log; ``data`` is JSON. ``item_uuid`` and ``part_number_key`` are for filters."""
 
     id: int
     name: str
     data: str
-    item_uuid: str | None
-    part_number_key: str | None
     at: str
+    item_uuid: str | None = None
+    part_number_key: str | None = None
+    username: str | None = None
 
     @property
     def mark(self) -> Mark:
@@ -106,28 +98,18 @@ def bom_merged(tx: Tx, item: Item, data: Mapping[str, Any]) -> None:
     _about(tx, "bom_merge", item, data)
 
 
-def server_state(tx: Tx, mode: str) -> None:
-    tx.emit(NewEvent("server.state", dumps({"mode": mode})))
+def set_mode(tx: Tx, mode: str) -> str:
+    """Take changes (``normal``), or none (``read-only``); returns the mode that the server is in now."""
+    audit.note(tx, "mode.set", mode, f"{mode_of(tx)} → {mode}")
+    put_state(tx, "mode", mode)
+    tx.emit(NewEvent("server.state", dumps({"mode": mode_of(tx)})))
+    return mode_of(tx)
 
 
 def read_after(tx: Tx, after: int, limit: int = 500) -> list[LoggedEvent]:
     """The next events after id ``after``, oldest first."""
-    rows = tx.conn.execute(
-        select(*LOGGED).where(events.c.id > after).order_by(events.c.id).limit(limit)
-    ).all()
-    return [LoggedEvent(*row) for row in rows]
-
-
-@dataclass(frozen=True, slots=True)
-class DatedEvent:
-    """An event as people read it: with its time, its user, and its data decoded."""
-
-    id: int
-    name: str
-    at: str
-    data: Mapping[str, Any]
-    username: str = ""
-    item_uuid: str | None = None
+    rows = tx.conn.execute(select(events).where(events.c.id > after).order_by(events.c.id).limit(limit)).all()
+    return [from_row(LoggedEvent, row) for row in rows]
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,7 +127,7 @@ def newest(
     limit: int,
     before: int | None = None,
     after: int | None = None,
-) -> list[DatedEvent]:
+) -> list[LoggedEvent]:
     """The newest events that were asked for, newest first; ``before`` and ``after`` are ids to page from."""
     query = select(events)
     if asked.names:
@@ -157,10 +139,7 @@ def newest(
         item = select(items.c.uuid).where(items.c.part_number_key == key).scalar_subquery()
         query = query.where((events.c.part_number_key == key) | (events.c.item_uuid == item))
     rows = newest_first(tx, query, events.c.id, limit, before, after)
-    return [
-        DatedEvent(row.id, row.name, row.at, json.loads(row.data), row.username or "", row.item_uuid)
-        for row in rows
-    ]
+    return [from_row(LoggedEvent, row) for row in rows]
 
 
 def usernames(tx: Tx) -> list[str]:
@@ -199,8 +178,8 @@ def reaches(tx: Tx, mark: Mark) -> bool:
 
 def mark_at(tx: Tx, event_id: int) -> Mark:
     """The mark of the event with this id; without a tag where there is none, or no more."""
-    row = tx.conn.execute(select(*LOGGED).where(events.c.id == event_id)).one_or_none()
-    return LoggedEvent(*row).mark if row is not None else Mark(event_id)
+    row = tx.conn.execute(select(events).where(events.c.id == event_id)).one_or_none()
+    return from_row(LoggedEvent, row).mark if row is not None else Mark(event_id)
 
 
 def trim(tx: Tx, keep: int, keep_bytes: int | None = None, limit: int | None = None) -> int:

@@ -21,7 +21,7 @@ from silo_server.schema.catalog import ITEM_TYPES, Category, find_schema
 from silo_server.services import events, revisions
 from silo_server.services.numbering import check_number, take_number
 from silo_server.services.search import index_item, search_for
-from silo_server.values import Item
+from silo_server.values import Item, from_row
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,29 +74,7 @@ SORTS: Mapping[str, Sequence[ColumnElement[Any]]] = {
 
 def to_item(row: Any) -> Item:
     """A frozen item from its row."""
-    return Item(
-        id=row.id,
-        uuid=row.uuid,
-        part_number=row.part_number,
-        name=row.name,
-        description=row.description,
-        item_type=row.item_type,
-        schema=row.schema_name,
-        category=row.category,
-        sourcing_type=row.sourcing_type,
-        long_description=row.long_description,
-        thumbnail_key=row.thumbnail_key,
-        properties=loads(row.properties),
-        current_revision=row.current_revision,
-        bom_version=row.bom_version,
-        version=row.version,
-        created_as=row.created_as,
-        created_at=row.created_at,
-        created_by=row.created_by,
-        updated_at=row.updated_at,
-        updated_by=row.updated_by,
-        archived_at=row.archived_at,
-    )
+    return from_row(Item, row, schema=row.schema_name, properties=loads(row.properties))
 
 
 def get_item(tx: Tx, part_number: str, *, include_archived: bool = False, lock: bool = False) -> Item:

@@ -11,13 +11,12 @@ from typing import Any
 from sqlalchemy import Row, func, insert, select, update
 
 from silo.bom.errors import ConflictError, NewerRevisionError, NotFoundError
-from silo_server.clock import wire
 from silo_server.db.engine import Tx
 from silo_server.db.tables import items, revisions
 from silo_server.json_values import check_json, dumps, loads
 from silo_server.services import events
 from silo_server.services.search import index_item
-from silo_server.values import Item, Revision
+from silo_server.values import Item, Revision, from_row, to_wire
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,17 +159,6 @@ def _newest_file(tx: Tx, item: Item) -> Revision | None:
     return None if row is None else _to_revision(row)
 
 
-def items_with_file(tx: Tx, checksum: str) -> list[tuple[str, int]]:
-    """(part number, revision number) of every revision with exactly this file."""
-    rows = tx.conn.execute(
-        select(items.c.part_number, revisions.c.revision_number)
-        .join(revisions, revisions.c.item_id == items.c.id)
-        .where(revisions.c.file_checksum == checksum.lower())
-        .order_by(items.c.part_number, revisions.c.revision_number)
-    ).all()
-    return [(row.part_number, row.revision_number) for row in rows]
-
-
 def _by_key(tx: Tx, item: Item, key: str, file: StoredFile | None) -> Revision | None:
     row = tx.conn.execute(
         select(revisions).where(revisions.c.item_id == item.id, revisions.c.idempotency_key == key)
@@ -186,38 +174,10 @@ def _by_key(tx: Tx, item: Item, key: str, file: StoredFile | None) -> Revision |
 
 
 def _to_revision(row: Row[Any]) -> Revision:
-    return Revision(
-        revision_number=row.revision_number,
-        comment=row.comment,
-        status=row.status,
-        properties=loads(row.properties),
-        file_name=row.file_name,
-        file_checksum=row.file_checksum,
-        file_size=row.file_size,
-        thumbnail_key=row.thumbnail_key,
-        created_at=row.created_at,
-        created_by=row.created_by,
-        base_revision=row.base_revision,
-        file_path=row.file_path,
-        links=json.loads(row.links) if row.links else (),
-    )
+    links = json.loads(row.links) if row.links else ()
+    return from_row(Revision, row, properties=loads(row.properties), links=links)
 
 
 def revision_to_wire(part_number: str, revision: Revision, *, links: bool = False) -> dict[str, Any]:
     """A revision, under the contract's names; its links only where they are wanted, there may be many."""
-    told = {"links": [dict(link) for link in revision.links]} if links else {}
-    return told | {
-        "part_number": part_number,
-        "revision_number": revision.revision_number,
-        "comment": revision.comment,
-        "status": revision.status,
-        "properties": dict(revision.properties),
-        "file_name": revision.file_name,
-        "file_checksum": revision.file_checksum,
-        "file_size": revision.file_size,
-        "thumbnail_key": revision.thumbnail_key,
-        "created_at": wire(revision.created_at),
-        "created_by": revision.created_by,
-        "base_revision": revision.base_revision,
-        "file_path": revision.file_path,
-    }
+    return {"part_number": part_number, **to_wire(revision, *(() if links else ("links",)))}

@@ -23,8 +23,7 @@ from sqlalchemy.dialects.postgresql import TSQUERY, TSVECTOR
 from sqlalchemy.sql.expression import cast, literal
 
 from silo_server.db.bulk import one_of
-from silo_server.db.engine import Tx
-from silo_server.db.state import get_state, put_state
+from silo_server.db.engine import Tx, get_state, put_state
 from silo_server.db.tables import items, revisions
 from silo_server.json_values import loads
 

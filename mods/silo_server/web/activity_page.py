@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -11,12 +12,12 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Request
 from starlette.responses import Response
 
-from silo_server.routes.context import ServerDep
+from silo_server.routes.context import PageFrom, ServerDep
 from silo_server.services import events
-from silo_server.services.events import DatedEvent, EventQuery
+from silo_server.services.events import EventQuery, LoggedEvent
 from silo_server.services.items import get_by_uuids
 from silo_server.values import Item
-from silo_server.web.guard import Reader
+from silo_server.web.login_page import Reader
 from silo_server.web.render import isolate, page, segment
 from silo_server.web.tables import Address, Part, part_of
 
@@ -53,12 +54,12 @@ def activity_page(
     request: Request,
     server: ServerDep,
     caller: Reader,
-    before: Annotated[int | None, Query(ge=0, le=2**62)] = None,
-    after: Annotated[int | None, Query(ge=0, le=2**62)] = None,
+    before: PageFrom = None,
+    after: PageFrom = None,
     kind: Annotated[str, Query(max_length=40)] = "",
     user: Annotated[str, Query(max_length=64)] = "",
     item: Annotated[str, Query(max_length=64)] = "",
-    newer_than: Annotated[int | None, Query(ge=0, le=2**62)] = None,
+    newer_than: PageFrom = None,
 ) -> Response:
     """What happened, newest first, by kind, user and item.
 
@@ -93,9 +94,9 @@ def activity_page(
     )
 
 
-def entry_of(event: DatedEvent, item: Item | None = None) -> Entry:
+def entry_of(event: LoggedEvent, item: Item | None = None) -> Entry:
     """An event in words. ``item``: what it is about, as it is now."""
-    data = event.data
+    data: dict[str, Any] = json.loads(event.data)
     number = item.part_number if item else str(data.get("item") or data.get("part_number") or "")
     path = f"/items/{segment(number)}" if number else ""
     if event.name in ("bom_merge", "bom.updated"):

@@ -20,6 +20,7 @@ from starlette.responses import RedirectResponse, Response
 from silo.bom.errors import RejectedError
 from silo.bom.numbers import parse_number, plain, read_quantity
 from silo_server.routes.context import form_of, server_of
+from silo_server.services.access.accounts import MAX_PASSWORD
 from silo_server.web.render import NOTICE_COOKIE
 
 NOTICE_SECONDS = 60
@@ -55,6 +56,12 @@ def text(form: FormData, name: str, most: int = 500) -> str:
 def texts(form: FormData, name: str) -> list[str]:
     """All values of a repeated field."""
     return [value for value in form.getlist(name) if isinstance(value, str)]
+
+
+def password_of(form: FormData, name: str) -> str:
+    """A password as it was typed: spaces at its ends belong to it."""
+    value = form.get(name)
+    return value[: MAX_PASSWORD + 1] if isinstance(value, str) else ""
 
 
 def whole(form: FormData, name: str) -> int | None:

@@ -4,18 +4,17 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Annotated
 
-from fastapi import APIRouter, Query, Request
+from fastapi import APIRouter, Request
 from starlette.responses import Response
 
 from silo.bom.errors import RejectedError, VersionConflictError
-from silo_server.routes.context import Server, ServerDep
+from silo_server.routes.context import PageFrom, Server, ServerDep
 from silo_server.services.bom import history
 from silo_server.services.items import get_item
 from silo_server.values import Actor
 from silo_server.web.forms import Form, back, text, whole
-from silo_server.web.guard import Reader, Writer
+from silo_server.web.login_page import Reader, Writer
 from silo_server.web.merge_page import bom_path
 from silo_server.web.render import page, plural
 from silo_server.web.tables import part_of
@@ -28,8 +27,6 @@ PAGE_SIZE = 50
 TOLD_LINES = 12
 KNOWN = 500
 
-Point = Annotated[int | None, Query(ge=0, le=2**62)]
-
 
 @router.get("/items/{part_number}/history")
 def history_page(
@@ -37,8 +34,8 @@ def history_page(
     server: ServerDep,
     caller: Reader,
     part_number: str,
-    before: Point = None,
-    after: Point = None,
+    before: PageFrom = None,
+    after: PageFrom = None,
 ) -> Response:
     """All changes with their lines, newest first; ``before`` and ``after`` are the changes to page from."""
     with server.db.read(caller) as tx:
@@ -67,8 +64,8 @@ def compare_page(
     server: ServerDep,
     caller: Reader,
     part_number: str,
-    old: Point = None,
-    new: Point = None,
+    old: PageFrom = None,
+    new: PageFrom = None,
     all: bool = False,
 ) -> Response:
     """Two points of time, line by line; without ``old`` what the newest change did."""

@@ -23,12 +23,12 @@ from silo.bom.headers import Role
 from silo.bom.numbers import Mark
 from silo_server.errors import TooLargeError
 from silo_server.routes.context import Server, ServerDep
-from silo_server.services.bom import csv_file, imports
-from silo_server.services.bom.csv_file import Layout
+from silo_server.services.bom import imports
+from silo_server.services.bom.imports import Layout
 from silo_server.services.items import get_item
 from silo_server.values import Actor
 from silo_server.web.forms import Form, back, text, whole
-from silo_server.web.guard import Writer
+from silo_server.web.login_page import Writer
 from silo_server.web.merge_page import bom_path
 from silo_server.web.render import isolate, page
 from silo_server.web.words import changes
@@ -75,7 +75,7 @@ def apply(request: Request, server: ServerDep, caller: Writer, part_number: str,
     """Write it; where the BOM changed since the check, check again instead."""
     upload, layout = _carried(form), layout_of(form)
     try:
-        records = csv_file.read_csv(upload.data, server.settings.max_merge_entries, layout)
+        records = imports.read_csv(upload.data, server.settings.max_merge_entries, layout)
         with server.db.write(caller) as tx:
             plan, change, _ = imports.apply_import(
                 tx, part_number, records, upload.name, whole(form, "version")
@@ -109,12 +109,12 @@ def layout_of(form: FormData) -> Layout | None:
     if "header" not in form:
         return None
     marks = {mark.value: mark for mark in Mark}
-    columns = {role: whole(form, f"column_{role}") for role in csv_file.ROLES}
+    columns = {role: whole(form, f"column_{role}") for role in imports.ROLES}
     delimiter = form.get("delimiter")
     return Layout(
-        delimiter if isinstance(delimiter, str) and delimiter in csv_file.DELIMITERS else ",",
-        min(whole(form, "header") or 0, csv_file.HEADER_WITHIN - 1),
-        {role: at for role, at in columns.items() if at is not None and at < csv_file.MAX_COLUMNS},
+        delimiter if isinstance(delimiter, str) and delimiter in imports.DELIMITERS else ",",
+        min(whole(form, "header") or 0, imports.HEADER_WITHIN - 1),
+        {role: at for role, at in columns.items() if at is not None and at < imports.MAX_COLUMNS},
         marks.get(text(form, "mark")),
     )
 
@@ -128,7 +128,7 @@ def _show(
     layout: Layout | None = None,
     problem: Problem = Problem(),
 ) -> Response:
-    records = csv_file.read_csv(upload.data, server.settings.max_merge_entries, layout) if upload else ()
+    records = imports.read_csv(upload.data, server.settings.max_merge_entries, layout) if upload else ()
     with server.db.read(caller) as tx:
         item = get_item(tx, part_number)
         plan = imports.plan_import(tx, part_number, records) if upload else None
@@ -158,8 +158,8 @@ _LABELS = {Role.TYPE: "Type", Role.REVISION: "Revision"}
 
 def _reading(file: Upload, layout: Layout | None) -> dict[str, Any]:
     """How the file is read, for the form in which a person changes that."""
-    known = layout or csv_file.guess_of(file.data) or Layout(csv_file.likely_delimiter(file.data), 0)
-    lines = csv_file.first_lines(file.data, known.delimiter, known.header + 6)
+    known = layout or imports.guess_of(file.data) or Layout(imports.likely_delimiter(file.data), 0)
+    lines = imports.first_lines(file.data, known.delimiter, known.header + 6)
     header = lines[known.header] if known.header < len(lines) else []
     width = max(map(len, lines), default=0)
     samples = lines[known.header + 1 :]
@@ -167,8 +167,8 @@ def _reading(file: Upload, layout: Layout | None) -> dict[str, Any]:
         "layout": known,
         "chosen": layout is not None,
         "lines": [" | ".join(cells)[:60] for cells in lines],
-        "delimiters": csv_file.DELIMITERS,
-        "roles": [(role, _LABELS.get(role, role.replace("_", " ").capitalize())) for role in csv_file.ROLES],
+        "delimiters": imports.DELIMITERS,
+        "roles": [(role, _LABELS.get(role, role.replace("_", " ").capitalize())) for role in imports.ROLES],
         "columns": [_name_of(index, header, samples) for index in range(width)],
     }
 
@@ -186,7 +186,7 @@ def _uploaded(form: FormData) -> Upload:
     data = file.file.read(MOST_BYTES + 1)
     if len(data) > MOST_BYTES:
         raise TooLargeError(f"The file is larger than {MOST_BYTES // 2**20} MiB; this cannot be a BOM.")
-    csv_file.refuse_workbook(data)
+    imports.refuse_workbook(data)
     return Upload(file.filename[:200], data)
 
 

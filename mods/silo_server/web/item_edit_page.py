@@ -29,7 +29,7 @@ from silo_server.services.items import ItemChange, NewItem, get_item
 from silo_server.services.revisions import Origin
 from silo_server.values import Actor, Item, Revision
 from silo_server.web.forms import Form, back, text, whole
-from silo_server.web.guard import Writer
+from silo_server.web.login_page import Writer
 from silo_server.web.render import isolate, page, segment
 
 router = APIRouter(include_in_schema=False)

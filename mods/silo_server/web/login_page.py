@@ -1,24 +1,139 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The way in and out: the login form, the one-time link, log out."""
+"""The way in and out: who may see and do what on the pages, the login form, the one-time link, log out."""
 
 from __future__ import annotations
 
 from typing import Annotated
+from urllib.parse import quote, urlsplit
 
+import anyio.to_thread
 from fastapi import APIRouter, Depends, Query, Request
-from starlette.datastructures import FormData
 from starlette.responses import RedirectResponse, Response
 
-from silo.bom.errors import AuthError
+from silo.bom.errors import AuthError, ForbiddenError
 from silo_server.errors import TooManyAttemptsError
 from silo_server.routes.auth import set_session_cookie
-from silo_server.routes.context import SESSION_COOKIE, ServerDep, client_address, find_actor
+from silo_server.routes.context import (
+    FORM_TYPES,
+    SAFE_METHODS,
+    SESSION_COOKIE,
+    FormSecretError,
+    Guard,
+    ServerDep,
+    client_address,
+    find_actor,
+    form_of,
+    server_of,
+)
 from silo_server.services.access import logins
-from silo_server.web.forms import Form, back, local_path, text, unpacked
-from silo_server.web.guard import Reader, own_form
+from silo_server.values import Actor, Role
+from silo_server.web.forms import (
+    MOST_KEPT,
+    Form,
+    Kept,
+    back,
+    kept_form,
+    local_path,
+    own_site,
+    password_of,
+    text,
+    unpacked,
+)
 from silo_server.web.render import page
 
 router = APIRouter(include_in_schema=False)
+
+
+class LoginNeededError(Exception):
+    """Nobody is logged in; the login page leads back to ``target``, or to the form that was ``kept``."""
+
+    def __init__(self, target: str, kept: Kept | None = None) -> None:
+        super().__init__(target)
+        self.target, self.kept = target, kept
+
+
+class OldFormError(Exception):
+    """A form of ours that was shown in an earlier session; the person is asked whether to send it now."""
+
+    def __init__(self, actor: Actor, kept: Kept) -> None:
+        super().__init__(kept.path)
+        self.actor, self.kept = actor, kept
+
+
+class PageGuard(Guard):
+    """As :class:`Guard`, for people: what they typed is kept over a login."""
+
+    async def __call__(self, request: Request) -> Actor:
+        try:
+            return await super().__call__(request)
+        except FormSecretError:
+            kept, actor = await _kept(request), await anyio.to_thread.run_sync(find_actor, request)
+            if kept is None or actor is None or not own_site(request):
+                raise
+            raise OldFormError(actor, kept) from None
+        except AuthError as error:
+            kept = await _kept(request)
+            if error.status_hint != 401:
+                request.state.kept = kept
+                raise
+            raise LoginNeededError(_here(request), kept if own_site(request) else None) from None
+
+
+async def _kept(request: Request) -> Kept | None:
+    """What the request's form holds; None where it is none, or too large to be carried along."""
+    length = request.headers.get("content-length", "")
+    small = length.isdigit() and int(length) <= MOST_KEPT
+    is_form = request.headers.get("content-type", "").startswith(FORM_TYPES)
+    if request.method in SAFE_METHODS or not is_form or not small:
+        return None
+    return kept_form(request.url.path, await form_of(request))
+
+
+Reader = Annotated[Actor, Depends(PageGuard(Role.VIEWER))]
+Writer = Annotated[Actor, Depends(PageGuard(Role.EDITOR))]
+Administrator = Annotated[Actor, Depends(PageGuard(Role.ADMIN))]
+
+
+def own_form(request: Request) -> None:
+    """For the one form without a session, the login: ForbiddenError where another site sent it.
+
+    A browser says where a form comes from; a page elsewhere must not log somebody in under its own name.
+    """
+    if own_site(request) is False:
+        raise ForbiddenError("this form was sent by another site; log in on the login page itself")
+
+
+def _here(request: Request) -> str:
+    if request.method in SAFE_METHODS:
+        query = f"?{request.url.query}" if request.url.query else ""
+        return request.url.path + query
+    # A form cannot be sent again by a link; the page before it is the best that is left.
+    referer = urlsplit(request.headers.get("referer", ""))
+    path = referer.path.removeprefix(server_of(request).settings.root_path)
+    return path if referer.netloc == request.headers.get("host") and path else "/"
+
+
+def _login_page(
+    request: Request, target: str, problem: str = "", status: int = 200, kept: Kept | None = None
+) -> Response:
+    values = {"target": target, "problem": problem, "kept": kept}
+    return page(request, "login.html", None, status=status, **values)
+
+
+async def to_login(request: Request, error: Exception) -> Response:
+    """Lead visitors who are not logged in to the login page."""
+    assert isinstance(error, LoginNeededError)
+    if error.kept is None:
+        return RedirectResponse("/login?next=" + quote(error.target, safe="/"), 303)
+    return await anyio.to_thread.run_sync(_login_page, request, error.target, "", 401, error.kept)
+
+
+async def send_again(request: Request, error: Exception) -> Response:
+    """Ask whether a form of an earlier session is to be sent."""
+    assert isinstance(error, OldFormError)
+    actor, kept = error.actor, error.kept
+    return await anyio.to_thread.run_sync(lambda: page(request, "again.html", actor, status=403, kept=kept))
+
 
 START = "/"
 Next = Annotated[str, Query(max_length=500)]
@@ -29,7 +144,7 @@ def login_form(request: Request, next: Next = START) -> Response:
     """The login form; users who are logged in already are sent on."""
     if find_actor(request) is not None:
         return back(local_path(next))
-    return page(request, "login.html", None, target=local_path(next), problem="", kept=None)
+    return _login_page(request, local_path(next))
 
 
 @router.post("/login", dependencies=[Depends(own_form)])
@@ -39,21 +154,17 @@ def log_in(request: Request, server: ServerDep, form: Form) -> Response:
     packed = form.get("kept")
     kept = unpacked(packed) if isinstance(packed, str) and packed else None
 
-    def again(problem: str, status: int) -> Response:
-        values = {"target": target, "problem": problem, "kept": kept}
-        return page(request, "login.html", None, status=status, **values)
-
     if "already" in form:
         actor = find_actor(request)
         if actor is None:
-            return again("You are not logged in yet in this browser.", 401)
+            return _login_page(request, target, "You are not logged in yet in this browser.", 401, kept)
         return page(request, "again.html", actor, kept=kept) if kept else back(target)
     try:
         session = logins.log_in(
-            server.db, text(form, "username", 200), _password(form), client_address(request)
+            server.db, text(form, "username", 200), password_of(form, "password"), client_address(request)
         )
     except (AuthError, TooManyAttemptsError) as error:
-        return again(str(error), error.status_hint)
+        return _login_page(request, target, str(error), error.status_hint, kept)
     if kept is None:
         return _with_session(request, server, session, target)
     actor = logins.actor_by_session(server.db, session.secret, client_address(request))
@@ -77,7 +188,7 @@ def use_link(request: Request, server: ServerDep, secret: str, form: Form) -> Re
     except AuthError as error:
         if find_actor(request) is not None:
             return back(target)
-        return page(request, "login.html", None, status=401, target=target, problem=str(error), kept=None)
+        return _login_page(request, target, str(error), 401)
     return _with_session(request, server, session, target)
 
 
@@ -88,12 +199,6 @@ def log_out(server: ServerDep, caller: Reader) -> Response:
     response = RedirectResponse("/login", 303)
     response.delete_cookie(SESSION_COOKIE)
     return response
-
-
-def _password(form: FormData) -> str:
-    # Spaces at the ends belong to a password.
-    value = form.get("password")
-    return value[:200] if isinstance(value, str) else ""
 
 
 def _with_session(request: Request, server: ServerDep, session: logins.NewSession, target: str) -> Response:

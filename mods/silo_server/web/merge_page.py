@@ -28,8 +28,8 @@ from silo_server.services.items import get_item
 from silo_server.values import Actor, Item, Line, LineState
 from silo_server.web import line_form
 from silo_server.web.forms import AmbiguousError, Form, back, text, texts, whole
-from silo_server.web.guard import Reader, Writer
 from silo_server.web.line_form import LineForm
+from silo_server.web.login_page import Reader, Writer
 from silo_server.web.render import isolate, page, plural, segment
 from silo_server.web.tables import Address, Page, arranged, fits, page_of
 from silo_server.web.words import FIELDS, by_whom, sentences
@@ -40,6 +40,12 @@ LATER_CHANGES = 5
 # So many open questions are shown; up to so many have a form each, more are decided by boxes.
 MOST_SHOWN, MOST_FORMS = 1000, 100
 KEPT = "kept on purpose, not in the CAD model"
+DONE = {
+    Action.REMOVE: "removed",
+    Action.KEEP: "kept as intentional",
+    Action.TAKE_CAD: "set to what CAD says",
+    Action.KEEP_SILO: "left as Silo says",
+}
 
 
 @dataclass(frozen=True)
@@ -151,9 +157,9 @@ def add_line(request: Request, server: ServerDep, caller: Writer, part_number: s
     def work(tx: Tx) -> tuple[str, int]:
         if not child:
             raise RejectedError("part number: wanted the number of an item, got nothing")
-        new = edits.NewLine(child_part_number=child, **line_form.values_of(sent.typed))
+        new = LineState(**{"quantity": 1.0, "source": "manual", **line_form.values_of(sent.typed)})
         try:
-            added = edits.add_line(tx, part_number, new, why=sent.why or None)
+            added = edits.add_line(tx, part_number, child, new, why=sent.why or None)
         except DuplicateError as error:
             parent = get_item(tx, part_number)
             line = component_of(lines_of(tx, parent), child, parent)
@@ -237,17 +243,22 @@ def view_of(query: str) -> str:
     return urlencode([(name, value) for name, value in parse_qsl(query[:1000]) if name != "edit"])
 
 
+def decision_of(form: FormData) -> tuple[Action, str | None]:
+    """What a form decides, and why; RejectedError where it has no button of ours."""
+    try:
+        action = Action(text(form, "action"))
+    except ValueError:
+        raise RejectedError("action: wanted one of the buttons, got none; load the page again") from None
+    return action, text(form, "reason") or (KEPT if action is Action.KEEP else None)
+
+
 def decisions_of(form: FormData, names: Mapping[str, str]) -> list[Decision]:
     """The decisions in a submitted form: one action for each line (by its id, or its child) in ``chosen``.
 
     names
         line id → part number, of the BOM's lines. After the id may stand the mark of what was seen.
     """
-    try:
-        action = Action(text(form, "action"))
-    except ValueError:
-        raise RejectedError("action: wanted one of the buttons, got none; load the page again") from None
-    reason = text(form, "reason") or (KEPT if action is Action.KEEP else None)
+    action, reason = decision_of(form)
     decisions = []
     for value in texts(form, "chosen"):
         which, _, seen = value.partition(" ")
@@ -388,14 +399,9 @@ def _editing(lines: list[Line], asked: Asked, item: Any) -> Line | None:
 
 
 def _done(decisions: list[Decision]) -> str:
-    words = {
-        Action.REMOVE: "removed",
-        Action.KEEP: "kept as intentional",
-        Action.TAKE_CAD: "set to what CAD says",
-        Action.KEEP_SILO: "left as Silo says",
-    }[decisions[0].action]
     who = isolate(decisions[0].child_part_number)
-    return f"{who if len(decisions) == 1 else plural(len(decisions), 'line', 'lines')} {words}."
+    lines = who if len(decisions) == 1 else plural(len(decisions), "line", "lines")
+    return f"{lines} {DONE[decisions[0].action]}."
 
 
 def _sentence(error: SiloError) -> str:

@@ -1,41 +1,51 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The pages put together: their routers, their static files, and errors as pages."""
+"""The pages put together: their routers, their static files, and errors as pages in plain words.
+
+The words of an error page are those that the JSON has.
+"""
 
 from __future__ import annotations
 
-from fastapi import FastAPI
-from starlette.responses import Response
+import json
+from collections.abc import Awaitable, Callable
+from typing import Any, cast
+from urllib.parse import quote
+
+import anyio.to_thread
+from fastapi import FastAPI, Request
+from sqlalchemy.exc import SQLAlchemyError
+from starlette.responses import RedirectResponse, Response
+from starlette.routing import Match
 from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
+from silo_server.middleware import SECURITY_HEADERS
+from silo_server.routes.context import SAFE_METHODS, find_actor
+from silo_server.values import Actor
 from silo_server.web import (
-    account_page,
+    accounts,
     activity_page,
-    error_page,
-    guard,
     history_page,
     import_page,
     item_edit_page,
     item_page,
-    items_page,
     login_page,
     merge_page,
-    users_page,
     waiting_page,
 )
+from silo_server.web.login_page import LoginNeededError, OldFormError, send_again, to_login
+from silo_server.web.render import page
 
 ROUTERS = (
     login_page.router,
-    items_page.router,
     item_edit_page.router,  # before item_page: /items/new is no part number
     item_page.router,
     merge_page.router,
     history_page.router,
     import_page.router,
     activity_page.router,
-    account_page.router,
     waiting_page.router,
-    users_page.router,
+    accounts.router,
 )
 
 
@@ -51,5 +61,90 @@ class OwnFiles(StaticFiles):
 def install(app: FastAPI) -> None:
     """Add what is no route: static files, the way to the login page, errors as pages."""
     app.mount("/static", OwnFiles(packages=[("silo_server.web", "static")]), name="static")
-    guard.install(app)
-    error_page.install(app)
+    # Browsers get pages where the handlers that ``app`` has give JSON.
+    for kind, handler in list(app.exception_handlers.items()):
+        app.add_exception_handler(kind, _for_browsers(cast(Handler, handler)))
+    app.add_exception_handler(LoginNeededError, to_login)
+    app.add_exception_handler(OldFormError, send_again)
+
+
+Handler = Callable[[Request, Exception], Awaitable[Response]]
+
+TITLES = {
+    400: "That did not work",
+    401: "Please log in",
+    403: "Not allowed",
+    404: "Not found",
+    405: "Not found",
+    409: "Something else is in the way",
+    412: "The BOM changed in between",
+    413: "Too large",
+    429: "Too many attempts",
+    503: "Not possible at the moment",
+}
+
+
+def wants_page(request: Request) -> bool:
+    """True for a browser that shows a page; the API and programs get JSON."""
+    return not request.url.path.startswith("/api/") and "text/html" in request.headers.get("accept", "")
+
+
+def _for_browsers(handler: Handler) -> Handler:
+    async def answer(request: Request, error: Exception) -> Response:
+        plain = await handler(request, error)
+        if plain.status_code == 405 and request.method in SAFE_METHODS and wants_page(request):
+            return RedirectResponse(_page_above(request), 303)
+        return await error_page(request, plain) if wants_page(request) else plain
+
+    return answer
+
+
+async def error_page(request: Request, plain: Response) -> Response:
+    """The page for an error that was answered as JSON."""
+    told: dict[str, Any] = json.loads(bytes(plain.body))
+
+    kept = getattr(request.state, "kept", None)
+
+    def draw() -> Response:
+        return page(
+            request,
+            "error.html",
+            _actor(request),
+            status=plain.status_code,
+            title=TITLES.get(plain.status_code, "The server made a mistake"),
+            message=_sentence(plain.status_code, told["message"], request),
+            problems=told.get("problems", [])[:50],
+            path=told.get("path", []),
+            kept=kept,
+        )
+
+    response = await anyio.to_thread.run_sync(draw)
+    if "retry-after" in plain.headers:
+        response.headers["retry-after"] = plain.headers["retry-after"]
+    # A fault is answered outside of the middleware that adds these otherwise.
+    response.headers.update(SECURITY_HEADERS)
+    return response
+
+
+def _page_above(request: Request) -> str:
+    """The page that the form of this address stands on: the nearest one above that can be looked at."""
+    path = request.scope["path"].rstrip("/")
+    while path:
+        path = path.rpartition("/")[0]
+        scope = {**request.scope, "path": path, "method": "GET"}
+        if any(route.matches(scope)[0] is Match.FULL for route in request.app.routes):
+            return quote(path)
+    return "/"
+
+
+def _sentence(status: int, message: str, request: Request) -> str:
+    if message.startswith(("Not Found:", "Method Not Allowed:")):
+        return f"There is no page {request.url.path}."
+    return message[:1].upper() + message[1:] + ("" if message.endswith((".", "?", "!")) else ".")
+
+
+def _actor(request: Request) -> Actor | None:
+    try:
+        return find_actor(request)
+    except SQLAlchemyError:
+        return None

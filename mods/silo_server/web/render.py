@@ -19,7 +19,7 @@ from silo.bom.numbers import as_decimal
 from silo_server.clock import wire
 from silo_server.db.engine import mode_of
 from silo_server.routes.context import masked, server_of
-from silo_server.services.bom.waiting import waiting_count
+from silo_server.services.bom.review import waiting_count
 from silo_server.values import Actor, Role
 
 NOTICE_COOKIE = "silo_notice"

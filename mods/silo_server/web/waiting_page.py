@@ -10,14 +10,13 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Request
 from starlette.responses import Response
 
-from silo.bom.errors import RejectedError, SiloError, VersionConflictError
+from silo.bom.errors import SiloError, VersionConflictError
 from silo_server.routes.context import Server, ServerDep
-from silo_server.services.bom.review import Action
-from silo_server.services.bom.waiting import Waiting, decide_all, waiting
+from silo_server.services.bom.review import Waiting, decide_all, waiting
 from silo_server.values import Actor
 from silo_server.web.forms import Form, back, text, texts
-from silo_server.web.guard import Reader, Writer
-from silo_server.web.merge_page import KEPT
+from silo_server.web.login_page import Reader, Writer
+from silo_server.web.merge_page import DONE, decision_of
 from silo_server.web.render import isolate, page, plural
 from silo_server.web.tables import Address, arranged, fits, page_of
 
@@ -39,12 +38,6 @@ _SORTS: Mapping[str, Callable[[Waiting], Any]] = {
     "incomplete": lambda row: row.left_out,
     "unregistered": lambda row: row.unregistered,
     "synced": lambda row: row.last.at,
-}
-_DONE = {
-    Action.REMOVE: "removed",
-    Action.KEEP: "kept as intentional",
-    Action.TAKE_CAD: "set to what CAD says",
-    Action.KEEP_SILO: "left as Silo says",
 }
 MOST_TOLD = 20
 
@@ -68,11 +61,7 @@ def waiting_page(
 @router.post("/waiting/decide")
 def decide(request: Request, server: ServerDep, caller: Writer, form: Form) -> Response:
     """One decision about all chosen BOMs. Each is a change of its own; what was not done is named."""
-    try:
-        action = Action(text(form, "action"))
-    except ValueError:
-        raise RejectedError("action: wanted one of the buttons, got none; load the page again") from None
-    reason = text(form, "reason") or (KEPT if action is Action.KEEP else None)
+    action, reason = decision_of(form)
     lines = boms = 0
     problems: list[str] = []
     for value in dict.fromkeys(texts(form, "chosen")):
@@ -89,7 +78,7 @@ def decide(request: Request, server: ServerDep, caller: Writer, form: Form) -> R
         except SiloError as error:
             problems.append(f"{isolate(part_number)}: {error}")
     if lines:
-        said = f"{plural(lines, 'line', 'lines')} in {plural(boms, 'BOM', 'BOMs')} {_DONE[action]}."
+        said = f"{plural(lines, 'line', 'lines')} in {plural(boms, 'BOM', 'BOMs')} {DONE[action]}."
     else:
         said = "Nothing of this kind was open in what was chosen, so nothing was changed."
     view = dict(Address("/waiting", {n: text(form, n, 1024) for n in ("q", "folder", "kind", "sort")}).but())

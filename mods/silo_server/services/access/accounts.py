@@ -7,10 +7,11 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 from argon2 import PasswordHasher
 from argon2.exceptions import InvalidHashError, VerificationError
-from sqlalchemy import Row, func, insert, select, update
+from sqlalchemy import func, insert, select, update
 
 from silo.bom.errors import ConflictError, ForbiddenError, NotFoundError, RejectedError
 from silo_server.db.engine import ADMIN_LOCK, Tx
@@ -18,7 +19,7 @@ from silo_server.db.tables import sessions, users
 from silo_server.errors import DuplicateError
 from silo_server.services.access import audit
 from silo_server.turnstile import Turnstile
-from silo_server.values import Role
+from silo_server.values import Role, from_row
 
 MIN_PASSWORD = 10
 NO_TOKEN = "a token cannot set the password of its own account; log in in a browser for that"
@@ -53,17 +54,10 @@ def _decoy() -> str:
         return _hasher().hash("a password that nobody has")
 
 
-def to_user(row: Row[tuple[object, ...]]) -> User:
+def to_user(row: Any) -> User:
     """A frozen user from its row."""
-    return User(
-        row.id,
-        row.username,
-        row.display_name,
-        Role(row.role),
-        bool(row.active),
-        row.password_hash is not None,
-        row.created_at,
-    )
+    known = row.password_hash is not None
+    return from_row(User, row, role=Role(row.role), active=bool(row.active), has_password=known)
 
 
 def list_users(tx: Tx) -> list[User]:

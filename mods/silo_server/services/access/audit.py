@@ -10,6 +10,7 @@ from sqlalchemy import insert, select
 from silo_server.db.bulk import newest_first
 from silo_server.db.engine import Tx
 from silo_server.db.tables import audit
+from silo_server.values import from_row
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,4 +45,4 @@ def list_entries(
 ) -> list[AuditEntry]:
     """The newest entries first; ``before`` and ``after`` are ids to page on and back."""
     rows = newest_first(tx, select(audit), audit.c.id, limit, before, after)
-    return [AuditEntry(r.id, r.at, r.username, r.action, r.target, r.detail, r.address) for r in rows]
+    return [from_row(AuditEntry, row) for row in rows]

@@ -17,7 +17,7 @@ from silo_server.db.bulk import update_rows
 from silo_server.db.engine import Database, Tx
 from silo_server.db.tables import api_tokens, users
 from silo_server.services.access import audit
-from silo_server.values import Actor, Role, Scope
+from silo_server.values import Actor, Role, Scope, from_row
 
 PREFIX = "silo_"
 # Writing down the last use of a token on every request would make every read a write.
@@ -77,7 +77,6 @@ def create_own_token(
     Raises ForbiddenError, ConflictError where the form was sent long ago.
     """
     actor = tx.actor
-    assert actor.user_id is not None  # every caller that a guard let in is a user
     check_may_change(actor)
     if scope is not None and not actor.scope.covers(scope):
         raise ForbiddenError(f"a token with the scope {actor.scope} cannot make one with the scope {scope}")
@@ -89,9 +88,9 @@ def create_own_token(
                 "log in in a browser for that"
             )
         expires = expires or actor.expires_at
-    if secret is not None and (known := _made_before(tx, actor.user_id, secret)) is not None:
+    if secret is not None and (known := _made_before(tx, actor.own_id, secret)) is not None:
         return known, secret
-    return create_token(tx, actor.user_id, name, expires=expires, scope=scope or actor.scope, secret=secret)
+    return create_token(tx, actor.own_id, name, expires=expires, scope=scope or actor.scope, secret=secret)
 
 
 def _made_before(tx: Tx, user_id: int, secret: str) -> Token | None:
@@ -162,20 +161,7 @@ def list_tokens(tx: Tx, user_id: int | None = None) -> list[Token]:
     )
     if user_id is not None:
         query = query.where(api_tokens.c.user_id == user_id)
-    return [
-        Token(
-            r.id,
-            r.username,
-            r.name,
-            r.prefix,
-            Scope(r.scope),
-            r.created_at,
-            r.expires_at,
-            r.last_used_at,
-            r.revoked_at,
-        )
-        for r in tx.conn.execute(query)
-    ]
+    return [from_row(Token, row, scope=Scope(row.scope)) for row in tx.conn.execute(query)]
 
 
 def revoke_token(tx: Tx, token_id: int, user_id: int | None) -> None:

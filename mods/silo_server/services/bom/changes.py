@@ -21,7 +21,9 @@ from silo_server.db.bulk import insert_rows, one_of, update_rows
 from silo_server.db.engine import Tx
 from silo_server.db.tables import bom_change_lines, bom_changes, bom_lines, items
 from silo_server.json_values import dumps
+from silo_server.services import events
 from silo_server.services.bom.lines import state_columns, state_to_json
+from silo_server.services.items import get_item
 from silo_server.values import Item, LineState
 
 
@@ -79,6 +81,13 @@ def new_line_id() -> str:
     return str(uuids.uuid4())
 
 
+def parent_to_change(tx: Tx, part_number: str, expected: int | None) -> Item:
+    """The item whose BOM is to be changed, locked, and with the ``expected`` version of the BOM."""
+    parent = get_item(tx, part_number, lock=True)
+    check_version(parent, expected)
+    return parent
+
+
 def check_version(parent: Item, expected: int | None) -> None:
     """Raise VersionConflictError unless the BOM still has the version that the request was made from."""
     if expected is not None and expected != parent.bom_version:
@@ -91,7 +100,8 @@ def check_version(parent: Item, expected: int | None) -> None:
 def apply_changes(tx: Tx, parent: Item, changes: Sequence[LineChange], note: ChangeNote) -> tuple[int, int]:
     """Write ``changes`` to the parent's BOM (whose lock the caller holds) and to its history.
 
-    Returns (change id, version after). The version moves only when a line does.
+    Returns (change id, version after). The version moves only when a line does. What is no merge is announced
+    here; a merge has an event of its own.
     """
     version = parent.bom_version + (1 if changes else 0)
     placed = _placed(tx, parent, changes)
@@ -118,6 +128,8 @@ def apply_changes(tx: Tx, parent: Item, changes: Sequence[LineChange], note: Cha
     if changes:
         insert_rows(tx, bom_change_lines, [_history_row(change_id, change) for change in placed])
         tx.conn.execute(update(items).where(items.c.id == parent.id).values(bom_version=version))
+    if note.kind is not ChangeKind.MERGE:
+        events.bom_updated(tx, parent, note.kind, note.summary)
     return change_id, version
 
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from silo.bom.diff import same_quantity
@@ -12,15 +12,14 @@ from silo.bom.errors import RejectedError
 from silo_server.db.engine import Tx
 from silo_server.errors import DuplicateError, LinesChangedError
 from silo_server.json_values import json_problem
-from silo_server.services import events
 from silo_server.services.bom.changes import (
     ChangeKind,
     ChangeNote,
     LineChange,
     apply_changes,
     check_no_cycle,
-    check_version,
     new_line_id,
+    parent_to_change,
 )
 from silo_server.services.bom.lines import LineId, line_of, lines_of, mark_of
 from silo_server.services.bom.merge_json import quantity_problem
@@ -29,22 +28,6 @@ from silo_server.values import Item, Line, LineState, number
 
 REL_TYPES = ("component", "alternate", "reference")
 SOURCES = ("manual", "assembly")
-
-
-@dataclass(frozen=True, kw_only=True)
-class NewLine:
-    """A line to be added by hand."""
-
-    child_part_number: str
-    quantity: float = 1.0
-    rel_type: str = "component"
-    unit: str | None = None
-    reference_designators: tuple[str, ...] = ()
-    find_number: str | None = None
-    notes: str | None = None
-    child_revision: int | None = None
-    source: str = "manual"
-    metadata: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,23 +42,17 @@ class Edited:
 
 
 def add_line(
-    tx: Tx, part_number: str, new: NewLine, expected: int | None = None, *, why: str | None = None
+    tx: Tx,
+    part_number: str,
+    child_part_number: str,
+    state: LineState,
+    expected: int | None = None,
+    *,
+    why: str | None = None,
 ) -> Edited:
     """Add a line. Raises DuplicateError where the child is there already, CycleError, RejectedError."""
-    parent = get_item(tx, part_number, lock=True)
-    check_version(parent, expected)
-    child = get_item(tx, new.child_part_number)
-    state = LineState(
-        new.quantity,
-        new.source,
-        new.rel_type,
-        new.unit,
-        tuple(new.reference_designators),
-        new.find_number,
-        new.notes,
-        new.child_revision,
-        metadata=dict(new.metadata),
-    )
+    parent = parent_to_change(tx, part_number, expected)
+    child = get_item(tx, child_part_number)
     check_state(state)
     for line in lines_of(tx, parent):
         if line.child_id == child.id and line.state.rel_type == state.rel_type:
@@ -102,8 +79,7 @@ def change_line(
     Another quantity on an assembly line makes it a manual override, which remembers what the assembly said;
     giving that quantity back ends the override. A ``source`` that is given wins over this.
     """
-    parent = get_item(tx, part_number, lock=True)
-    check_version(parent, expected)
+    parent = parent_to_change(tx, part_number, expected)
     line = line_of(lines_of(tx, parent), which, parent)
     after = edited_state(line.state, changes)
     check_state(after)
@@ -136,8 +112,7 @@ def remove_line(
     seen
         the :func:`mark_of` the line as the person saw it; LinesChangedError where it is another one by now.
     """
-    parent = get_item(tx, part_number, lock=True)
-    check_version(parent, expected)
+    parent = parent_to_change(tx, part_number, expected)
     line = line_of(lines_of(tx, parent), which, parent)
     if seen is not None and seen != mark_of(line.state):
         raise LinesChangedError(f"{line.child_part_number} was changed meanwhile", [line.id])
@@ -192,7 +167,6 @@ def _check_free(tx: Tx, parent: Item, line: Line, rel_type: str) -> None:
 def _apply(tx: Tx, parent: Item, change: LineChange, child: str, text: str, why: str | None = None) -> Edited:
     note = ChangeNote(kind=ChangeKind.EDIT, summary=text, reason=why)
     change_id, version = apply_changes(tx, parent, [change], note)
-    events.bom_updated(tx, parent, ChangeKind.EDIT, text)
     after = None
     if change.after is not None:
         after = next(line for line in lines_of(tx, parent) if line.id == change.line_id)

@@ -8,7 +8,7 @@ Change 0 is the empty BOM before everything.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy import func, select
@@ -18,18 +18,17 @@ from silo_server.db.bulk import newest_first, one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import bom_change_lines, bom_changes, bom_conflicts
 from silo_server.json_values import loads
-from silo_server.services import events
 from silo_server.services.bom.changes import (
     ChangeKind,
     ChangeNote,
     LineChange,
     apply_changes,
     check_no_cycle,
-    check_version,
+    parent_to_change,
 )
 from silo_server.services.bom.lines import lines_of, stored_state
-from silo_server.services.items import by_ids, get_item
-from silo_server.values import Item, Line, LineState
+from silo_server.services.items import by_ids
+from silo_server.values import Item, Line, LineState, from_row, names_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +90,9 @@ def list_changes(
     return _changes(tx, [bom_changes.c.parent_id == parent.id], limit, before, after)
 
 
-def lines_of_changes(tx: Tx, change_ids: Collection[int], most: int) -> dict[int, list[ChangedLine]]:
+def lines_of_changes(
+    tx: Tx, change_ids: Collection[int], most: int = 2**31 - 1
+) -> dict[int, list[ChangedLine]]:
     """The first ``most`` lines of each of these changes, in one question."""
     place = func.row_number().over(
         partition_by=bom_change_lines.c.change_id, order_by=bom_change_lines.c.position
@@ -115,13 +116,7 @@ def get_change(tx: Tx, parent: Item, change_id: int) -> tuple[Change, list[Chang
     found = _changes(tx, [bom_changes.c.parent_id == parent.id, bom_changes.c.id == change_id], 1)
     if not found:
         raise NotFoundError(f"the BOM of {parent.part_number} has no change {change_id}")
-    rows = tx.conn.execute(
-        select(bom_change_lines)
-        .where(bom_change_lines.c.change_id == change_id)
-        .order_by(bom_change_lines.c.position)
-    ).all()
-    children = by_ids(tx, {row.child_id for row in rows})
-    return found[0], [_changed_line(row, children) for row in rows]
+    return found[0], lines_of_changes(tx, [change_id]).get(change_id, [])
 
 
 def stories(
@@ -203,9 +198,9 @@ def get_own_change(tx: Tx, parent: Item, change_id: int) -> int:
 
 def compare(before: Sequence[PastLine], after: Sequence[PastLine]) -> list[Difference]:
     """Two states side by side, in the order of the later one, what is gone last; pure."""
-    old = {line.line_id: line for line in before}
-    new = {line.line_id: line for line in after}
-    rows = [_difference(line.child, _state_of(old.get(line.line_id)), line.state) for line in after]
+    old = {line.line_id: line.state for line in before}
+    new = {line.line_id for line in after}
+    rows = [_difference(line.child, old.get(line.line_id), line.state) for line in after]
     rows.extend(_difference(line.child, line.state, None) for line in before if line.line_id not in new)
     return rows
 
@@ -214,8 +209,7 @@ def restore(
     tx: Tx, part_number: str, change_id: int, reason: str | None, expected: int | None
 ) -> tuple[int, int]:
     """Make the BOM again what change ``change_id`` left; a new change. Returns (change id, version)."""
-    parent = get_item(tx, part_number, lock=True)
-    check_version(parent, expected)
+    parent = parent_to_change(tx, part_number, expected)
     target = {line.line_id: line for line in state_at(tx, parent, change_id)}
     changes = []
     current = {line.id: line for line in lines_of(tx, parent)}
@@ -229,9 +223,7 @@ def restore(
     changes.extend(LineChange(m.line_id, m.child.id, None, m.state, m.position) for m in missing)
     text = f"restored as of change {change_id}: {len(changes)} lines changed"
     note = ChangeNote(kind=ChangeKind.RESTORE, summary=text, reason=reason, refers_to=change_id)
-    done = apply_changes(tx, parent, changes, note)
-    events.bom_updated(tx, parent, ChangeKind.RESTORE, text)
-    return done
+    return apply_changes(tx, parent, changes, note)
 
 
 def undo(tx: Tx, part_number: str, change_id: int, expected: int | None) -> tuple[int, int]:
@@ -239,8 +231,7 @@ def undo(tx: Tx, part_number: str, change_id: int, expected: int | None) -> tupl
 
     Raises ConflictError, naming the lines, where one of them was changed again since.
     """
-    parent = get_item(tx, part_number, lock=True)
-    check_version(parent, expected)
+    parent = parent_to_change(tx, part_number, expected)
     change, lines = get_change(tx, parent, change_id)
     if change.kind == ChangeKind.FOLDED:
         raise ConflictError(f"change {change_id} cannot be undone: what was before it is no longer kept")
@@ -266,11 +257,9 @@ def undo(tx: Tx, part_number: str, change_id: int, expected: int | None) -> tupl
     changes = [LineChange(n.line_id, n.child.id, n.after, n.before, n.position) for n in lines]
     _reopen(tx, parent, change, current)
     text = f"undone: {change.summary}"
-    done = apply_changes(
+    return apply_changes(
         tx, parent, changes, ChangeNote(kind=ChangeKind.UNDO, summary=text, refers_to=change_id)
     )
-    events.bom_updated(tx, parent, ChangeKind.UNDO, text)
-    return done
 
 
 def _reopen(tx: Tx, parent: Item, change: Change, current: Mapping[str, Line]) -> None:
@@ -302,21 +291,8 @@ def _changes(
     )
     query = select(bom_changes, lines).where(*conditions)
     return [
-        Change(
-            id=row.id,
-            version=row.version,
-            kind=ChangeKind(row.kind),
-            at=row.at,
-            username=row.username,
-            summary=row.summary,
-            reason=row.reason,
-            document_file=row.document_file,
-            document_sha256=row.document_sha256,
-            document_revision=row.document_revision,
-            sync_id=row.sync_id,
-            refers_to=row.refers_to,
-            decisions=loads(row.decisions) if row.decisions else (),
-            line_count=row.line_count,
+        from_row(
+            Change, row, kind=ChangeKind(row.kind), decisions=loads(row.decisions) if row.decisions else ()
         )
         for row in newest_first(tx, query, bom_changes.c.id, limit, before, after)
     ]
@@ -332,13 +308,9 @@ def _difference(child: Item, before: LineState | None, after: LineState | None) 
         return Difference(child, "added", None, after, ())
     if after is None:
         return Difference(child, "removed", before, None, ())
-    names = [f.name for f in fields(LineState) if getattr(before, f.name) != getattr(after, f.name)]
+    names = [name for name in names_of(LineState) if getattr(before, name) != getattr(after, name)]
     return Difference(child, "changed" if names else "unchanged", before, after, names)
 
 
 def _state(text: str | None) -> LineState | None:
     return None if text is None else stored_state(text)
-
-
-def _state_of(line: PastLine | None) -> LineState | None:
-    return None if line is None else line.state

@@ -12,17 +12,17 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from sqlalchemy import delete, select, update
+from sqlalchemy import delete, insert, select, update
 
 from silo.bom.left_out import Reason, in_words, remembered
 from silo_server.clock import wire
-from silo_server.db.bulk import insert_rows, one_of
+from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import bom_last_syncs, bom_lines
 from silo_server.json_values import dumps
 from silo_server.services.bom.merge_json import MergeOrder
 from silo_server.services.bom.tree import Graph
-from silo_server.values import Item
+from silo_server.values import Item, from_row
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,15 +77,13 @@ def last_syncs(tx: Tx, parent_ids: Collection[int]) -> dict[int, LastSync]:
 
 
 def _read(row: Any) -> LastSync:
-    return LastSync(
-        row.at,
-        row.username,
-        row.document_file,
-        json.loads(row.left_out),
-        row.refused_at,
-        row.refusal or "",
-        {int(child): known for child, known in json.loads(row.components).items()},
-        row.folder or "",
+    return from_row(
+        LastSync,
+        row,
+        left_out=json.loads(row.left_out),
+        refusal=row.refusal or "",
+        components={int(child): known for child, known in json.loads(row.components).items()},
+        folder=row.folder or "",
     )
 
 
@@ -106,17 +104,13 @@ def remember(
     components = remembered(known, entries, [str(children[number]) for number in kept])
     tx.conn.execute(delete(bom_last_syncs).where(bom_last_syncs.c.parent_id == parent.id))
     row = {
-        "parent_id": parent.id,
         "at": tx.stamp,
-        "username": tx.actor.username,
         "document_file": order.document_file,
         "folder": order.document_folder or before.folder or None,
         "left_out": dumps([dict(one) for one in order.left_out]),
         "components": dumps(components),
-        "refused_at": None,
-        "refusal": None,
     }
-    insert_rows(tx, bom_last_syncs, [row])
+    _insert(tx, parent, row)
 
 
 def remember_refusal(tx: Tx, parent: Item, message: str) -> None:
@@ -126,17 +120,12 @@ def remember_refusal(tx: Tx, parent: Item, message: str) -> None:
         update(bom_last_syncs).where(bom_last_syncs.c.parent_id == parent.id).values(**written)
     )
     if not known.rowcount:
-        row = {
-            "parent_id": parent.id,
-            "at": None,
-            "username": tx.actor.username,
-            "document_file": None,
-            "folder": None,
-            "left_out": "[]",
-            "components": "{}",
-            **written,
-        }
-        insert_rows(tx, bom_last_syncs, [row])
+        _insert(tx, parent, {"left_out": "[]", "components": "{}", **written})
+
+
+def _insert(tx: Tx, parent: Item, row: Mapping[str, Any]) -> None:
+    who = {"parent_id": parent.id, "username": tx.actor.username}
+    tx.conn.execute(insert(bom_last_syncs).values(**who, **row))
 
 
 def in_sentences(gaps: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -12,30 +12,18 @@ from typing import Any
 from sqlalchemy import Integer, Select, func, select, type_coerce
 
 from silo.bom.errors import ConflictError, NotFoundError
-from silo_server.clock import wire
 from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import bom_lines, items
 from silo_server.errors import TooLargeError
 from silo_server.json_values import MAX_DEPTH, dumps, loads
-from silo_server.values import Item, Line, LineState, number
+from silo_server.values import Item, Line, LineState, names_of, number, to_wire
 
-STATE_COLUMNS = (
-    bom_lines.c.quantity,
-    bom_lines.c.source,
-    bom_lines.c.rel_type,
-    bom_lines.c.unit,
-    bom_lines.c.reference_designators,
-    bom_lines.c.find_number,
-    bom_lines.c.notes,
-    bom_lines.c.child_revision,
-    bom_lines.c.unreferenced_since,
-    # As the number that SQLite has: making a bool of it costs more than all the rest of the row.
-    type_coerce(bom_lines.c.override, Integer).label("override"),
-    bom_lines.c.cad_quantity,
-    bom_lines.c.reason,
-    bom_lines.c.metadata.label("line_metadata"),
-)
+# "override" as the number that SQLite has: making a bool of it costs more than all the rest of the row.
+STATE_COLUMNS = [
+    type_coerce(bom_lines.c.override, Integer) if name == "override" else bom_lines.c[name]
+    for name in names_of(LineState)
+]
 
 
 def select_lines() -> Select[*tuple[Any, ...]]:
@@ -64,35 +52,13 @@ def to_line(row: Any) -> Line:
 # Most lines of a BOM are in one of a few states (so many pieces, from the assembly, nothing noted); a frozen
 # value can be shared, and making one costs ten times as much as finding it.
 @lru_cache(maxsize=16384)
-def _state(
-    quantity: float,
-    source: str,
-    rel_type: str,
-    unit: str | None,
-    reference_designators: str,
-    find_number: str | None,
-    notes: str | None,
-    child_revision: int | None,
-    unreferenced_since: str | None,
-    override: bool,
-    cad_quantity: float | None,
-    reason: str | None,
-    metadata: str,
-) -> LineState:
-    return LineState(
-        quantity,
-        source,
-        rel_type,
-        unit,
-        tuple(loads(reference_designators)),
-        find_number,
-        notes,
-        child_revision,
-        unreferenced_since,
-        bool(override),
-        cad_quantity,
-        reason,
-        loads(metadata),
+def _state(*columns: Any) -> LineState:
+    state = LineState(*columns)  # the columns are in the order of the fields
+    return replace(
+        state,
+        reference_designators=tuple(loads(columns[4])),
+        override=bool(state.override),
+        metadata=loads(columns[12]),
     )
 
 
@@ -167,20 +133,12 @@ def component_of(lines: Iterable[Line], which: str | LineId, parent: Item) -> Li
 
 def state_to_json(state: LineState) -> dict[str, Any]:
     """A line's state as history stores it; only what is set."""
-    stored: dict[str, Any] = {"quantity": state.quantity, "source": state.source, "rel_type": state.rel_type}
-    for name in ("unit", "find_number", "notes", "child_revision", "unreferenced_since", "reason"):
-        value = getattr(state, name)
-        if value is not None:
-            stored[name] = value
-    if state.reference_designators:
-        stored["reference_designators"] = list(state.reference_designators)
-    if state.override:
-        stored["override"] = True
-    if state.cad_quantity is not None:
-        stored["cad_quantity"] = state.cad_quantity
-    if state.metadata:
-        stored["metadata"] = dict(state.metadata)
-    return stored
+    known = ((name, getattr(state, name)) for name in names_of(LineState))
+    return {
+        name: value
+        for name, value in known
+        if value is not None and value is not False and value != () and value != {}
+    }
 
 
 def mark_of(state: LineState, cad_quantity: float | None = None) -> str:
@@ -203,19 +161,9 @@ def stored_state(text: str) -> LineState:
 
 def state_columns(state: LineState) -> dict[str, Any]:
     """A line's state as columns of the table."""
-    return {
+    return {name: getattr(state, name) for name in names_of(LineState)} | {
         "quantity": float(state.quantity),
-        "source": state.source,
-        "rel_type": state.rel_type,
-        "unit": state.unit,
         "reference_designators": dumps(list(state.reference_designators)),
-        "find_number": state.find_number,
-        "notes": state.notes,
-        "child_revision": state.child_revision,
-        "unreferenced_since": state.unreferenced_since,
-        "override": state.override,
-        "cad_quantity": state.cad_quantity,
-        "reason": state.reason,
         "metadata": dumps(dict(state.metadata)),
     }
 
@@ -245,21 +193,7 @@ def child_to_wire(line: Line) -> dict[str, Any]:
 
 def line_state_to_wire(state: LineState) -> dict[str, Any]:
     """What a line says of itself."""
-    return {
-        "rel_type": state.rel_type,
-        "quantity": number(state.quantity),
-        "unit": state.unit,
-        "reference_designators": list(state.reference_designators),
-        "find_number": state.find_number,
-        "notes": state.notes,
-        "child_revision": state.child_revision,
-        "source": state.source,
-        "unreferenced_since": wire(state.unreferenced_since),
-        "override": state.override,
-        "cad_quantity": number(state.cad_quantity),
-        "reason": state.reason,
-        "metadata": dict(state.metadata),
-    }
+    return to_wire(state) | {"quantity": number(state.quantity), "cad_quantity": number(state.cad_quantity)}
 
 
 def revisions_to_wire(line: Line) -> dict[str, Any]:

@@ -1,25 +1,38 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""What a merge left for a person to decide, and the decisions: remove, keep, take CAD's, keep Silo's."""
+"""What a merge left for a person to decide, in one BOM and in all, and the decisions about it.
+
+Every page shows how many BOMs wait, so finding them reads nothing but what waits (``db.tables.UNREFERENCED``,
+``INCOMPLETE``).
+"""
 
 from __future__ import annotations
 
+import hashlib
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
-from sqlalchemy import select, update
+from sqlalchemy import func, select, text, update
 
 from silo.bom.diff import same_quantity
-from silo.bom.errors import ConflictError, NotFoundError, RejectedError
+from silo.bom.errors import ConflictError, NotFoundError, RejectedError, VersionConflictError
+from silo.bom.left_out import Reason
 from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
-from silo_server.db.tables import bom_conflicts
+from silo_server.db.tables import INCOMPLETE, UNREFERENCED, bom_conflicts, bom_last_syncs, bom_lines, items
 from silo_server.errors import LinesChangedError
-from silo_server.services import events
-from silo_server.services.bom.changes import ChangeKind, ChangeNote, LineChange, apply_changes, check_version
+from silo_server.services.bom.changes import (
+    ChangeKind,
+    ChangeNote,
+    LineChange,
+    apply_changes,
+    parent_to_change,
+)
 from silo_server.services.bom.history import Change, last_merge
+from silo_server.services.bom.last_sync import NEVER, LastSync, last_syncs
 from silo_server.services.bom.lines import LineId, component_of, lines_of, mark_of
-from silo_server.services.items import get_item
+from silo_server.services.items import by_ids, get_item
 from silo_server.values import Item, Line, LineState
 
 
@@ -118,8 +131,7 @@ def resolve(
     Raises LinesChangedError where lines are not as they were seen, RejectedError with everything that does
     not fit; then nothing was changed.
     """
-    parent = get_item(tx, part_number, lock=True)
-    check_version(parent, expected)
+    parent = parent_to_change(tx, part_number, expected)
     lines = lines_of(tx, parent)
     conflicts = {c.line.id: c for c in open_conflicts(tx, parent, lines)}
     changes: list[LineChange] = []
@@ -225,6 +237,120 @@ def _write(
             for d in decisions
         ],
     )
-    done = apply_changes(tx, parent, changes, note)
-    events.bom_updated(tx, parent, ChangeKind.RESOLVE, note.summary)
-    return done
+    return apply_changes(tx, parent, changes, note)
+
+
+@dataclass(frozen=True, slots=True)
+class Waiting:
+    """A BOM that waits, and for what. ``left_out`` counts what was left out, but the unregistered.
+
+    mark
+        of what a decision is about: the BOM's version, and what CAD says of its conflicts.
+    """
+
+    item: Item
+    mark: str
+    last: LastSync
+    unreferenced: int
+    conflicts: int
+    left_out: int
+    unregistered: int
+
+    @property
+    def total(self) -> int:
+        """All that waits."""
+        return self.unreferenced + self.conflicts + self.left_out + self.unregistered
+
+
+def waiting(tx: Tx) -> list[Waiting]:
+    """All BOMs that wait, by part number; archived assemblies wait for nobody."""
+    unreferenced, conflicts, gaps = _unreferenced(tx), _conflicts(tx), _incomplete(tx)
+    found = by_ids(tx, {*unreferenced, *conflicts, *gaps})
+    syncs = last_syncs(tx, found)
+    rows = []
+    for item_id, item in found.items():
+        if item.archived_at:
+            continue
+        last = syncs.get(item_id, NEVER)
+        missing = sum(gap["reason"] == Reason.UNREGISTERED for gap in last.gaps)
+        rows.append(
+            Waiting(
+                item,
+                _mark(item, conflicts.get(item_id, {})),
+                last,
+                unreferenced.get(item_id, 0),
+                len(conflicts.get(item_id, ())),
+                len(last.gaps) - missing,
+                missing,
+            )
+        )
+    return sorted(rows, key=lambda row: row.item.part_number.casefold())
+
+
+def waiting_count(tx: Tx) -> int:
+    """How many BOMs wait."""
+    ids = {*_unreferenced(tx), *_conflicts(tx), *_incomplete(tx)}
+    if not ids:
+        return 0
+    alive = (
+        select(func.count())
+        .select_from(items)
+        .where(one_of(tx, items.c.id, ids), items.c.archived_at.is_(None))
+    )
+    return tx.conn.scalar(alive) or 0
+
+
+def _mark(item: Item, conflicts: Mapping[int, float]) -> str:
+    # A sync that only brings other conflicts changes no line, and so not the version.
+    told = hashlib.sha256(repr(sorted(conflicts.items())).encode()).hexdigest()[:16]
+    return f"{item.bom_version}-{told}"
+
+
+def decide_all(tx: Tx, part_number: str, action: Action, reason: str | None, seen: str) -> int:
+    """Decide the same about all unreferenced lines (``remove``, ``keep``) or all conflicts of a BOM.
+
+    seen
+        the mark of what the person saw.
+    Returns how many lines there were. VersionConflictError where the BOM is not the one that was seen.
+    """
+    open_lines = review(tx, get_item(tx, part_number, lock=True).part_number)
+    about_conflicts = action in (Action.TAKE_CAD, Action.KEEP_SILO)
+    lines = [one.line for one in open_lines.conflicts] if about_conflicts else open_lines.unreferenced
+    decisions = [Decision(line.child_part_number, action, reason, line.id) for line in lines]
+    if decisions:
+        conflicts = {one.line.child_id: one.cad_quantity for one in open_lines.conflicts}
+        if seen != _mark(open_lines.parent, conflicts):
+            raise VersionConflictError(f"the BOM of {part_number} is not as it was seen")
+        resolve(tx, part_number, decisions)
+    return len(decisions)
+
+
+def _unreferenced(tx: Tx) -> Counter[int]:
+    query = select(bom_lines.c.parent_id, func.count()).where(text(f"bom_lines.{UNREFERENCED}"))
+    return Counter({row[0]: row[1] for row in tx.conn.execute(query.group_by(bom_lines.c.parent_id))})
+
+
+def _conflicts(tx: Tx) -> dict[int, dict[int, float]]:
+    """Parent → child → what CAD says, by the rule of ``review.open_conflicts``, for all BOMs."""
+    same = (bom_lines.c.parent_id == bom_conflicts.c.parent_id) & (
+        bom_lines.c.child_id == bom_conflicts.c.child_id
+    )
+    query = (
+        select(
+            bom_conflicts.c.parent_id,
+            bom_conflicts.c.child_id,
+            bom_conflicts.c.cad_quantity,
+            bom_lines.c.quantity,
+        )
+        .join(bom_lines, same)
+        .where(~bom_conflicts.c.accepted, bom_lines.c.source == "manual", bom_lines.c.rel_type == "component")
+    )
+    found: dict[int, dict[int, float]] = {}
+    for row in tx.conn.execute(query):
+        if not same_quantity(row.quantity, row.cad_quantity):
+            found.setdefault(row.parent_id, {})[row.child_id] = row.cad_quantity
+    return found
+
+
+def _incomplete(tx: Tx) -> Sequence[int]:
+    return tx.conn.scalars(select(bom_last_syncs.c.parent_id).where(text(f"({INCOMPLETE})"))).all()

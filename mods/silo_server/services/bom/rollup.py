@@ -20,7 +20,7 @@ from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import items
 from silo_server.json_values import loads
-from silo_server.services.bom.tree import Exact, Graph, added, flatten, multiplied, order_of
+from silo_server.services.bom.tree import Exact, Graph, added, flatten, order_of
 from silo_server.values import Line
 
 DEFAULT_CURRENCY = "EUR"
@@ -162,22 +162,20 @@ def roll_up_cost(graph: Graph, parts: Mapping[int, Part]) -> CostRollup:
 
 def roll_up_mass(graph: Graph, parts: Mapping[int, Part]) -> MassRollup:
     """Masses from the leaves up; a sub-assembly's own mass where its parts do not have all of theirs."""
-    order = order_of(graph)
-    stands_for_itself = _stated_assemblies(graph, order, parts)
-    factors: dict[int, Exact] = {graph.root.id: 1}
+    known = worths(graph, parts)
+
+    def stands_for_itself(item_id: int) -> bool:
+        below = graph.components(item_id)
+        whole = all(known[line.child_id].mass_whole for line in below)
+        stated = positive_number(parts[item_id].properties, "mass_kg") is not None
+        return bool(below) and not whole and stated and item_id != graph.root.id
+
+    assemblies = {item_id for item_id in order_of(graph) if stands_for_itself(item_id)}
     amounts: dict[int, Exact] = {}
-    lines: dict[int, Line] = {}
-    for item_id in order:
-        if item_id not in factors or item_id in stands_for_itself:
-            continue
-        for line in graph.components(item_id):
-            amount = multiplied(factors[item_id], line)
-            if graph.components(line.child_id) and line.child_id not in stands_for_itself:
-                factors[line.child_id] = added(factors.get(line.child_id, 0), amount, line)
-            else:
-                amounts[line.child_id] = added(amounts.get(line.child_id, 0), amount, line)
-                lines.setdefault(line.child_id, line)
-    rows = [_mass_row(parts[i], amounts[i], i in stands_for_itself) for i in lines]
+    for row in flatten(graph, assemblies):
+        item_id = row.line.child_id
+        amounts[item_id] = added(amounts.get(item_id, 0), row.total, row.line)
+    rows = [_mass_row(parts[one], amount, one in assemblies) for one, amount in amounts.items()]
     return MassRollup(
         rows,
         float(exact_sum(row.total for row in rows if row.total is not None)),
@@ -194,24 +192,6 @@ def positive_number(properties: Mapping[str, Any], name: str) -> float | None:
     if isinstance(value, bool) or not isinstance(value, int | float | Decimal):
         return None
     return float(value) if 0 <= value < 1e15 else None
-
-
-def _stated_assemblies(graph: Graph, order: Sequence[int], parts: Mapping[int, Part]) -> set[int]:
-    def has_mass(item: Part) -> bool:
-        return positive_number(item.properties, "mass_kg") is not None
-
-    # Children before parents: an assembly is complete when everything it contains is.
-    complete: dict[int, bool] = {}
-    stated: set[int] = set()
-    for item_id in reversed(order):
-        below = graph.components(item_id)
-        whole = all(complete.get(line.child_id, has_mass(parts[line.child_id])) for line in below)
-        if below and not whole and item_id != graph.root.id and has_mass(parts[item_id]):
-            stated.add(item_id)
-            whole = True
-        if below:
-            complete[item_id] = whole
-    return stated
 
 
 def _mass_row(item: Part, amount: Exact, is_assembly: bool) -> MassRow:

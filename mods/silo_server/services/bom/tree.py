@@ -7,7 +7,7 @@ multiplied is multiplied here. Only ``component`` lines are followed.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from typing import NamedTuple
@@ -140,15 +140,21 @@ def expand(graph: Graph, depth: int, limit: int) -> list[Occurrence]:
     return rows
 
 
-def flatten(graph: Graph) -> list[FlatRow]:
-    """The leaf parts with their total quantities, in the order the tree shows them first."""
+def flatten(graph: Graph, closed: Collection[int] = ()) -> list[FlatRow]:
+    """The leaf parts with their total quantities, in the order the tree shows them first.
+
+    closed
+        assemblies (internal ids) that count as parts.
+    """
     factors: dict[int, Exact] = {graph.root.id: 1}
     totals: dict[tuple[int, str | None], Exact] = {}
     shown: dict[tuple[int, str | None], Line] = {}
     for item_id in order_of(graph):
+        if item_id not in factors:
+            continue  # below a closed one only
         for line in graph.components(item_id):
             amount = multiplied(factors[item_id], line)
-            if graph.components(line.child_id):
+            if line.child_id not in closed and graph.components(line.child_id):
                 factors[line.child_id] = added(factors.get(line.child_id, 0), amount, line)
             else:
                 key = (line.child_id, line.state.unit)

@@ -1,41 +1,41 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""For admins: users, everybody's tokens, the server's mode, and the audit list."""
+"""One's own password and API tokens; for admins users, everybody's tokens, the mode, and the audit list."""
 
 from __future__ import annotations
 
+import secrets
 from collections.abc import Mapping
 from functools import partial
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Request
+from fastapi import APIRouter, Path, Request
 from starlette.responses import Response
 
 from silo.bom.errors import ConflictError, RejectedError, SiloError
 from silo_server.db.engine import mode_of
-from silo_server.db.state import put_state
+from silo_server.errors import TooManyAttemptsError
 from silo_server.operation.housekeeping import last_run
-from silo_server.routes.context import Server, ServerDep
+from silo_server.routes.context import SESSION_COOKIE, PageFrom, Server, ServerDep
 from silo_server.services import events
 from silo_server.services.access import accounts, audit, credentials, logins
-from silo_server.values import Actor, Role
-from silo_server.web.account_page import password_of
+from silo_server.values import Actor, Role, Scope
 from silo_server.web.forms import (
     Form,
     back,
     back_with_secret,
     compared,
+    password_of,
     secret_of,
     take_away_secret,
     text,
 )
-from silo_server.web.guard import Administrator
+from silo_server.web.login_page import Administrator, Reader
 from silo_server.web.render import page
 from silo_server.web.tables import part_of
 
 router = APIRouter(include_in_schema=False)
 
 AUDIT_SIZE = 100
-Point = Annotated[int | None, Query(ge=0, le=2**62)]
 MODES = ("normal", "read-only")
 
 
@@ -112,9 +112,7 @@ def set_mode(server: ServerDep, caller: Administrator, form: Form) -> Response:
     if mode not in MODES:
         raise RejectedError("mode: wanted normal or read-only; load the page again")
     with server.db.write(caller, even_when_read_only=True) as tx:
-        audit.note(tx, "mode.set", mode, f"{mode_of(tx)} → {mode}")
-        put_state(tx, "mode", mode)
-        events.server_state(tx, mode_of(tx))
+        events.set_mode(tx, mode)
     return back(
         "/users", "The server takes changes." if mode == "normal" else "The server takes no changes now."
     )
@@ -125,8 +123,8 @@ def audit_page(
     request: Request,
     server: ServerDep,
     caller: Administrator,
-    before: Point = None,
-    after: Point = None,
+    before: PageFrom = None,
+    after: PageFrom = None,
 ) -> Response:
     """Who did what, newest first."""
     with server.db.read(caller) as tx:
@@ -174,3 +172,95 @@ def _role(name: str) -> Role:
         return Role(name)
     except ValueError:
         raise RejectedError(f"role: wanted one of {', '.join(Role)}, got {name!r}") from None
+
+
+LIFETIMES = {"30": 30, "90": 90, "365": 365, "": None}
+TokenId = Annotated[int, Path(ge=1, le=2**62)]
+
+
+@router.get("/account")
+def account_page(request: Request, server: ServerDep, caller: Reader) -> Response:
+    """The own tokens, never their secrets, and a form for the password."""
+    fresh = secret_of(request)
+    response = _own_page(request, server, caller, fresh=fresh)
+    return take_away_secret(request, response, "/account") if fresh else response
+
+
+@router.post("/account/tokens")
+def create_token(request: Request, server: ServerDep, caller: Reader, form: Form) -> Response:
+    """Make a token. Its secret is shown once, on the page that this leads to."""
+    name, ends, wanted = text(form, "name"), text(form, "days"), text(form, "scope") or Scope.WRITE
+    if not 0 < len(name) <= 200:
+        return _own_page(request, server, caller, problem="A token needs a name of at most 200 characters.")
+    if ends not in LIFETIMES:
+        return _own_page(request, server, caller, problem="Choose one of the lifetimes.")
+    try:
+        scope = Scope(wanted)
+    except ValueError:
+        return _own_page(request, server, caller, problem="Choose one of the scopes.")
+    days, secret = LIFETIMES[ends], None
+    if key := text(form, "key"):
+        secret = credentials.secret_of_form(caller, key, name, ends, wanted)
+    try:
+        with server.db.write(caller, even_when_read_only=True) as tx:
+            _, secret = credentials.create_own_token(
+                tx, name, days=days, forever=days is None, scope=scope, secret=secret
+            )
+    except ConflictError as error:
+        return _own_page(request, server, caller, problem=str(error))
+    return back_with_secret(request, "/account", name, secret)
+
+
+@router.post("/account/tokens/{token_id}/revoke")
+def revoke_token(server: ServerDep, caller: Reader, token_id: TokenId, form: Form) -> Response:
+    """Revoke a token: one's own, or anybody's for an admin."""
+    credentials.check_may_change(caller)
+    owner = None if caller.role is Role.ADMIN else caller.own_id
+    with server.db.write(caller, even_when_read_only=True) as tx:
+        credentials.revoke_token(tx, token_id, owner)
+    return back("/users" if text(form, "from") == "users" else "/account", "The token is revoked.")
+
+
+@router.post("/account/password")
+def set_password(request: Request, server: ServerDep, caller: Reader, form: Form) -> Response:
+    """Set the own password; ends all own sessions. Asks for the old one, but after a login link."""
+    password, again = password_of(form, "password"), password_of(form, "again")
+    try:
+        if password != again:
+            raise RejectedError("The two passwords differ.")
+        logins.set_own_password(server.db, caller, password, password_of(form, "current"))
+    except (RejectedError, TooManyAttemptsError) as error:
+        return _own_page(request, server, caller, problem=str(error))
+    response = back("/login", "The password is set. Log in with it.")
+    response.delete_cookie(SESSION_COOKIE)
+    return response
+
+
+def _own_page(
+    request: Request,
+    server: Server,
+    caller: Actor,
+    *,
+    problem: str = "",
+    fresh: tuple[str, str] | None = None,
+) -> Response:
+    with server.db.read(caller) as tx:
+        tokens = credentials.list_tokens(tx, caller.own_id)
+        now = tx.stamp
+        user = accounts.get_user(tx, caller.username)
+    return page(
+        request,
+        "account.html",
+        caller,
+        status=400 if problem else 200,
+        tokens=tokens,
+        now=now,
+        user=user,
+        lifetimes=[days for days in LIFETIMES.values() if days],
+        key=secrets.token_hex(16),
+        scopes=[scope for scope in Scope if caller.role.covers(scope.role)],
+        asks_password=not caller.by_link,
+        problem=problem[:1].upper() + problem[1:],
+        fresh=fresh,
+        shortest=accounts.MIN_PASSWORD,
+    )
