@@ -10,7 +10,7 @@ from uuid import uuid4
 import pytest
 
 from silo.api.client import SiloClient
-from silo.api.schemas import categories_of
+from silo.api.items import categories_of
 from silo.api.wire import MergeEntry, MergeRequest
 from silo.bom.errors import InputError, NotFoundError, RejectedError, RouteMissingError, UnreachableError
 

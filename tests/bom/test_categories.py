@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from silo.api.schemas import categories_of, rules_of
+from silo.api.items import categories_of, rules_of
 from silo.bom.categories import Categories, Rule, assembly_categories, proposed_category
 from silo.bom.errors import ConfigError, InputError
 from silo.bom.model import BomEntry

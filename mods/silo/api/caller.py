@@ -1,21 +1,103 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""What the calls of a client share: how a question becomes a request."""
+"""What the calls of a client share: how a question becomes a request, and what was learned of the server."""
 
 from __future__ import annotations
 
+import json
+import logging
 import re
+import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import BaseModel
 
-from silo.api.abilities import Abilities
 from silo.api.address import ServerAddress
-from silo.api.multipart import as_json
+from silo.api.files import as_json
 from silo.api.replies import Reply
 from silo.api.transport import Call, Cancel, Transport, stop_if
 from silo.bom.errors import BusyError, ForbiddenError, NotFoundError, ReadOnlyError, RejectedError
+from silo.durable import replacing
+from silo.folders import cache_folder
+
+log = logging.getLogger("silo.api")
+
+KEPT_S = 24 * 3600.0
+
+
+@dataclass
+class Abilities:
+    """What a server can do, kept for a day, so that each run need not try it again; None: nobody tried yet.
+
+    Rights and modes are not kept, they change.
+
+    batch
+        many identities in one question.
+    boms
+        the BOMs of many items in one question.
+    strict
+        it refuses keys that it does not know.
+    keeps_item_ids
+        a new item gets the UUID that the client proposes.
+    schemas
+        the part-number schema that is taken for a wanted one.
+    """
+
+    batch: bool | None = None
+    boms: bool | None = None
+    strict: bool = False
+    keeps_item_ids: bool = False
+    schemas: dict[str, str] = field(default_factory=dict)
+
+
+def abilities_path() -> Path:
+    """The user's file of what was learned about servers."""
+    return cache_folder() / "servers.json"
+
+
+def load_abilities(path: Path, server: str, *, clock: Callable[[], float] = time.time) -> Abilities:
+    """What is known of a server; nothing where that is older than a day."""
+    known = _read_memory(path).get(server)
+    if not isinstance(known, dict) or not 0 <= clock() - _seconds(known.get("learned_at")) < KEPT_S:
+        return Abilities()
+    values = {f.name: known[f.name] for f in fields(Abilities) if f.name in known}
+    maybe = (bool, type(None))
+    wanted = {"batch": maybe, "boms": maybe, "strict": bool, "keeps_item_ids": bool, "schemas": dict}
+    if not all(isinstance(value, wanted[name]) for name, value in values.items()):  # type: ignore[arg-type]
+        return Abilities()
+    return Abilities(**values)
+
+
+def save_abilities(
+    path: Path, server: str, known: Abilities, *, clock: Callable[[], float] = time.time
+) -> None:
+    """Remember; what cannot be written is not remembered. One small JSON file for all servers.
+
+    It is only a memory: a file that is lost, old or damaged costs some requests, never an answer.
+    """
+    content = {**_read_memory(path), server: {**asdict(known), "learned_at": clock()}}
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with replacing(path) as file:
+            file.write(json.dumps(content, indent=1).encode())
+    except OSError as error:
+        log.info("%s: what was learned about %s is not kept (%s)", path, server, error)
+
+
+def _read_memory(path: Path) -> dict[str, Any]:
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return data if isinstance(data, dict) else {}
+
+
+def _seconds(value: Any) -> float:
+    return float(value) if isinstance(value, (int, float)) else 0.0
+
 
 T = TypeVar("T")
 

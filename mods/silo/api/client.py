@@ -18,15 +18,14 @@ from typing import TYPE_CHECKING, Any, Self
 import requests
 
 from silo.api import files
-from silo.api.abilities import Abilities, load, save
 from silo.api.address import ServerAddress
 from silo.api.boms import BomCalls
-from silo.api.caller import LISTS
+from silo.api.caller import LISTS, Abilities, load_abilities, save_abilities
+from silo.api.events import SILENCE, HttpEventStream, open_stream
+from silo.api.files import Progress
 from silo.api.items import ItemCalls
-from silo.api.multipart import Progress
 from silo.api.policy import Retries
 from silo.api.sse import ServerEvent
-from silo.api.stream import SILENCE, HttpEventStream, open_stream
 from silo.api.transport import Call, Cancel, Timeouts, Transport, stop_if
 from silo.api.wire import Origin, Revision, ServerState, User
 from silo.bom.errors import NotFoundError, RejectedError, RouteMissingError, ServerFaultError, SiloError
@@ -54,7 +53,7 @@ class SiloClient(ItemCalls, BomCalls):
     silence
         seconds after which an event stream without a byte counts as dead.
     memory
-        a file in which what was learned about the server is kept for a day (:mod:`silo.api.abilities`).
+        a file in which what was learned about the server is kept for a day (:mod:`silo.api.caller`).
 
     May be shared between threads. Close it, or use it as a context manager.
     """
@@ -78,7 +77,7 @@ class SiloClient(ItemCalls, BomCalls):
         self._silence = silence
         self._memory = memory
         self._asked_for_item_ids = False
-        self.abilities = load(memory, self.base_url) if memory is not None else Abilities()
+        self.abilities = load_abilities(memory, self.base_url) if memory is not None else Abilities()
         self._known_before = replace(self.abilities, schemas=dict(self.abilities.schemas))
         self._transport = Transport(
             self._address,
@@ -104,7 +103,7 @@ class SiloClient(ItemCalls, BomCalls):
     def close(self) -> None:
         """Give the connections back, and keep what was learned about the server."""
         if self._memory is not None and self.abilities != self._known_before:
-            save(self._memory, self.base_url, self.abilities)
+            save_abilities(self._memory, self.base_url, self.abilities)
         self._transport.close()
 
     @property

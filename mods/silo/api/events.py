@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""A live connection to the server's events that looks after itself.
+"""The server's events: one open stream, and a live connection that looks after itself.
 
 ``EventListener`` keeps one stream open from a thread of its own: it begins again after every loss, with
 growing pauses and a little chance (many clients must not return in one moment), resumes where it stopped
@@ -10,36 +10,111 @@ from __future__ import annotations
 
 import logging
 import random
+import socket
 import threading
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, closing, nullcontext
+from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
+import requests
+
+from silo.api.failures import Where, translated
 from silo.api.policy import Backoff, told_wait
 from silo.api.protocol import EventStream
-from silo.api.replies import WebPageError
-from silo.api.sse import HEARTBEAT, MERGE, RESET, STATE, ServerEvent, SseParser, parse
-from silo.api.wire import MergeEvent, ServerState
-from silo.bom.errors import AuthError, RejectedError, RouteMissingError, SiloError
-
-__all__ = [
-    "HEARTBEAT",
-    "MERGE",
-    "RESET",
-    "STATE",
-    "Backoff",
-    "Connection",
-    "ConnectionState",
-    "EventListener",
-    "MergeEvent",
-    "ServerEvent",
-    "SseParser",
-    "parse",
-]
+from silo.api.replies import WebPageError, error_of
+from silo.api.sse import HEARTBEAT, RESET, STATE, ServerEvent, SseParser
+from silo.api.transport import MAX_ERROR, Call, Transport, read_some
+from silo.api.wire import ServerState
+from silo.bom.errors import AuthError, RejectedError, RouteMissingError, ServerFaultError, SiloError
 
 log = logging.getLogger("silo.api")
+
+
+SILENCE = 90.0
+"""Seconds without a byte after which a stream counts as dead: three heartbeats of the server."""
+
+
+def open_stream(transport: Transport, last_event_id: str | None, silence: float) -> HttpEventStream:
+    """Ask for the events after ``last_event_id``; raises as every request does."""
+    headers = {"Accept": "text/event-stream", "Cache-Control": "no-cache", "Accept-Encoding": "identity"}
+    if last_event_id:
+        headers["Last-Event-ID"] = last_event_id
+    call = Call("GET", transport.address.api("events"), "its events", headers=headers, endless=True)
+    response = transport.open(call, read_timeout=silence)
+    where = Where(transport.address.host, "its events", transport.timeouts.connect, silence)
+    kind = response.headers.get("Content-Type", "")
+    if response.status_code != 200 or "text/event-stream" not in kind.lower():
+        with closing(response):
+            reply = transport.reply(response, replace(call, max_bytes=MAX_ERROR, endless=False))
+        if not reply.ok:
+            raise error_of(reply)
+        raise ServerFaultError(f"{where.asked} answered no event stream; check that it is a Silo server")
+    return HttpEventStream(response, where)
+
+
+class HttpEventStream:
+    """The events of one connection, until the server ends it, it dies, or :meth:`close` is called.
+
+    Iterating raises :class:`silo.bom.errors.UnreachableError` when the stream is silent for too long.
+    """
+
+    def __init__(self, response: requests.Response, where: Where) -> None:
+        self._response, self._where = response, where
+        self._lock = threading.Lock()
+        self._closed = self._reading = False
+        self._parser = SseParser()
+
+    @property
+    def last_event_id(self) -> str | None:
+        """The id to resume from: of the last event, or of a bare mark that the server set."""
+        return self._parser.last_event_id
+
+    def __iter__(self) -> Iterator[ServerEvent]:
+        with self._lock:
+            if self._closed:
+                return
+            self._reading = True
+        try:
+            yield from self._events()
+        except SiloError:
+            # After close() the connection is expected to break.
+            if not self._closed:
+                raise
+        finally:
+            self._closed = True
+            self._response.close()
+
+    def _events(self) -> Iterator[ServerEvent]:
+        while not self._closed:
+            with translated(self._where):
+                chunk = read_some(self._response)
+            if not chunk:
+                return
+            yield from self._parser.feed(chunk)
+
+    def close(self) -> None:
+        """End the stream, from any thread; a reader that waits for bytes wakes up."""
+        with self._lock:
+            self._closed = True
+            reading = self._reading
+        if not reading:
+            self._response.close()
+            return
+        # Closing the response here would wait for the reader; shutting the socket down wakes it.
+        try:
+            _shut_down(self._response)
+        except (AttributeError, ValueError, RuntimeError, OSError):
+            return  # It ended by itself meanwhile.
+
+
+def _shut_down(response: requests.Response) -> None:
+    raw: Any = response.raw
+    if hasattr(raw, "shutdown"):  # urllib3 2.3
+        raw.shutdown()
+    else:
+        raw._fp.fp.raw._sock.shutdown(socket.SHUT_RDWR)
 
 
 class Connection(StrEnum):

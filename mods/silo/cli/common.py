@@ -147,14 +147,14 @@ def client_of(
     busy_tries, longest
         for jobs that may wait: how often a server that puts us off is asked, and the longest pause (seconds).
     """
-    from silo.api.abilities import default_path
+    from silo.api.caller import abilities_path
     from silo.api.client import SiloClient
     from silo.api.config import resolve_server
     from silo.api.policy import Retries
 
     where = resolve_server(getattr(args, "server", None), getattr(args, "token", None))
     retries = Retries(busy_tries=busy_tries, longest=longest)
-    memory = default_path()
+    memory = abilities_path()
     with SiloClient(where.url, where.token, verify=where.verify, memory=memory, retries=retries) as client:
         yield client
 

@@ -127,7 +127,7 @@ def _listed(texts: Iterable[str]) -> str:
 
 
 def _server(args: argparse.Namespace) -> Rows:
-    from silo.api.abilities import Abilities
+    from silo.api.caller import Abilities
     from silo.api.config import resolve_server
 
     try:

@@ -17,11 +17,19 @@ from typing import Any, Protocol
 
 from pydantic import ValidationError
 
-from silo.api import arrived
 from silo.api.address import canonical
 from silo.api.policy import Backoff, Scope, Then, judge
 from silo.api.protocol import FilesApi
-from silo.api.revisions import Standing, is_newest, newest_number, other_name, standing
+from silo.api.revisions import (
+    MayHaveArrivedError,
+    SentFile,
+    Standing,
+    find_arrived,
+    is_newest,
+    newest_number,
+    other_name,
+    standing,
+)
 from silo.api.transport import Cancel, stop_if
 from silo.api.wire import (
     LinkedFile,
@@ -260,7 +268,7 @@ class _Run:
                 entry = replace(entry, file_left=False)
             except SiloError as error:
                 _refuse(error, refused)
-                if isinstance(error, arrived.MayHaveArrivedError):
+                if isinstance(error, MayHaveArrivedError):
                     # A person who presses Retry has looked at these revisions.
                     self.store.update(entry.id, base_revision=error.newest)
                 if isinstance(error, NewerRevisionError):
@@ -310,10 +318,10 @@ class _Run:
             self.store.update(entry.id, base_revision=newest_number(known))
         else:
             known = self._revisions(sent.part_number, after=entry.base_revision)
-            mine = arrived.find_arrived(
+            mine = find_arrived(
                 self.client,
                 sent.part_number,
-                arrived.Sent(entry.file_name, entry.sha256, entry.size, entry.base_revision),
+                SentFile(entry.file_name, entry.sha256, entry.size, entry.base_revision),
                 known,
                 cancelled=self.cancelled,
             )

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any, Self
 from uuid import UUID, uuid4
 
 from silo.api.bodies import ItemBody, ItemChanges, LineBody, body
+from silo.api.files import Progress
 from silo.api.merging import result_of
-from silo.api.multipart import Progress
 from silo.api.sse import MERGE, STATE
 from silo.api.transport import Cancel, stop_if
 from silo.api.wire import (

@@ -26,7 +26,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, Protocol
 
-from silo.api.arrived import checksum_of
+from silo.api.revisions import checksum_of
 from silo.api.transport import Cancel, stop_if
 from silo.api.wire import BomLine, Item, Revision
 from silo.bom.errors import DocumentError, InputError, NotFoundError, RouteMissingError

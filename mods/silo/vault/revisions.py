@@ -15,8 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
-from silo.api.arrived import Downloads, checksum_of
-from silo.api.revisions import Standing, has_file
+from silo.api.revisions import Downloads, Standing, checksum_of, has_file
 from silo.api.transport import Cancel
 from silo.api.wire import Revision
 from silo.bom.changes import Assembly, LineChange, ThreeLines, compare_assemblies, compare_three

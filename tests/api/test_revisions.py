@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from silo.api.arrived import MayHaveArrivedError, Sent, find_arrived
+from silo.api.revisions import MayHaveArrivedError, SentFile, find_arrived
 from silo.api.wire import Revision
 from silo.bom.errors import NotFoundError, UnreachableError
 from silo.outbox.entry import Commit, State
@@ -18,7 +18,7 @@ from silo.outbox.store import Store
 from silo.testing import FakeSilo
 
 OURS = b"our file"
-SENT = Sent("a.FCStd", hashlib.sha256(OURS).hexdigest(), len(OURS), base=1)
+SENT = SentFile("a.FCStd", hashlib.sha256(OURS).hexdigest(), len(OURS), base=1)
 
 
 class Files:
@@ -83,7 +83,7 @@ def test_a_revision_without_a_file_is_none_of_ours() -> None:
 )
 def test_where_nothing_tells_a_person_looks(name: str, revision: Revision, content: dict[str, bytes]) -> None:
     """The file cannot be read, or the server packs it anew."""
-    sent = Sent(name, SENT.sha256, SENT.size, 1)
+    sent = SentFile(name, SENT.sha256, SENT.size, 1)
     with pytest.raises(MayHaveArrivedError, match="revision 2") as caught:
         find_arrived(Files(**content), "A", sent, [revision])
     assert caught.value.newest == 2

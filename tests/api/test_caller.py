@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from real_silo import TOKEN, Moods, real_silo
 
-from silo.api.abilities import KEPT_S, Abilities, load, save
+from silo.api.caller import KEPT_S, Abilities, load_abilities, save_abilities
 from silo.api.client import SiloClient
 from silo.cli.main import main
 
@@ -19,12 +19,12 @@ def test_it_is_kept_per_server_for_a_day(tmp_path: Path) -> None:
     """Not longer, not for another server, and not in the future of a clock that was set back."""
     path = tmp_path / "cache" / "servers.json"
     known = Abilities(batch=False, strict=True, keeps_item_ids=True, schemas={"kindred-rd": "acme"})
-    save(path, "http://a", known, clock=lambda: 1000.0)
-    save(path, "http://b", Abilities(batch=True), clock=lambda: 1000.0)
-    assert load(path, "http://a", clock=lambda: 1000.0 + KEPT_S - 1) == known
+    save_abilities(path, "http://a", known, clock=lambda: 1000.0)
+    save_abilities(path, "http://b", Abilities(batch=True), clock=lambda: 1000.0)
+    assert load_abilities(path, "http://a", clock=lambda: 1000.0 + KEPT_S - 1) == known
     for now in (1000.0 + KEPT_S, 999.0):
-        assert load(path, "http://a", clock=lambda now=now: now) == Abilities()  # type: ignore[misc]
-    assert load(path, "http://c") == Abilities()
+        assert load_abilities(path, "http://a", clock=lambda now=now: now) == Abilities()  # type: ignore[misc]
+    assert load_abilities(path, "http://c") == Abilities()
 
 
 @pytest.mark.parametrize(
@@ -34,7 +34,7 @@ def test_a_damaged_memory_is_none(tmp_path: Path, text: str) -> None:
     """It costs some requests, never an answer."""
     path = tmp_path / "servers.json"
     path.write_text(text, encoding="utf-8")
-    assert load(path, "http://a", clock=lambda: 2.0) == Abilities()
+    assert load_abilities(path, "http://a", clock=lambda: 2.0) == Abilities()
 
 
 def test_the_next_run_does_not_try_again(tmp_path: Path) -> None:
@@ -58,7 +58,7 @@ def test_a_right_is_not_kept(tmp_path: Path) -> None:
         client.get_items_by_uuid([NOBODY])
         client.get_items_by_uuid([NOBODY])
         assert silo.seen.count("POST /api/items/by-uuid") == 1
-    assert load(memory, silo.url).batch is None
+    assert load_abilities(memory, silo.url).batch is None
 
 
 def doctor(silo: str, capsys: pytest.CaptureFixture[str]) -> tuple[int, str]:
