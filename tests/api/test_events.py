@@ -11,7 +11,9 @@ from typing import Any
 import pytest
 
 from silo.api.client import SiloClient
-from silo.api.events import SELDOM, Backoff, Connection, ConnectionState, EventListener, ServerEvent
+from silo.api.events import SELDOM, Connection, ConnectionState, EventListener
+from silo.api.policy import Backoff
+from silo.api.sse import ServerEvent
 from silo.bom.errors import AuthError, ServerFaultError, UnreachableError
 from silo.testing import FakeSilo
 

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from silo.api.wire import Origin, Revision
+from silo.api.files import Origin
+from silo.api.wire import Revision
 from silo.bom.errors import UnreachableError
 from silo.outbox.entry import UNKNOWN, Commit, Entry, State
 from silo.outbox.store import Store

@@ -22,12 +22,12 @@ from silo.api.address import ServerAddress
 from silo.api.boms import BomCalls
 from silo.api.caller import LISTS, Abilities, load_abilities, save_abilities
 from silo.api.events import SILENCE, HttpEventStream, open_stream
-from silo.api.files import Progress
+from silo.api.files import Origin, Progress
 from silo.api.items import ItemCalls
 from silo.api.policy import Retries
 from silo.api.sse import ServerEvent
 from silo.api.transport import Call, Cancel, Timeouts, Transport, stop_if
-from silo.api.wire import Origin, Revision, ServerState, User
+from silo.api.wire import Revision, ServerState, User
 from silo.bom.errors import NotFoundError, RejectedError, RouteMissingError, ServerFaultError, SiloError
 
 _PAGE = 1000  # revisions in one answer

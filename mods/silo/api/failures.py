@@ -8,7 +8,6 @@ these libraries define has a line here, so a new one does not slip through as it
 from __future__ import annotations
 
 import http.client
-import json
 import socket
 import ssl
 from collections.abc import Iterator
@@ -56,141 +55,98 @@ class Where:
         return f"{self.host} ({self.subject})" if self.subject else self.host
 
 
-def _refused(where: Where) -> SiloError:
-    return NotSentError(
-        f"nothing answers at {where.host}: is the Silo server running, and is the address right? "
-        "`silo-mod serve` starts one on this computer"
-    )
+_Kind = tuple[type[SiloError], str]
 
+_REFUSED: _Kind = (
+    NotSentError,
+    "nothing answers at {host}: is the Silo server running, and is the address right? "
+    "`silo-mod serve` starts one on this computer",
+)
+_UNKNOWN_NAME: _Kind = (
+    NotSentError,
+    "the name in {host} is not known here: check the address, the network or the VPN",
+)
+_SLOW_CONNECT: _Kind = (
+    NotSentError,
+    "{host} could not be reached within {connect:g} s: check the network or the VPN",
+)
+_SLOW_ANSWER: _Kind = (
+    UnreachableError,
+    "{asked} was silent for {read:g} s; try again, or allow a longer time",
+)
+_BROKEN: _Kind = (
+    UnreachableError,
+    "{asked} closed the connection before the answer was complete; try again",
+)
+_TLS: _Kind = (
+    NotSentError,
+    "no secure connection to {host}: its certificate is not trusted here, or it speaks no https. "
+    "For an own certificate authority give its file in SILO_SSL_VERIFY",
+)
+_PROXY: _Kind = (NotSentError, "the proxy on the way to {host} does not let us through; check its settings")
+_ADDRESS: _Kind = (
+    ConfigError,
+    "{host}: this server address cannot be used; write it like https://silo.example.com",
+)
+# The library's own text quotes the header's value, which may be the token.
+_HEADER: _Kind = (ConfigError, "{host}: the token or a header holds characters that HTTP does not allow")
+_LOOP: _Kind = (ServerFaultError, "{asked} redirects in a circle; check the server address")
+_GARBLED: _Kind = (
+    ServerFaultError,
+    "{asked} answered something that cannot be understood; is this the address of a Silo server?",
+)
+_OURS: _Kind = (InputError, "{asked}: what was to be sent cannot be put into a request")
 
-def _unknown_name(where: Where) -> SiloError:
-    return NotSentError(
-        f"the name in {where.host} is not known here: check the address, the network or the VPN"
-    )
-
-
-def _slow_connect(where: Where) -> SiloError:
-    return NotSentError(
-        f"{where.host} could not be reached within {where.connect:g} s: check the network or the VPN"
-    )
-
-
-def _slow_answer(where: Where) -> SiloError:
-    return UnreachableError(
-        f"{where.asked} was silent for {where.read:g} s; try again, or allow a longer time"
-    )
-
-
-def _broken(where: Where) -> SiloError:
-    return UnreachableError(f"{where.asked} closed the connection before the answer was complete; try again")
-
-
-def _tls(where: Where) -> SiloError:
-    return NotSentError(
-        f"no secure connection to {where.host}: its certificate is not trusted here, or it speaks no https. "
-        "For an own certificate authority give its file in SILO_SSL_VERIFY"
-    )
-
-
-def _proxy(where: Where) -> SiloError:
-    return NotSentError(f"the proxy on the way to {where.host} does not let us through; check its settings")
-
-
-def _address(where: Where) -> SiloError:
-    return ConfigError(
-        f"{where.host}: this server address cannot be used; write it like https://silo.example.com"
-    )
-
-
-def _header(where: Where) -> SiloError:
-    # The library's own text quotes the header's value, which may be the token.
-    return ConfigError(f"{where.host}: the token or a header holds characters that HTTP does not allow")
-
-
-def _loop(where: Where) -> SiloError:
-    return ServerFaultError(f"{where.asked} redirects in a circle; check the server address")
-
-
-def _garbled(where: Where) -> SiloError:
-    return ServerFaultError(
-        f"{where.asked} answered something that cannot be understood; is this the address of a Silo server?"
-    )
-
-
-def _ours(where: Where) -> SiloError:
-    return InputError(f"{where.asked}: what was to be sent cannot be put into a request")
-
-
+_REQUESTS: tuple[tuple[_Kind, str], ...] = (
+    (_BROKEN, "RequestException ConnectionError ChunkedEncodingError RetryError"),
+    (_SLOW_CONNECT, "ConnectTimeout"),
+    (_SLOW_ANSWER, "ReadTimeout Timeout"),
+    (_TLS, "SSLError"),
+    (_PROXY, "ProxyError InvalidProxyURL"),
+    (_GARBLED, "ContentDecodingError StreamConsumedError InvalidJSONError JSONDecodeError HTTPError"),
+    (_LOOP, "TooManyRedirects"),
+    (_ADDRESS, "URLRequired MissingSchema InvalidSchema InvalidURL"),
+    (_HEADER, "InvalidHeader"),
+    (_OURS, "UnrewindableBodyError"),
+)
+_URLLIB3: tuple[tuple[_Kind, str], ...] = (
+    (
+        _BROKEN,
+        "HTTPError PoolError RequestError MaxRetryError ProtocolError IncompleteRead "
+        "InvalidChunkLength EmptyPoolError ClosedPoolError ResponseError FullPoolError",
+    ),
+    (_LOOP, "HostChangedError"),
+    (_TLS, "SSLError"),
+    (_PROXY, "ProxyError ProxySchemeUnknown ProxySchemeUnsupported"),
+    (_GARBLED, "DecodeError ResponseNotChunked BodyNotHttplibCompatible InvalidHeader HeaderParsingError"),
+    (_SLOW_ANSWER, "TimeoutError TimeoutStateError ReadTimeoutError"),
+    (_SLOW_CONNECT, "ConnectTimeoutError"),
+    (_REFUSED, "NewConnectionError"),
+    (_ADDRESS, "LocationValueError LocationParseError URLSchemeUnknown"),
+    (_OURS, "UnrewindableBodyError"),
+    (_UNKNOWN_NAME, "NameResolutionError"),
+)
 # The most specific class wins, by the order in the class's own ancestry (its MRO).
-TABLE = {
-    rq.RequestException: _broken,
-    rq.ConnectionError: _broken,
-    rq.ConnectTimeout: _slow_connect,
-    rq.ReadTimeout: _slow_answer,
-    rq.Timeout: _slow_answer,
-    rq.SSLError: _tls,
-    rq.ProxyError: _proxy,
-    rq.InvalidProxyURL: _proxy,
-    rq.ChunkedEncodingError: _broken,
-    rq.ContentDecodingError: _garbled,
-    rq.StreamConsumedError: _garbled,
-    rq.InvalidJSONError: _garbled,
-    rq.JSONDecodeError: _garbled,
-    rq.HTTPError: _garbled,
-    rq.RetryError: _broken,
-    rq.TooManyRedirects: _loop,
-    rq.URLRequired: _address,
-    rq.MissingSchema: _address,
-    rq.InvalidSchema: _address,
-    rq.InvalidURL: _address,
-    rq.InvalidHeader: _header,
-    rq.UnrewindableBodyError: _ours,
-    u3.HTTPError: _broken,
-    u3.PoolError: _broken,
-    u3.RequestError: _broken,
-    u3.MaxRetryError: _broken,
-    u3.HostChangedError: _loop,
-    u3.SSLError: _tls,
-    u3.ProxyError: _proxy,
-    u3.ProxySchemeUnknown: _proxy,
-    u3.ProxySchemeUnsupported: _proxy,
-    u3.DecodeError: _garbled,
-    u3.ProtocolError: _broken,
-    u3.IncompleteRead: _broken,
-    u3.InvalidChunkLength: _broken,
-    u3.TimeoutError: _slow_answer,
-    u3.TimeoutStateError: _slow_answer,
-    u3.ReadTimeoutError: _slow_answer,
-    u3.ConnectTimeoutError: _slow_connect,
-    u3.NewConnectionError: _refused,
-    u3.EmptyPoolError: _broken,
-    u3.ClosedPoolError: _broken,
-    u3.LocationValueError: _address,
-    u3.LocationParseError: _address,
-    u3.URLSchemeUnknown: _address,
-    u3.ResponseError: _broken,
-    u3.ResponseNotChunked: _garbled,
-    u3.BodyNotHttplibCompatible: _garbled,
-    u3.InvalidHeader: _garbled,
-    u3.HeaderParsingError: _garbled,
-    u3.UnrewindableBodyError: _ours,
-    http.client.HTTPException: _broken,
-    pydantic.ValidationError: _garbled,
-    pydantic.PydanticUserError: _garbled,
-    json.JSONDecodeError: _garbled,
-    UnicodeError: _garbled,
-    RecursionError: _garbled,
-    ValueError: _garbled,
-    ssl.SSLError: _tls,
-    ssl.CertificateError: _tls,
-    socket.gaierror: _unknown_name,
-    ConnectionRefusedError: _refused,
-    TimeoutError: _slow_answer,
-    OSError: _broken,
+TABLE: dict[type, _Kind] = {
+    getattr(library, name): kind
+    for library, rows in ((rq, _REQUESTS), (u3, _URLLIB3))
+    for kind, names in rows
+    for name in names.split()
+    if hasattr(library, name)  # some are of urllib3 2 alone
 }
-for _name, _build in (("NameResolutionError", _unknown_name), ("FullPoolError", _broken)):
-    if hasattr(u3, _name):  # urllib3 2
-        TABLE[getattr(u3, _name)] = _build
+TABLE |= {
+    http.client.HTTPException: _BROKEN,
+    pydantic.ValidationError: _GARBLED,
+    pydantic.PydanticUserError: _GARBLED,
+    UnicodeError: _GARBLED,
+    RecursionError: _GARBLED,
+    ValueError: _GARBLED,
+    ssl.SSLError: _TLS,
+    socket.gaierror: _UNKNOWN_NAME,
+    ConnectionRefusedError: _REFUSED,
+    TimeoutError: _SLOW_ANSWER,
+    OSError: _BROKEN,
+}
 
 # Wrappers whose reason says more than they do.
 _WRAPPERS = (rq.ConnectionError, rq.ChunkedEncodingError, u3.MaxRetryError, u3.ProtocolError)
@@ -199,10 +155,8 @@ _WRAPPERS = (rq.ConnectionError, rq.ChunkedEncodingError, u3.MaxRetryError, u3.P
 def translate(error: Exception, where: Where) -> SiloError:
     """Our error for a foreign one, in plain words; never quotes a header."""
     told = _innermost(error)
-    for kind in type(told).__mro__:
-        if kind in TABLE:
-            return TABLE[kind](where)
-    return _garbled(where)
+    kind, text = next((TABLE[one] for one in type(told).__mro__ if one in TABLE), _GARBLED)
+    return kind(text.format(host=where.host, asked=where.asked, connect=where.connect, read=where.read))
 
 
 @contextmanager

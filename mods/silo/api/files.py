@@ -17,7 +17,7 @@ from urllib.parse import urljoin
 
 from silo.api.replies import error_of
 from silo.api.transport import MAX_ERROR, Call, Cancel, Transport, stop_if
-from silo.api.wire import Origin, Revision
+from silo.api.wire import LinkedFile, Revision, Wire
 from silo.bom.errors import (
     ConflictError,
     DocumentError,
@@ -187,6 +187,14 @@ def _unreadable(path: Path, error: OSError) -> DocumentError:
 
 
 MAX_DOWNLOAD = 4 << 30
+
+
+class Origin(Wire):
+    """What a client says of a file that it sends: the fields of :class:`Revision` of these names."""
+
+    base_revision: int | None = None
+    file_path: str = ""
+    links: list[LinkedFile] | None = None
 
 
 def upload(

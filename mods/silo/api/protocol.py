@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
-from silo.api.files import Progress
+from silo.api.files import Origin, Progress
 from silo.api.sse import ServerEvent
 from silo.api.transport import Cancel
 from silo.api.wire import (
@@ -18,7 +18,6 @@ from silo.api.wire import (
     Item,
     MergeRequest,
     MergeResult,
-    Origin,
     Revision,
     ServerState,
     User,

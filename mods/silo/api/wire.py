@@ -9,13 +9,11 @@ Write with ``model_dump(mode="json", by_alias=True, exclude_none=True)``.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from datetime import datetime
 from typing import Annotated, Any, Literal
 
 from pydantic import (
-    AfterValidator,
     AliasChoices,
     BaseModel,
     BeforeValidator,
@@ -68,12 +66,6 @@ class Record(Answer, Mapping[str, Any]):
         return len(type(self).model_fields)
 
 
-def _finite_positive(value: float) -> float:
-    if not math.isfinite(value) or value <= 0:
-        raise ValueError(f"quantity: wanted a finite number above 0, got {value}")
-    return value
-
-
 def _shortest(value: float) -> float:
     # The spec writes 12, never 12.0; a server that counts in integers refuses the latter.
     return int(value) if value == value and abs(value) < 2**53 and value == int(value) else value
@@ -108,7 +100,7 @@ Time = Annotated[datetime | None, WrapValidator(_time_or_none)]
 Number = Annotated[float, _Shortest, WithJsonSchema({"type": "number"})]
 Quantity = Annotated[
     float,
-    AfterValidator(_finite_positive),
+    Field(gt=0, allow_inf_nan=False),
     _Shortest,
     WithJsonSchema({"type": "number", "exclusiveMinimum": 0}),
 ]
@@ -273,19 +265,24 @@ class MergeWarning(Answer):
     server_quantity: Number | None = None
 
 
-class MergeResult(Answer):
-    """The answer to a merge request."""
+class _Merged(Answer):
+    """What answer and event of a merge share."""
 
-    status: str = "merged"
     diff: MergeDiff = Field(default_factory=MergeDiff)
-    warnings: list[MergeWarning] = Field(default_factory=list)
     resolve_url: str = ""
     sync_id: str | None = None
-    version: int | None = None
+    warnings: list[MergeWarning] = Field(default_factory=list)
     left_out: list[LeftOutPart] | None = None
 
 
-class MergeEvent(Answer):
+class MergeResult(_Merged):
+    """The answer to a merge request."""
+
+    status: str = "merged"
+    version: int | None = None
+
+
+class MergeEvent(_Merged):
     """The SSE event of a merge: the spec's ``bom_merge``, or the real Silo's ``bom.merged``."""
 
     type: str = "bom_merge"
@@ -293,11 +290,6 @@ class MergeEvent(Answer):
     user: str = ""
     timestamp: Time = None
     summary: str = ""
-    diff: MergeDiff = Field(default_factory=MergeDiff)
-    resolve_url: str = ""
-    sync_id: str | None = None
-    warnings: list[MergeWarning] = Field(default_factory=list)
-    left_out: list[LeftOutPart] | None = None
 
 
 class ErrorBody(Answer):
@@ -355,14 +347,6 @@ class Revision(Record):
     base_revision: int | None = None
     file_path: str | None = None
     links: list[LinkedFile] = Field(default_factory=list)
-
-
-class Origin(Wire):
-    """What a client says of a file that it sends: the fields of :class:`Revision` of these names."""
-
-    base_revision: int | None = None
-    file_path: str = ""
-    links: list[LinkedFile] | None = None
 
 
 class FlatLine(Record):

@@ -18,6 +18,7 @@ from typing import Any, Protocol
 from pydantic import ValidationError
 
 from silo.api.address import canonical
+from silo.api.files import Origin
 from silo.api.policy import Backoff, Scope, Then, judge
 from silo.api.protocol import FilesApi
 from silo.api.revisions import (
@@ -35,7 +36,6 @@ from silo.api.wire import (
     LinkedFile,
     MergeRequest,
     MergeResult,
-    Origin,
     Revision,
     ServerState,
     SourceDocument,

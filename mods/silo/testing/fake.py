@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Self
 from uuid import UUID, uuid4
 
 from silo.api.bodies import ItemBody, ItemChanges, LineBody, body
-from silo.api.files import Progress
+from silo.api.files import Origin, Progress
 from silo.api.merging import result_of
 from silo.api.sse import MERGE, STATE
 from silo.api.transport import Cancel, stop_if
@@ -28,7 +28,6 @@ from silo.api.wire import (
     MergeEvent,
     MergeRequest,
     MergeResult,
-    Origin,
     Revision,
     ServerState,
     User,

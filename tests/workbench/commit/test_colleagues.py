@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from desk import Document, Office
 
-from silo.api.wire import Origin
+from silo.api.files import Origin
 from silo.bom.changes import ThreeLines
 from silo.bom.model import BomEntry
 from silo.outbox.entry import State

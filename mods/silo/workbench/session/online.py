@@ -11,7 +11,8 @@ from typing import Any
 
 from silo.api.client import SiloClient
 from silo.api.config import resolve_server
-from silo.api.events import ConnectionState, EventListener, ServerEvent
+from silo.api.events import ConnectionState, EventListener
+from silo.api.sse import ServerEvent
 from silo.bom.errors import ConfigError
 from silo.outbox.entry import Entry as Waiting
 from silo.outbox.send import Report, Sent, send_all
