@@ -7,12 +7,11 @@ from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import Any
 
-from silo.api.bodies import BomsAnswer, LineBody, NumbersBody, body
-from silo.api.caller import LISTS, Caller, Params
+from silo.api.caller import LISTS, Caller, Params, body
 from silo.api.merging import merge_by_lines, merge_result, read_back, without_manual
 from silo.api.replies import Reply
 from silo.api.transport import Cancel
-from silo.api.wire import BomLine, FlatLine, MergeRequest, MergeResult, WhereUsedLine
+from silo.api.wire import Answer, BomLine, FlatLine, MergeRequest, MergeResult, Quantity, WhereUsedLine, Wire
 from silo.bom.errors import (
     ConflictError,
     CycleError,
@@ -20,6 +19,36 @@ from silo.bom.errors import (
     RouteMissingError,
     VersionConflictError,
 )
+
+
+class NumbersBody(Wire):
+    """``POST /api/items/boms``: the BOMs of many items in one question."""
+
+    part_numbers: list[str]
+
+
+class BomsAnswer(Answer):
+    """Its answer: the lines of each item that is known, by the part number as it was asked for."""
+
+    boms: dict[str, list[BomLine]]
+
+
+class LineBody(Wire):
+    """``POST …/bom`` and ``PUT …/bom/{child}``: a line as a person writes it.
+
+    ``source`` is for a merge by single calls, on a server that has no other.
+    """
+
+    child_part_number: str | None = None
+    quantity: Quantity | None = None
+    unit: str | None = None
+    rel_type: str | None = None
+    find_number: str | None = None
+    notes: str | None = None
+    reference_designators: list[str] | None = None
+    child_revision: int | None = None
+    metadata: dict[str, Any] | None = None
+    source: str | None = None
 
 
 class BomCalls(Caller):
@@ -169,7 +198,7 @@ class BomCalls(Caller):
     def add_bom_line(self, part_number: str, child: str, /, **values: Any) -> BomLine:
         """Add a line by hand (``source`` manual): ``quantity``, ``unit``, ``notes``, ``find_number``, …
 
-        The fields are those of :class:`silo.api.bodies.LineBody`. A merge never touches such a line.
+        The fields are those of :class:`LineBody`. A merge never touches such a line.
         """
         line = body(LineBody, {"quantity": 1, **values, "child_part_number": child}, "a BOM line")
         reply = self._change(
@@ -182,7 +211,7 @@ class BomCalls(Caller):
         return reply.model(BomLine)
 
     def update_bom_line(self, part_number: str, child: str, /, **changes: Any) -> BomLine:
-        """Change a line by hand; the fields are those of :class:`silo.api.bodies.LineBody`."""
+        """Change a line by hand; the fields are those of :class:`LineBody`."""
         line = body(LineBody, changes, "a BOM line")
         subject = f"{child} on the BOM of {part_number}"
         return self._change("PUT", subject, *_bom(part_number), child, body=line).model(BomLine)

@@ -13,13 +13,13 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic import BaseModel
+from pydantic import BaseModel, ValidationError
 
 from silo.api.address import ServerAddress
 from silo.api.files import as_json
 from silo.api.replies import Reply
 from silo.api.transport import Call, Cancel, Transport, stop_if
-from silo.bom.errors import BusyError, ForbiddenError, NotFoundError, ReadOnlyError, RejectedError
+from silo.bom.errors import BusyError, ForbiddenError, InputError, NotFoundError, ReadOnlyError, RejectedError
 from silo.durable import replacing
 from silo.folders import cache_folder
 
@@ -100,6 +100,7 @@ def _seconds(value: Any) -> float:
 
 
 T = TypeVar("T")
+Body = TypeVar("Body", bound=BaseModel)
 
 LISTS = ("items", "entries", "lines", "bom", "results", "data")
 """The keys under which servers put a list that is not bare."""
@@ -226,6 +227,19 @@ class Caller:
     def _delete(self, subject: str, *segments: str) -> None:
         """Remove."""
         self._transport.send(Call("DELETE", self._address.api(*segments), subject))
+
+
+def body(kind: type[Body], values: Mapping[str, Any], thing: str) -> Body:
+    """The values as a request; raises :class:`InputError` with all that does not fit at once."""
+    unknown = sorted(set(values) - set(kind.model_fields) - {"schema"})
+    if unknown:
+        known = ", ".join(kind.model_fields)
+        raise InputError(f"{', '.join(unknown)}: no field of {thing}; wanted some of {known}")
+    try:
+        return kind.model_validate(values)
+    except ValidationError as error:
+        wrong = "; ".join(f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors())
+        raise InputError(f"these values do not fit {thing}: {wrong}") from error
 
 
 def _one_by_one(

@@ -8,12 +8,13 @@ from contextlib import suppress
 from typing import Any
 from uuid import UUID
 
-from silo.api.bodies import ItemBody, ItemChanges, NumberAnswer, NumberBody, UuidsBody, body
-from silo.api.caller import LISTS, Caller, Params
+from pydantic import Field
+
+from silo.api.caller import LISTS, Caller, Params, body
 from silo.api.failures import translated
 from silo.api.replies import Reply, WebPageError
 from silo.api.transport import Cancel
-from silo.api.wire import Item
+from silo.api.wire import Answer, Item, Wire
 from silo.bom.categories import Categories, Rule
 from silo.bom.errors import (
     InputError,
@@ -22,6 +23,56 @@ from silo.bom.errors import (
     RouteMissingError,
     SiloError,
 )
+
+
+class UuidsBody(Wire):
+    """``POST /api/items/by-uuid``: many identities in one question."""
+
+    uuids: list[str]
+
+
+class ItemBody(Wire):
+    """``POST /api/items``. The server makes the part number from schema and category.
+
+    ``id``, a UUID of the client's choice, makes a repeat harmless where the server honours it.
+    """
+
+    schema_name: str = Field(alias="schema", default="kindred-rd")
+    category: str = Field(min_length=1)
+    description: str = ""
+    name: str | None = None
+    item_type: str = "part"
+    id: str | None = None
+    projects: list[str] | None = None
+    sourcing_type: str | None = None
+    long_description: str | None = None
+    properties: dict[str, Any] | None = None
+
+
+class ItemChanges(Wire):
+    """``PUT /api/items/{partNumber}``. With ``properties`` it makes a new revision, else in place."""
+
+    part_number: str | None = None
+    description: str | None = None
+    name: str | None = None
+    item_type: str | None = None
+    sourcing_type: str | None = None
+    long_description: str | None = None
+    properties: dict[str, Any] | None = None
+    comment: str | None = None
+
+
+class NumberBody(Wire):
+    """``POST /api/generate-part-number``: a preview, it may be asked as often as one likes."""
+
+    schema_name: str = Field(alias="schema", default="kindred-rd")
+    category: str = Field(min_length=1)
+
+
+class NumberAnswer(Answer):
+    """The number that the next item of this category would get."""
+
+    part_number: str
 
 
 class ItemCalls(Caller):
@@ -156,7 +207,7 @@ class ItemCalls(Caller):
             return Item.model_validate(said)
 
     def update_item(self, part_number: str, /, **changes: Any) -> Item:
-        """Change fields of an item (those of :class:`silo.api.bodies.ItemChanges`).
+        """Change fields of an item (those of :class:`ItemChanges`).
 
         ``properties`` makes a new revision (with ``comment``); the rest changes in place.
         """

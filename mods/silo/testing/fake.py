@@ -15,8 +15,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 from uuid import UUID, uuid4
 
-from silo.api.bodies import ItemBody, ItemChanges, LineBody, body
+from silo.api.boms import LineBody
+from silo.api.caller import body
 from silo.api.files import Origin, Progress
+from silo.api.items import ItemBody, ItemChanges
 from silo.api.merging import result_of
 from silo.api.sse import MERGE, STATE
 from silo.api.transport import Cancel, stop_if
