@@ -12,7 +12,6 @@ import json
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, Protocol
-from urllib.parse import quote
 
 from pydantic import ValidationError
 
@@ -26,7 +25,6 @@ from silo.api.wire import (
     MergeResult,
     MergeWarning,
     QuantityLine,
-    QuantityUpdate,
 )
 from silo.bom.diff import is_manual, same_quantity
 from silo.bom.errors import (
@@ -38,7 +36,7 @@ from silo.bom.errors import (
     ServerFaultError,
     SiloError,
 )
-from silo.bom.merge import plan_merge
+from silo.bom.merge import answer_of, conflict_warning, plan_merge
 from silo.bom.model import BomDiff
 
 UNCLEAR = "answer_not_understood"
@@ -101,36 +99,8 @@ _LISTS = {"added", "removed", "quantity_changed", "unchanged"}
 
 def result_of(diff: BomDiff, part_number: str, request: MergeRequest) -> MergeResult:
     """The answer of spec §5 for a planned merge."""
-    warnings = [
-        MergeWarning(
-            type="unreferenced",
-            part_number=change.part_number,
-            message="Present in server BOM but not in assembly",
-        )
-        for change in diff.removed
-    ] + [
-        _conflict(conflict.part_number, conflict.local_quantity, conflict.remote_quantity)
-        for conflict in diff.conflicts
-    ]
-    return MergeResult(
-        diff=MergeDiff(
-            added=[QuantityLine(**change) for change in diff.added],
-            removed=[QuantityLine(**change) for change in diff.removed],
-            quantity_changed=[
-                QuantityUpdate(
-                    part_number=change.part_number,
-                    old_quantity=change.remote_quantity,
-                    new_quantity=change.local_quantity,
-                )
-                for change in diff.quantity_changed
-            ],
-            unchanged=[QuantityLine(**change) for change in diff.unchanged],
-        ),
-        warnings=warnings,
-        resolve_url=f"/items/{quote(part_number, safe='')}/bom",
-        sync_id=request.sync_id,
-        left_out=request.left_out or None,
-    )
+    left_out = [one.model_dump() for one in request.left_out or ()]
+    return MergeResult.model_validate(answer_of(diff, part_number, request.sync_id, left_out))
 
 
 def read_back(api: Lines, part_number: str, request: MergeRequest, host: str) -> MergeResult:
@@ -175,7 +145,9 @@ def without_manual(
     result = merge(request.model_copy(update={"entries": rest}))
     known = {warning.part_number.casefold() for warning in result.warnings if warning.type == "conflict"}
     warnings = [
-        _conflict(entry.child_part_number, entry.quantity, manual[_key(entry)].quantity)
+        MergeWarning.model_validate(
+            conflict_warning(entry.child_part_number, entry.quantity, manual[_key(entry)].quantity)
+        )
         for entry in left
         if not same_quantity(manual[_key(entry)].quantity, entry.quantity) and _key(entry) not in known
     ]
@@ -228,16 +200,6 @@ def _try(refused: list[str], child: str, call: Callable[[], object]) -> None:
 
 def _entry(entry: MergeEntry) -> Mapping[str, Any]:
     return {"child_part_number": entry.child_part_number, "quantity": entry.quantity}
-
-
-def _conflict(part_number: str, assembly: float | None, server: float | None) -> MergeWarning:
-    return MergeWarning(
-        type="conflict",
-        part_number=part_number,
-        message="Set by a person to another quantity than the assembly's",
-        assembly_quantity=assembly,
-        server_quantity=server,
-    )
 
 
 def _key(entry: MergeEntry) -> str:

@@ -18,9 +18,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
+from urllib.parse import quote
 
 from silo.bom.diff import Component, diff_bom, is_manual, local_quantities, same_quantity
-from silo.bom.model import BomDiff, BomEntry
+from silo.bom.model import BomChange, BomDiff, BomEntry
 
 
 @dataclass(frozen=True)
@@ -140,3 +141,64 @@ def summary(diff: BomDiff) -> str:
     if diff.conflicts:
         parts.append(f"{len(diff.conflicts)} in conflict")
     return "BOM updated: " + ", ".join(parts)
+
+
+def resolve_url(part_number: str) -> str:
+    """Where a person decides on what a merge left open."""
+    return f"/items/{quote(part_number, safe='')}/bom"
+
+
+def answer_of(
+    diff: BomDiff, part_number: str, sync_id: str | None = None, left_out: Sequence[Mapping[str, Any]] = ()
+) -> dict[str, Any]:
+    """The answer to a merge (spec §5); ``sync_id`` and ``left_out`` only where there are such."""
+
+    def lines(changes: Iterable[BomChange]) -> list[dict[str, Any]]:
+        return [{"part_number": one.part_number, "quantity": _count(one.quantity)} for one in changes]
+
+    unreferenced = [
+        {
+            "type": "unreferenced",
+            "part_number": change.part_number,
+            "message": "Present in server BOM but not in assembly",
+        }
+        for change in diff.removed
+    ]
+    answer: dict[str, Any] = {
+        "status": "merged",
+        "diff": {
+            "added": lines(diff.added),
+            "removed": lines(diff.removed),
+            "quantity_changed": [
+                {
+                    "part_number": change.part_number,
+                    "old_quantity": _count(change.remote_quantity),
+                    "new_quantity": _count(change.local_quantity),
+                }
+                for change in diff.quantity_changed
+            ],
+            "unchanged": lines(diff.unchanged),
+        },
+        "warnings": unreferenced
+        + [conflict_warning(c.part_number, c.local_quantity, c.remote_quantity) for c in diff.conflicts],
+        "resolve_url": resolve_url(part_number),
+    }
+    told = {"sync_id": sync_id, "left_out": [dict(one) for one in left_out]}
+    return answer | {name: value for name, value in told.items() if value}
+
+
+def conflict_warning(part_number: str, assembly: float | None, server: float | None) -> dict[str, Any]:
+    """The warning of a line that a person gave another quantity than the assembly has."""
+    cad, ours = _count(assembly), _count(server)
+    return {
+        "type": "conflict",
+        "part_number": part_number,
+        "message": f"The assembly has {cad}, Silo has {ours} (set by a person); a person decides",
+        "assembly_quantity": cad,
+        "server_quantity": ours,
+    }
+
+
+def _count(quantity: float | None) -> float | None:
+    """A count reads as a count: 12.0 is written as 12."""
+    return int(quantity) if quantity is not None and quantity == int(quantity) else quantity

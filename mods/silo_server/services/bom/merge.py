@@ -17,7 +17,7 @@ from typing import Any
 from sqlalchemy import delete, insert, select
 
 from silo.bom.errors import ConflictError, RejectedError
-from silo.bom.merge import MergePlan, plan_merge, summary
+from silo.bom.merge import MergePlan, answer_of, plan_merge, summary
 from silo.bom.model import QuantityChange
 from silo_server.db.bulk import insert_rows, one_of
 from silo_server.db.engine import Tx
@@ -36,7 +36,7 @@ from silo_server.services.bom.changes import (
 from silo_server.services.bom.history import state_at
 from silo_server.services.bom.last_sync import LastSync, last_sync, remember
 from silo_server.services.bom.lines import lines_of
-from silo_server.services.bom.merge_json import MergeOrder, answer_of, event_of
+from silo_server.services.bom.merge_json import MergeOrder, event_of
 from silo_server.services.items import get_item
 from silo_server.services.revisions import check_base
 from silo_server.values import Item, Line, LineState, number
@@ -67,7 +67,7 @@ def preview_merge(tx: Tx, part_number: str, order: MergeOrder, expected: int | N
     parent = get_item(tx, part_number)
     check_version(parent, expected)
     prepared = _prepare(tx, parent, order)
-    answer = answer_of(parent, prepared.plan.diff, order.sync_id, order.left_out)
+    answer = answer_of(prepared.plan.diff, parent.part_number, order.sync_id, order.left_out)
     return MergeOutcome(dumps(answer), parent.bom_version)
 
 
@@ -92,7 +92,7 @@ def merge_bom(tx: Tx, part_number: str, order: MergeOrder, expected: int | None)
     _remember_conflicts(tx, prepared)
     kept = [change.part_number for change in prepared.plan.diff.kept]
     remember(tx, parent, order, prepared.child_ids, prepared.before, kept)
-    answer = answer_of(parent, prepared.plan.diff, order.sync_id, order.left_out)
+    answer = answer_of(prepared.plan.diff, parent.part_number, order.sync_id, order.left_out)
     text = dumps(answer)
     if order.sync_id:
         _remember_sync(tx, parent, order, text, version, _reference(prepared, changes, answer, change_id))
