@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
 from collections.abc import Iterator
 from pathlib import Path
 from uuid import uuid4
@@ -11,7 +12,6 @@ from uuid import uuid4
 import pytest
 
 from silo.api.client import SiloClient
-from silo.api.protocol import SiloApi
 from silo.api.wire import MergeEntry, MergeRequest, MergeResult
 from silo.bom.diff import diff_bom
 from silo.bom.errors import (
@@ -23,6 +23,8 @@ from silo.bom.errors import (
     VersionConflictError,
 )
 from silo.testing import FakeSilo
+
+Silo = SiloClient | FakeSilo
 
 
 @pytest.fixture(scope="module")
@@ -37,20 +39,20 @@ def server_client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SiloClie
 
 
 @pytest.fixture(params=["fake", "server"])
-def silo(request: pytest.FixtureRequest) -> SiloApi:
+def silo(request: pytest.FixtureRequest) -> Silo:
     if request.param == "fake":
         return FakeSilo()
     client: SiloClient = request.getfixturevalue("server_client")
     return client
 
 
-def make(silo: SiloApi, name: str, category: str = "M01") -> str:
+def make(silo: Silo, name: str, category: str = "M01") -> str:
     """A new item's part number."""
     kind = "assembly" if category.startswith("A") else "part"
     return silo.create_item("kindred-rd", category, name, item_type=kind).part_number
 
 
-def merge(silo: SiloApi, parent: str, **quantities: float) -> MergeResult:
+def merge(silo: Silo, parent: str, **quantities: float) -> MergeResult:
     return silo.merge_bom(parent, request(**quantities))
 
 
@@ -63,14 +65,31 @@ def key(part_number: str) -> str:
     return part_number.replace("-", "_")
 
 
-def lines(silo: SiloApi, parent: str) -> dict[str, tuple[float | None, str, bool]]:
+def lines(silo: Silo, parent: str) -> dict[str, tuple[float | None, str, bool]]:
     return {
         line.child_part_number: (line.quantity, line.source, line.unreferenced_since is not None)
         for line in silo.get_bom(parent)
     }
 
 
-def test_many_boms_are_those_that_are_asked_for_singly(silo: SiloApi) -> None:
+def test_the_fake_has_the_methods_of_the_client_with_the_same_arguments() -> None:
+    """Whoever is written against one works with the other."""
+
+    def methods(kind: type) -> dict[str, list[tuple[str, object, object]]]:
+        return {
+            name: [(one.name, one.kind, one.default) for one in inspect.signature(method).parameters.values()]
+            for name, method in inspect.getmembers(kind, inspect.isfunction)
+            if not name.startswith("_")
+        }
+
+    client, fake = methods(SiloClient), methods(FakeSilo)
+    assert set(client) - set(fake) == {"close", "events", "modules", "thumbnail"}
+    assert set(fake) - set(client) == {"set_mode"}
+    for name in set(client) & set(fake):
+        assert client[name] == fake[name], name
+
+
+def test_many_boms_are_those_that_are_asked_for_singly(silo: Silo) -> None:
     """By the number as it was asked for; what is not known is left out."""
     top, part = make(silo, "Top", "A01"), make(silo, "Part")
     merge(silo, top, **{key(part): 2})
@@ -80,7 +99,7 @@ def test_many_boms_are_those_that_are_asked_for_singly(silo: SiloApi) -> None:
     assert found[part] == []
 
 
-def test_an_item_is_found_by_its_identity_and_reads_as_a_mapping(silo: SiloApi) -> None:
+def test_an_item_is_found_by_its_identity_and_reads_as_a_mapping(silo: Silo) -> None:
     """The contract of resolve_part_numbers: a mapping with part_number and name, or None."""
     made = silo.create_item("kindred-rd", "M01", "Base plate", properties={"mass_kg": 1.5})
     found = silo.get_item_by_uuid(made.id)
@@ -92,13 +111,13 @@ def test_an_item_is_found_by_its_identity_and_reads_as_a_mapping(silo: SiloApi) 
 
 
 @pytest.mark.parametrize("odd", ["", "..", "not-a-uuid", "a/b", "ä"])
-def test_what_is_no_identity_is_no_item(silo: SiloApi, odd: str) -> None:
+def test_what_is_no_identity_is_no_item(silo: Silo, odd: str) -> None:
     """Files hold garbage where an identity should be; that is an unregistered part, not a failure."""
     assert silo.get_item_by_uuid(odd) is None
     assert silo.get_items_by_uuid([odd]) == {}
 
 
-def test_identities_are_found_in_any_spelling_under_the_spelling_given(silo: SiloApi) -> None:
+def test_identities_are_found_in_any_spelling_under_the_spelling_given(silo: Silo) -> None:
     """Capitals, braces and missing dashes are one identity; unknown ones are left out."""
     made = silo.create_item("kindred-rd", "M01", "Cover")
     loud, bare = made.id.upper(), made.id.replace("-", "")
@@ -109,7 +128,7 @@ def test_identities_are_found_in_any_spelling_under_the_spelling_given(silo: Sil
     }
 
 
-def test_a_part_number_is_found_in_any_case_and_a_missing_one_is_told(silo: SiloApi) -> None:
+def test_a_part_number_is_found_in_any_case_and_a_missing_one_is_told(silo: Silo) -> None:
     """kindred-rd: numbers compare case-insensitively."""
     number = make(silo, "Shaft")
     assert silo.get_item(number.lower()).part_number == number
@@ -117,7 +136,7 @@ def test_a_part_number_is_found_in_any_case_and_a_missing_one_is_told(silo: Silo
         silo.get_item("Z99-0001")
 
 
-def test_a_number_preview_reserves_nothing(silo: SiloApi) -> None:
+def test_a_number_preview_reserves_nothing(silo: Silo) -> None:
     """The form asks for it again and again; the next item gets it."""
     preview = silo.generate_part_number("kindred-rd", "F01")
     assert silo.generate_part_number("kindred-rd", "F01") == preview
@@ -126,7 +145,7 @@ def test_a_number_preview_reserves_nothing(silo: SiloApi) -> None:
         silo.generate_part_number("kindred-rd", "no-such")
 
 
-def test_creating_twice_with_one_key_makes_one_item(silo: SiloApi) -> None:
+def test_creating_twice_with_one_key_makes_one_item(silo: Silo) -> None:
     """A crash between creation and stamping must not give a part two numbers."""
     wanted = str(uuid4())
     first = silo.create_item("kindred-rd", "M01", "Bracket", idempotency_key=wanted)
@@ -134,7 +153,7 @@ def test_creating_twice_with_one_key_makes_one_item(silo: SiloApi) -> None:
     assert (again.id, again.part_number) == (wanted, first.part_number)
 
 
-def test_the_search_looks_for_every_word_and_by_type(silo: SiloApi) -> None:
+def test_the_search_looks_for_every_word_and_by_type(silo: Silo) -> None:
     """Words in any order; the type narrows."""
     word = uuid4().hex
     part, assembly = make(silo, f"Gear {word}"), make(silo, f"Gearbox {word}", "A01")
@@ -144,7 +163,7 @@ def test_the_search_looks_for_every_word_and_by_type(silo: SiloApi) -> None:
     assert len(silo.search_items(limit=1)) == 1
 
 
-def test_an_item_keeps_its_identity_under_a_new_number(silo: SiloApi) -> None:
+def test_an_item_keeps_its_identity_under_a_new_number(silo: Silo) -> None:
     """The number is a name, the UUID is the item; properties make a revision, a description does not."""
     made = silo.create_item("kindred-rd", "M01", "Old name")
     renamed = f"X-{uuid4().hex[:8]}"
@@ -157,7 +176,7 @@ def test_an_item_keeps_its_identity_under_a_new_number(silo: SiloApi) -> None:
         silo.update_item(renamed, colour="red")
 
 
-def test_the_schema_names_its_categories(silo: SiloApi) -> None:
+def test_the_schema_names_its_categories(silo: Silo) -> None:
     """Code and text, whatever form the schema has; an unknown schema is told."""
     assert silo.categories()["F01"] == "Screws and bolts"
     assert silo.get_schema("kindred-rd")["name"] == "kindred-rd"
@@ -166,7 +185,7 @@ def test_the_schema_names_its_categories(silo: SiloApi) -> None:
         silo.get_schema("no-such")
 
 
-def test_a_merge_gives_the_diff_and_the_server_has_it(silo: SiloApi) -> None:
+def test_a_merge_gives_the_diff_and_the_server_has_it(silo: Silo) -> None:
     """Spec §5: added, changed, removed (kept and flagged), unchanged; warnings; the page to look at."""
     top = make(silo, "Top", "A01")
     kept, changed, gone, new = (make(silo, name) for name in ("Kept", "Changed", "Gone", "New"))
@@ -189,14 +208,14 @@ def test_a_merge_gives_the_diff_and_the_server_has_it(silo: SiloApi) -> None:
     }
 
 
-def test_what_the_server_has_diffs_as_the_core_does(silo: SiloApi) -> None:
+def test_what_the_server_has_diffs_as_the_core_does(silo: Silo) -> None:
     """The lines are the mappings that diff_bom takes."""
     top, part = make(silo, "Top", "A01"), make(silo, "Part")
     merge(silo, top, **{key(part): 3})
     assert diff_bom([{"child_part_number": part, "quantity": 3}], silo.get_bom(top)).drifted is False
 
 
-def test_a_manual_line_is_never_touched_and_a_difference_is_a_conflict(silo: SiloApi) -> None:
+def test_a_manual_line_is_never_touched_and_a_difference_is_a_conflict(silo: Silo) -> None:
     """What people wrote stays; the assembly's other quantity is told."""
     top, glue = make(silo, "Top", "A01"), make(silo, "Glue", "C01")
     silo.add_bom_line(top, glue, quantity=2, notes="one drop each")
@@ -206,7 +225,7 @@ def test_a_manual_line_is_never_touched_and_a_difference_is_a_conflict(silo: Sil
     assert silo.get_bom(top)[0].notes == "one drop each"
 
 
-def test_the_same_sync_id_gives_the_same_answer(silo: SiloApi) -> None:
+def test_the_same_sync_id_gives_the_same_answer(silo: Silo) -> None:
     """Sending twice does no harm, even when something happened in between."""
     top, part = make(silo, "Top", "A01"), make(silo, "Part")
     first = silo.merge_bom(top, request("sync-1", **{key(part): 1}))
@@ -218,7 +237,7 @@ def test_the_same_sync_id_gives_the_same_answer(silo: SiloApi) -> None:
         silo.merge_bom(top, request("sync-1", **{key(part): 2}))
 
 
-def test_a_dry_run_answers_and_changes_nothing(silo: SiloApi) -> None:
+def test_a_dry_run_answers_and_changes_nothing(silo: Silo) -> None:
     """The preview is the merge's own answer."""
     top, part = make(silo, "Top", "A01"), make(silo, "Part")
     result = silo.merge_bom(top, request(dry_run=True, **{key(part): 4}))
@@ -226,7 +245,7 @@ def test_a_dry_run_answers_and_changes_nothing(silo: SiloApi) -> None:
     assert silo.get_bom(top) == []
 
 
-def test_all_unknown_children_are_told_at_once_and_nothing_changes(silo: SiloApi) -> None:
+def test_all_unknown_children_are_told_at_once_and_nothing_changes(silo: Silo) -> None:
     """One 400 with every bad entry, by its index."""
     top, part = make(silo, "Top", "A01"), make(silo, "Part")
     with pytest.raises(RejectedError) as caught:
@@ -237,14 +256,14 @@ def test_all_unknown_children_are_told_at_once_and_nothing_changes(silo: SiloApi
     assert silo.get_bom(top) == []
 
 
-def test_an_unknown_assembly_is_told_as_such(silo: SiloApi) -> None:
+def test_an_unknown_assembly_is_told_as_such(silo: Silo) -> None:
     """404 for the parent."""
     part = make(silo, "Part")
     with pytest.raises(NotFoundError, match="Z98-0001"):
         merge(silo, "Z98-0001", **{key(part): 1})
 
 
-def test_a_ring_is_refused_with_its_way(silo: SiloApi) -> None:
+def test_a_ring_is_refused_with_its_way(silo: Silo) -> None:
     """A in B in A: the path says how."""
     top, sub = make(silo, "Top", "A01"), make(silo, "Sub", "A01")
     merge(silo, top, **{key(sub): 1})
@@ -255,7 +274,7 @@ def test_a_ring_is_refused_with_its_way(silo: SiloApi) -> None:
         merge(silo, top, **{key(top): 1})
 
 
-def test_a_version_that_is_not_the_newest_is_refused(silo: SiloApi) -> None:
+def test_a_version_that_is_not_the_newest_is_refused(silo: Silo) -> None:
     """If-Match: somebody was quicker."""
     top, part = make(silo, "Top", "A01"), make(silo, "Part")
     version = silo.get_bom_version(top)
@@ -266,7 +285,7 @@ def test_a_version_that_is_not_the_newest_is_refused(silo: SiloApi) -> None:
     assert lines(silo, top) == {part: (2, "assembly", False)}
 
 
-def test_the_tree_expands_and_flattens(silo: SiloApi) -> None:
+def test_the_tree_expands_and_flattens(silo: Silo) -> None:
     """Quantities multiply down the tree; only leaves are in the flat BOM."""
     top, sub = make(silo, "Top", "A01"), make(silo, "Gearbox", "A01")
     gear, bolt = make(silo, "Gear"), make(silo, "Bolt", "F01")
@@ -279,7 +298,7 @@ def test_the_tree_expands_and_flattens(silo: SiloApi) -> None:
     assert [(use.parent_part_number, use.quantity) for use in silo.where_used(gear)] == [(sub, 4)]
 
 
-def test_a_line_is_edited_and_removed_by_hand(silo: SiloApi) -> None:
+def test_a_line_is_edited_and_removed_by_hand(silo: Silo) -> None:
     """A person's quantity makes the line the person's."""
     top, part = make(silo, "Top", "A01"), make(silo, "Part")
     merge(silo, top, **{key(part): 4})
@@ -293,7 +312,7 @@ def test_a_line_is_edited_and_removed_by_hand(silo: SiloApi) -> None:
         silo.remove_bom_line(top, part)
 
 
-def test_a_file_becomes_a_revision_and_comes_back(silo: SiloApi, tmp_path: Path) -> None:
+def test_a_file_becomes_a_revision_and_comes_back(silo: Silo, tmp_path: Path) -> None:
     """Upload, list, download: the bytes and their hash are the same."""
     number, content = make(silo, "Housing"), bytes(range(256)) * 700
     source, back = tmp_path / 'Ho"use ä.FCStd', tmp_path / "back.FCStd"
@@ -323,7 +342,7 @@ def test_a_file_becomes_a_revision_and_comes_back(silo: SiloApi, tmp_path: Path)
     assert back.read_bytes() == content
 
 
-def test_the_server_says_who_and_how_it_is(silo: SiloApi) -> None:
+def test_the_server_says_who_and_how_it_is(silo: Silo) -> None:
     """User, mode, health, and full addresses of pages."""
     assert silo.whoami().username
     assert silo.ready().mode == "normal"
@@ -331,7 +350,7 @@ def test_the_server_says_who_and_how_it_is(silo: SiloApi) -> None:
     assert silo.web_url("/items/A01-0001/bom") == f"{silo.base_url}/items/A01-0001/bom"
 
 
-def test_a_merge_is_announced(silo: SiloApi) -> None:
+def test_a_merge_is_announced(silo: Silo) -> None:
     """The event that the activity pane shows; replay gives it again."""
     top, part = make(silo, "Top", "A01"), make(silo, "Part")
     first = silo.open_events()

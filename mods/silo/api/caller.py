@@ -16,9 +16,8 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from silo.api.address import ServerAddress
-from silo.api.files import as_json
 from silo.api.replies import Reply
-from silo.api.transport import Call, Cancel, Transport, stop_if
+from silo.api.transport import Call, Cancel, Transport, as_json, stop_if
 from silo.bom.errors import BusyError, ForbiddenError, InputError, NotFoundError, ReadOnlyError, RejectedError
 from silo.durable import replacing
 from silo.folders import cache_folder

@@ -8,32 +8,28 @@ What comes back are the wire models, which also read as mappings. What goes wron
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import closing, suppress
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import requests
 
-from silo.api import files
 from silo.api.address import ServerAddress
 from silo.api.boms import BomCalls
-from silo.api.caller import LISTS, Abilities, load_abilities, save_abilities
+from silo.api.caller import Abilities, load_abilities, save_abilities
 from silo.api.events import SILENCE, HttpEventStream, open_stream
-from silo.api.files import Origin, Progress
-from silo.api.items import ItemCalls
+from silo.api.files import FileCalls
 from silo.api.policy import Retries
 from silo.api.sse import ServerEvent
 from silo.api.transport import Call, Cancel, Timeouts, Transport, stop_if
-from silo.api.wire import Revision, ServerState, User
-from silo.bom.errors import NotFoundError, RejectedError, RouteMissingError, ServerFaultError, SiloError
-
-_PAGE = 1000  # revisions in one answer
+from silo.api.wire import ServerState, User
+from silo.bom.errors import SiloError
 
 
-class SiloClient(ItemCalls, BomCalls):
+class SiloClient(FileCalls, BomCalls):
     """A Silo server.
 
     base_url
@@ -151,115 +147,6 @@ class SiloClient(ItemCalls, BomCalls):
         # A server that is not ready says so with 503, and why in the same form.
         return reply.mapping(accept=(503,))
 
-    def revisions(self, part_number: str, /, *, newest: int | None = None, after: int = 0) -> list[Revision]:
-        """The revisions of an item, newest first; those above the number ``after``.
-
-        ``newest``: only so many. A server that knows neither sends all, and gets no further question.
-        """
-        found: list[Revision] = []
-        params: dict[str, int] = {"limit": newest or _PAGE, **({"after": after} if after else {})}
-        while True:
-            subject = f"the revisions of {part_number}"
-            reply = self._get(subject, "items", part_number, "revisions", params=params)
-            page = reply.models(Revision, "revisions", *LISTS)
-            lowest = found[-1].revision_number if found else None
-            fresh = [r for r in page if r.revision_number > after]
-            fresh = [r for r in fresh if lowest is None or r.revision_number < lowest]
-            found += sorted(fresh, key=lambda revision: revision.revision_number, reverse=True)
-            total = reply.headers.get("X-Total-Count", "")
-            if newest is not None or not fresh or not total.isdecimal() or len(found) >= int(total):
-                return found[:newest]
-            params["before"] = found[-1].revision_number
-
-    def get_revision(self, part_number: str, number: int, /) -> Revision:
-        """One revision, with the files that its file links to."""
-        subject = f"revision {number} of {part_number}"
-        return self._get(subject, *_revision(part_number, number)).model(Revision)
-
-    def get_properties(self, part_number: str, /) -> dict[str, Any]:
-        """All properties of an item, from its newest revision where the item's own answer carries none.
-
-        Raises :class:`silo.bom.errors.ServerFaultError` where they cannot be read: no answer is not "none".
-        """
-        item = self.get_item(part_number)
-        if item.properties:
-            return dict(item.properties)
-        try:
-            newest = next(iter(self.revisions(part_number, newest=1)), None)
-        except RouteMissingError:
-            newest = None
-        if newest is None and ("properties" in item.model_fields_set or not item.current_revision):
-            return {}
-        number = newest.revision_number if newest is not None else item.current_revision
-        if newest is not None and "properties" in newest.model_fields_set:
-            return dict(newest.properties)
-        asked = self._get(f"revision {number} of {part_number}", *_revision(part_number, number)).mapping()
-        if "properties" not in asked or not isinstance(asked["properties"], dict | None):
-            raise ServerFaultError(
-                f"{self._address.host} does not show the properties of {part_number}; nothing was written: "
-                "it would replace properties that are not known here"
-            )
-        return dict(asked["properties"] or {})
-
-    def upload_file(
-        self,
-        part_number: str,
-        path: Path | str,
-        comment: str = "",
-        properties: Mapping[str, Any] | None = None,
-        on_progress: Progress | None = None,
-        *,
-        file_name: str | None = None,
-        idempotency_key: str | None = None,
-        sha256: str | None = None,
-        origin: Origin | None = None,
-        cancelled: Cancel | None = None,
-    ) -> Revision:
-        """Send a file as a new revision, streamed; never repeated by itself (see :mod:`silo.outbox`).
-
-        ``sha256`` is what must arrive: a server that knows the field makes no revision of anything else.
-        ``origin`` says what the file was made from: :class:`silo.bom.errors.NewerRevisionError` where a newer
-        one is there. A server that does not know this takes the file.
-        Raises :class:`silo.bom.errors.DocumentError` for a file that cannot be read.
-        """
-        return files.upload(
-            self._transport,
-            part_number,
-            Path(path),
-            comment,
-            properties,
-            on_progress,
-            file_name=file_name,
-            idempotency_key=idempotency_key,
-            sha256=sha256,
-            origin=origin,
-            cancelled=cancelled,
-        )
-
-    def download_file(
-        self,
-        part_number: str,
-        path: Path | str,
-        revision: int | None = None,
-        on_progress: Progress | None = None,
-        *,
-        cancelled: Cancel | None = None,
-    ) -> str:
-        """Fetch the latest file of an item, or that of a revision, to ``path``; gives its SHA-256 in hex.
-
-        The bytes may differ from those uploaded: a server re-packs some formats.
-        """
-        return files.download(
-            self._transport, part_number, Path(path), revision, on_progress, cancelled=cancelled
-        )
-
-    def thumbnail(self, part_number: str, /) -> bytes | None:
-        """The picture of an item as PNG; None where there is none, or the server keeps none."""
-        try:
-            return self._get(f"the picture of {part_number}", "items", part_number, "thumbnail").content
-        except (NotFoundError, RejectedError, ServerFaultError):
-            return None
-
     def open_events(self, last_event_id: str | None = None) -> HttpEventStream:
         """Open the event stream; :class:`silo.api.events.EventListener` keeps one open for good."""
         return open_stream(self._transport, last_event_id, self._silence)
@@ -276,14 +163,3 @@ class SiloClient(ItemCalls, BomCalls):
             for event in stream:
                 stop_if(cancelled)
                 yield event
-
-
-def _revision(part_number: str, number: int) -> tuple[str, ...]:
-    return ("items", part_number, "revisions", str(number))
-
-
-if TYPE_CHECKING:
-    from silo.api.protocol import SiloApi
-
-    # The type checker holds the two to their protocol.
-    _conforms: type[SiloApi] = SiloClient

@@ -11,6 +11,7 @@ The rules of this module:
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
@@ -31,6 +32,7 @@ from silo.bom.errors import (
     AuthError,
     CancelledError,
     ConfigError,
+    InputError,
     ServerFaultError,
     SiloError,
     UnreachableError,
@@ -240,6 +242,14 @@ class Transport:
         else:
             cancelled.wait(seconds)
             stop_if(cancelled)
+
+
+def as_json(data: object) -> bytes:
+    """Strict JSON; raises :class:`InputError` for what it cannot hold (NaN, bytes, a value in itself)."""
+    try:
+        return json.dumps(data, ensure_ascii=False, allow_nan=False).encode("utf-8", "replace")
+    except (TypeError, ValueError, RecursionError) as error:
+        raise InputError(f"this cannot be sent as JSON: {error}") from error
 
 
 def read_some(response: requests.Response) -> bytes:

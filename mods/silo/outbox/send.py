@@ -10,17 +10,17 @@ from __future__ import annotations
 
 import json
 import random
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from pydantic import ValidationError
 
 from silo.api.address import canonical
 from silo.api.files import Origin
 from silo.api.policy import Backoff, Scope, Then, judge
-from silo.api.protocol import FilesApi
+from silo.api.protocol import SendApi
 from silo.api.revisions import (
     MayHaveArrivedError,
     SentFile,
@@ -37,7 +37,6 @@ from silo.api.wire import (
     MergeRequest,
     MergeResult,
     Revision,
-    ServerState,
     SourceDocument,
 )
 from silo.bom.errors import (
@@ -59,23 +58,6 @@ from silo.outbox.entry import ASKED, SAME_PART, Entry, State
 from silo.outbox.store import Store
 
 PAUSES = Backoff(first=5.0, longest=900.0)
-
-
-class SendApi(FilesApi, Protocol):
-    """What sending needs of a Silo; :class:`silo.api.client.SiloClient` has it."""
-
-    @property
-    def base_url(self) -> str: ...
-
-    def get_item_by_uuid(self, uuid: str, /) -> Mapping[str, Any] | None: ...
-
-    def get_bom(self, part_number: str, /) -> Sequence[Any]: ...
-
-    def merge_bom(
-        self, part_number: str, request: MergeRequest, /, *, cancelled: Cancel | None = None
-    ) -> MergeResult: ...
-
-    def ready(self) -> ServerState: ...
 
 
 @dataclass(frozen=True)

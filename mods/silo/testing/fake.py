@@ -12,14 +12,15 @@ import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 from uuid import UUID, uuid4
 
 from silo.api.boms import LineBody
 from silo.api.caller import body
-from silo.api.files import Origin, Progress
+from silo.api.files import Origin
 from silo.api.items import ItemBody, ItemChanges
 from silo.api.merging import result_of
+from silo.api.multipart import Progress
 from silo.api.sse import MERGE, STATE
 from silo.api.transport import Cancel, stop_if
 from silo.api.wire import (
@@ -395,10 +396,3 @@ def _uuid(text: str) -> UUID | None:
         return UUID(text)
     except ValueError:
         return None
-
-
-if TYPE_CHECKING:
-    from silo.api.protocol import SiloApi
-
-    # The type checker holds the two to their protocol.
-    _conforms: type[SiloApi] = FakeSilo

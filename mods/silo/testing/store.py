@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any
 
-from silo.api.files import Origin, as_json
+from silo.api.files import Origin
 from silo.api.sse import MERGE, ServerEvent
+from silo.api.transport import as_json
 from silo.api.wire import BomLine, Item, MergeEvent, MergeResult, Revision
 from silo.bom.errors import NewerRevisionError, NotFoundError, ReadOnlyError, RejectedError
 
