@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from silo.api.transport import Cancel
 from silo.api.wire import Revision
-from silo.bom.errors import ConflictError, NotFoundError
+from silo.bom.errors import ConflictError, NewerRevisionError, NotFoundError
 
 if TYPE_CHECKING:
     from silo.api.wire import Revision
@@ -45,6 +45,21 @@ class Standing:
     def base_number(self) -> int:
         """The base's number; -1 where it is not known, so that any revision is newer."""
         return self.base.revision_number if self.base is not None else -1
+
+    def refusal(self, part_number: str) -> NewerRevisionError:
+        """What is said of a commit that would undo the newer revision."""
+        newest = self.newest
+        assert newest is not None  # something is newer
+        made = (
+            f"revision {self.base_number}" if self.base is not None else "a file that is no revision in Silo"
+        )
+        return NewerRevisionError(
+            f"{newest.created_by or 'Somebody'} committed revision {newest.revision_number} of {part_number}"
+            f"{f' ({newest.comment})' if newest.comment else ''}, and this was made from {made}. "
+            "Sending it would undo that. Look at theirs; then send yours on top of it, or discard it and "
+            "take theirs",
+            newest.model_dump(mode="json", exclude={"properties", "links"}),
+        )
 
 
 def has_file(revision: Revision) -> bool:

@@ -140,8 +140,7 @@ class Database:
         except sqlite3.Error as error:
             raise OutboxError(
                 f"{self.path}: the outbox cannot be used now ({error}). What waits in it is still there. "
-                f"Make "
-                "room on the disk or mend its permissions; a file that is no database must be moved away"
+                "Make room on the disk or mend its permissions; a file that is no database must be moved away"
             ) from error
 
     def _make_ready(self) -> None:

@@ -159,6 +159,11 @@ class Entry:
         return (self.identity or self.part_number).casefold()
 
     @property
+    def keys(self) -> set[str]:
+        """The names of its item."""
+        return {self.item, self.part_number.casefold()} - {""}
+
+    @property
     def has_file(self) -> bool:
         """True where a file belongs to the commit, sent or not."""
         return bool(self.copy)

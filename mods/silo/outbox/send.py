@@ -24,7 +24,6 @@ from silo.api.protocol import SendApi
 from silo.api.revisions import (
     MayHaveArrivedError,
     SentFile,
-    Standing,
     find_arrived,
     is_newest,
     newest_number,
@@ -156,10 +155,10 @@ class _Run:
                 continue
             if (
                 entry.state is not State.WAITING
-                or self._is_behind(entry)
+                or entry.keys & self.behind
                 or not (force or self._is_due(entry))
             ):
-                self.behind |= {entry.item, entry.part_number.casefold()} - {""}
+                self.behind |= entry.keys
                 continue
             self._try(entry)
 
@@ -167,9 +166,6 @@ class _Run:
         """Make the copy that an earlier run of the program could not make any more."""
         self.store.finish(entry.key)
         return self.store.entry(entry.id)
-
-    def _is_behind(self, entry: Entry) -> bool:
-        return bool({entry.item, entry.part_number.casefold()} & self.behind)
 
     def _is_due(self, entry: Entry) -> bool:
         # A pause that is longer than any that we make was noted before the clock was set back.
@@ -210,7 +206,7 @@ class _Run:
         self.store.update(entry.id, reason=str(error), next_attempt=self.store.clock() + pause)
         now = self.store.entry(entry.id) or entry
         self.report.failed.append(now)
-        self.behind |= {now.item, now.part_number.casefold()} - {""}
+        self.behind |= now.keys
         if not passing and verdict.scope is Scope.ALL:
             self.report.stopped_by = error
 
@@ -277,8 +273,7 @@ class _Run:
         if item is None:
             raise NotFoundError(
                 f"Silo does not know {entry.label or entry.path}; register it, or check that this is the "
-                f"right "
-                "server"
+                "right server"
             )
         return str(item["part_number"])
 
@@ -327,7 +322,7 @@ class _Run:
         number = self.store.known_revision(entry.server, entry.origin, entry.identity)
         stands = standing(known, entry.origin, number, entry.on_top_of)
         if stands.newer is not None:
-            raise newer_revision(entry.part_number, stands)
+            raise stands.refusal(entry.part_number)
         return max(stands.base_number, 0)
 
     def _upload(self, entry: Entry, base: int | None) -> Revision:
@@ -420,22 +415,6 @@ class _Run:
         if document is not None and document.revision is None:
             document = document.model_copy(update={"revision": revision})
         return wanted.model_copy(update={"sync_id": wanted.sync_id or entry.key, "document": document})
-
-
-def newer_revision(part_number: str, stands: Standing) -> NewerRevisionError:
-    """What is said of a commit that would undo a colleague's revision."""
-    newest = stands.newest
-    assert newest is not None  # something is newer
-    made = (
-        f"revision {stands.base_number}" if stands.base is not None else "a file that is no revision in Silo"
-    )
-    return NewerRevisionError(
-        f"{newest.created_by or 'Somebody'} committed revision {newest.revision_number} of {part_number}"
-        f"{f' ({newest.comment})' if newest.comment else ''}, and this was made from {made}. "
-        "Sending it would undo that. Look at theirs; then send yours on top of it, or discard it and take "
-        "theirs",
-        newest.model_dump(mode="json", exclude={"properties", "links"}),
-    )
 
 
 def _origin(entry: Entry, base: int | None) -> Origin:

@@ -23,6 +23,7 @@ import sqlite3
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -42,15 +43,17 @@ _HELD_AGE = 3600.0
 _REMEMBERED = 2 * 366 * 86400.0
 
 # All but what may be large.
-_COLUMNS = (
-    "id, key, server, state, path, label, identity, part_number, taken_at, comment, properties, file_left,"
-    " file_name, copy, sha256, size, bom_left, allow_missing, remark, reason, attempts, next_attempt,"
-    " base_revision, revision, origin, on_top_of, newer, place, links, renamed"
-)
+_COLUMNS = ", ".join(one.name for one in fields(Entry) if one.name != "superseded")
 _SELECT = f"""SELECT {_COLUMNS}, EXISTS (
     SELECT 1 FROM sent s WHERE s.server = e.server AND s.item IN (e.identity, e.part_number) AND s.item <> ''
     AND s.entry_id > e.id AND (s.kind = 'file' AND e.file_left OR s.kind = 'bom' AND e.bom_left)
 ) AS superseded FROM entry e"""  # noqa: S608
+
+# What of a commit goes into its row as it is.
+_AS_GIVEN = (
+    *("key", "path", "label", "identity", "part_number", "taken_at", "comment", "allow_missing", "remark"),
+    *("request", "origin", "on_top_of"),
+)
 
 
 class Store(Database):
@@ -85,27 +88,15 @@ class Store(Database):
         """Put a commit's row on disk, which takes no time; :meth:`finish` makes the copy of its file."""
         if commit.file is None and commit.extraction is None and not commit.request:
             raise InputError(f"{commit.path or commit.part_number}: neither a file nor a BOM to keep")
-        row = {
-            "key": commit.key,
+        row = {name: getattr(commit, name) for name in _AS_GIVEN} | {
             "server": canonical(server) if server else "",
             "state": State.KEEPING if commit.file is not None else State.WAITING,
-            "path": commit.path,
-            "label": commit.label,
-            "identity": commit.identity,
-            "part_number": commit.part_number,
-            "taken_at": commit.taken_at,
-            "comment": commit.comment,
             "properties": _strict_json(commit.properties),
             "file_left": commit.file is not None,
             "file_name": os.path.basename(commit.path) or (commit.file.name if commit.file else ""),
             "copy": f"{commit.key}{commit.file.suffix[:20]}" if commit.file is not None else "",
             "bom_left": bool(commit.extraction is not None or commit.request),
-            "allow_missing": commit.allow_missing,
-            "remark": commit.remark,
             "extraction": json.dumps(to_plain(commit.extraction)) if commit.extraction is not None else "",
-            "request": commit.request,
-            "origin": commit.origin,
-            "on_top_of": commit.on_top_of,
         }
         with self.transaction() as db:
             insert(db, row)
@@ -177,8 +168,7 @@ class Store(Database):
         if entry.superseded:
             raise ConflictError(
                 f"{entry.part_number or entry.label}: a newer commit of it was sent since, and this one "
-                f"would "
-                "undo it. Discard it"
+                "would undo it. Discard it"
             )
         ready = State.WAITING if entry.sha256 or not entry.file_left else State.KEEPING
         changed: dict[str, Any] = {"state": ready, "reason": "", "next_attempt": 0.0}
@@ -213,11 +203,8 @@ class Store(Database):
         entry = self._known(entry_id)
         held = next(iter((self._held / entry.key).glob("*")), None)
         try:
-            with (
-                (held or self.copies / entry.copy).open("rb") as read,
-                replacing(target, mode=0o644) as write,
-            ):
-                shutil.copyfileobj(read, write, _BLOCK)
+            with open(held or self.copies / entry.copy, "rb") as read, replacing(target, mode=0o644) as out:
+                shutil.copyfileobj(read, out, _BLOCK)
         except OSError as error:
             raise DocumentError(str(target), f"cannot be written ({error.strerror or error})") from error
 
