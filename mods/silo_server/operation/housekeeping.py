@@ -12,13 +12,12 @@ import asyncio
 import json
 import logging
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from datetime import datetime, timedelta
-from pathlib import Path
 
-from sqlalchemy import Table, delete, func, insert, select, update
+from sqlalchemy import ColumnElement, Table, delete, func, insert, select, update
 from sqlalchemy.exc import SQLAlchemyError
 
 from silo.bom.errors import SiloError
@@ -41,9 +40,8 @@ from silo_server.files import FileStore
 from silo_server.json_values import dumps
 from silo_server.services import events
 from silo_server.services import items as item_service
-from silo_server.services.bom.changes import ChangeKind
+from silo_server.services.bom.changes import ChangeKind, LineChange, history_row
 from silo_server.services.bom.history import state_at
-from silo_server.services.bom.lines import state_to_json
 
 logger = logging.getLogger("silo_server.housekeeping")
 
@@ -131,14 +129,16 @@ def _repeat(db: Database, step: Step) -> int:
         count += gone
 
 
-def _old(table: Table, key: str, when: str, age: Callable[[Tx], datetime | None]) -> Step:
+def _old(
+    table: Table, key: str, when: str, age: Callable[[Tx], datetime | None], *also: ColumnElement[bool]
+) -> Step:
     """Delete the rows whose time ``when`` is at or before ``age``; nothing where that is None."""
 
     def step(tx: Tx) -> int:
         before = age(tx)
         if before is None:
             return 0
-        over = select(table.c[key]).where(table.c[when] <= stamp(before)).limit(BATCH)
+        over = select(table.c[key]).where(table.c[when] <= stamp(before), *also).limit(BATCH)
         return tx.conn.execute(delete(table).where(table.c[key].in_(over))).rowcount
 
     return step
@@ -154,13 +154,6 @@ def _days(setting: str) -> Callable[[Tx], datetime | None]:
         return tx.at - timedelta(days=days) if days else None
 
     return age
-
-
-def _start_tokens(tx: Tx) -> int:
-    over = select(api_tokens.c.id).where(
-        api_tokens.c.name == START_TOKEN, api_tokens.c.expires_at <= tx.stamp
-    )
-    return tx.conn.execute(delete(api_tokens).where(api_tokens.c.id.in_(over.limit(BATCH)))).rowcount
 
 
 def _failures(tx: Tx) -> datetime:
@@ -220,18 +213,8 @@ def _history(tx: Tx) -> int:
             refers_to=None,
         )
     )
-    rows = [
-        {
-            "change_id": newest,
-            "line_id": line.line_id,
-            "child_id": line.child.id,
-            "position": line.position,
-            "action": "added",
-            "before": None,
-            "after": dumps(state_to_json(line.state)),
-        }
-        for line in lines
-    ]
+    added = [LineChange(one.line_id, one.child.id, None, one.state, one.position) for one in lines]
+    rows = [{"change_id": newest, **history_row(change)} for change in added]
     if rows:
         tx.conn.execute(insert(bom_change_lines), rows)
     return count
@@ -241,7 +224,7 @@ _STEPS: dict[str, Step] = {
     "sessions": _old(sessions, "id_hash", "expires_at", _now),
     "login links": _old(login_links, "token_hash", "expires_at", _now),
     "login failures": _old(login_failures, "id", "at", _failures),
-    "start tokens": _start_tokens,
+    "start tokens": _old(api_tokens, "id", "expires_at", _now, api_tokens.c.name == START_TOKEN),
     "sync answers": _syncs,
     "events": _events,
     "audit": _old(audit, "id", "at", _days("audit_days")),
@@ -265,8 +248,4 @@ def _remove_orphans(db: Database, store: FileStore) -> int:
         used: set[str] = set()
         for referring in (revisions.c.file_checksum, revisions.c.thumbnail_key, items.c.thumbnail_key):
             used.update(tx.conn.scalars(select(referring).distinct().where(referring.is_not(None))))
-    return _remove(store, (path for path in old if path.name not in used), before)
-
-
-def _remove(store: FileStore, paths: Iterable[Path], before: float) -> int:
-    return sum(store.remove_old(path, before) for path in paths)
+    return sum(store.remove_old(path, before) for path in old if path.name not in used)

@@ -143,18 +143,17 @@ async def upload_file(server: ServerDep, caller: Editor, part_number: str, reque
         origin = Origin(
             _base_revision(form.get("base_revision")), _path(form.get("path")), _links(form.get("links"))
         )
-        return await anyio.to_thread.run_sync(
-            _store,
-            server,
-            caller,
-            part_number,
-            file,
-            str(comment or ""),
-            properties,
-            _idempotency_key(request),
-            (sha256 or "").lower(),
-            origin,
-        )
+        key, text, digest = _idempotency_key(request), str(comment or ""), (sha256 or "").lower()
+
+        def answer(item: Item, revision: Revision) -> Response:
+            return json_answer(revision_to_wire(item.part_number, revision, links=True), 201)
+
+        def work() -> Response:
+            return store_file(
+                server, caller, part_number, file, text, answer, properties, key, digest, origin
+            )
+
+        return await anyio.to_thread.run_sync(work)
 
 
 @router.get("/file", response_class=Response, responses={**READ_ERRORS, **BINARY})
@@ -191,23 +190,6 @@ def thumbnail(
     path = server.files.path_of(item.thumbnail_key)
     kept = "max-age=31536000, immutable" if key and item.thumbnail_key.startswith(key) else "max-age=300"
     return FileResponse(path, media_type="image/png", headers={"Cache-Control": f"private, {kept}"})
-
-
-def _store(
-    server: Server,
-    caller: Actor,
-    part_number: str,
-    file: UploadFile,
-    comment: str,
-    properties: dict[str, Any] | None,
-    key: str | None,
-    sha256: str,
-    origin: Origin,
-) -> Response:
-    def answer(item: Item, revision: Revision) -> Response:
-        return json_answer(revision_to_wire(item.part_number, revision, links=True), 201)
-
-    return store_file(server, caller, part_number, file, comment, answer, properties, key, sha256, origin)
 
 
 def store_file(

@@ -114,16 +114,8 @@ def entry_of(event: LoggedEvent, item: Item | None = None) -> Entry:
 
 
 def _words(name: str, data: Mapping[str, Any]) -> str:
-    if name == "bom_merge":
-        return "BOM merged from CAD"
     if name == "bom.updated":
         return f"BOM: {data.get('summary', 'changed')}"
-    if name == "item.created":
-        return "registered"
-    if name == "item.updated":
-        return "changed"
-    if name == "item.deleted":
-        return "archived"
     if name == "revision.created":
         comment = data.get("comment")
         return f"revision {data.get('revision_number', '')}" + (
@@ -132,7 +124,8 @@ def _words(name: str, data: Mapping[str, Any]) -> str:
     if name == "server.state":
         closed = data.get("mode") == "read-only"
         return "The server takes no changes at the moment" if closed else "The server takes changes again"
-    return name
+    said = {"bom_merge": "BOM merged from CAD", "item.created": "registered", "item.updated": "changed"}
+    return (said | {"item.deleted": "archived"}).get(name, name)
 
 
 def _counts(name: str, data: Mapping[str, Any]) -> tuple[tuple[str, int, str], ...]:

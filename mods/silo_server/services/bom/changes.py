@@ -126,7 +126,8 @@ def apply_changes(tx: Tx, parent: Item, changes: Sequence[LineChange], note: Cha
         .returning(bom_changes.c.id)
     ).scalar_one()
     if changes:
-        insert_rows(tx, bom_change_lines, [_history_row(change_id, change) for change in placed])
+        rows = [{"change_id": change_id, **history_row(change)} for change in placed]
+        insert_rows(tx, bom_change_lines, rows)
         tx.conn.execute(update(items).where(items.c.id == parent.id).values(bom_version=version))
     if note.kind is not ChangeKind.MERGE:
         events.bom_updated(tx, parent, note.kind, note.summary)
@@ -219,9 +220,9 @@ def _write_lines(tx: Tx, parent: Item, changes: Sequence[LineChange]) -> None:
     insert_rows(tx, bom_lines, rows)
 
 
-def _history_row(change_id: int, change: LineChange) -> dict[str, Any]:
+def history_row(change: LineChange) -> dict[str, Any]:
+    """A changed line as the history stores it."""
     return {
-        "change_id": change_id,
         "line_id": change.line_id,
         "child_id": change.child_id,
         "position": change.position,

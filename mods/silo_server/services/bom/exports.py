@@ -39,34 +39,11 @@ class View(StrEnum):
 
 
 COLUMNS = (
-    "Item",
-    "Level",
-    "Part number",
-    "Name",
-    "Description",
-    "Item type",
-    "Relation type",
-    "Quantity",
-    "Unit",
-    "Total quantity",
-    "Unit mass [kg]",
-    "Overall mass [kg]",
-    "Unit cost",
-    "Overall cost",
-    "Currency",
-    "Supplier",
-    "Supplier's part number",
-    "Lead time [days]",
-    "Manufacturer",
-    "Manufacturer's part number",
-    "Material",
-    "Source",
-    "Reference designators",
-    "Find number",
-    "Notes",
-    "Revision",
-    "Unreferenced since",
-    "Incomplete",
+    *("Item", "Level", "Part number", "Name", "Description", "Item type", "Relation type", "Quantity"),
+    *("Unit", "Total quantity", "Unit mass [kg]", "Overall mass [kg]", "Unit cost", "Overall cost"),
+    *("Currency", "Supplier", "Supplier's part number", "Lead time [days]", "Manufacturer"),
+    *("Manufacturer's part number", "Material", "Source", "Reference designators", "Find number", "Notes"),
+    *("Revision", "Unreferenced since", "Incomplete"),
 )
 _FORMATS = {"Unit cost": "#,##0.00##", "Overall cost": "#,##0.00", "Unit mass [kg]": "0.0#####"}
 _FORMATS["Overall mass [kg]"] = "0.0##"
@@ -209,7 +186,9 @@ def to_xlsx(made: Export, out: IO[bytes]) -> None:
     bold = Font(bold=True)
 
     def cell(value: Any, column: str = "", font: Any = None) -> Any:
-        made_ = WriteOnlyCell(sheet, value=_printable(value) if isinstance(value, str) else value)
+        if isinstance(value, str):  # XML, and so XLSX, has no place for control characters
+            value = "".join(c for c in value if c >= " " or c in "\t\n\r")
+        made_ = WriteOnlyCell(sheet, value=value)
         if isinstance(value, str):
             made_.data_type = "s"
         elif column in _FORMATS and value is not None:
@@ -303,8 +282,3 @@ def _item_numbers(depths: Sequence[int]) -> Iterator[str]:
             counters.append(0)
         counters[-1] += 1
         yield ".".join(map(str, counters))
-
-
-def _printable(text: str) -> str:
-    # XML, and so XLSX, has no place for control characters.
-    return "".join(c for c in text if c >= " " or c in "\t\n\r")
