@@ -126,29 +126,13 @@ class Settings:
         return path.with_name(path.stem + "-files") if path else data_folder() / "files"
 
 
-_ENVIRONMENT = {
-    "database_url": "SILO_DATABASE_URL",
-    "files_dir": "SILO_STORAGE_ROOT_DIR",
-    "read_only": "SILO_READ_ONLY",
-    "heartbeat_seconds": "SILO_HEARTBEAT_SECONDS",
-    "event_log_size": "SILO_EVENT_LOG_SIZE",
-    "event_log_bytes": "SILO_EVENT_LOG_BYTES",
-    "sync_days": "SILO_SYNC_DAYS",
-    "sync_bytes": "SILO_SYNC_BYTES",
-    "history_days": "SILO_HISTORY_DAYS",
-    "audit_days": "SILO_AUDIT_DAYS",
-    "housekeeping_seconds": "SILO_HOUSEKEEPING_SECONDS",
-    "max_body_bytes": "SILO_MAX_BODY_BYTES",
-    "max_file_bytes": "SILO_MAX_FILE_BYTES",
-    "max_merge_entries": "SILO_MAX_MERGE_ENTRIES",
-    "secure_cookies": "SILO_SECURE_COOKIES",
-    "request_log": "SILO_REQUEST_LOG",
-    "root_path": "SILO_ROOT_PATH",
-    "trusted_proxies": "SILO_TRUSTED_PROXIES",
-    "public_url": "SILO_PUBLIC_URL",
-    "admin_username": "SILO_ADMIN_USERNAME",
-    "admin_password": "SILO_ADMIN_PASSWORD",
-}
+_NAMES = (
+    *("database_url", "read_only", "heartbeat_seconds", "event_log_size", "event_log_bytes", "sync_days"),
+    *("sync_bytes", "history_days", "audit_days", "housekeeping_seconds", "max_body_bytes", "max_file_bytes"),
+    *("max_merge_entries", "secure_cookies", "request_log", "root_path", "trusted_proxies", "public_url"),
+    *("admin_username", "admin_password"),
+)
+_ENVIRONMENT = {name: f"SILO_{name.upper()}" for name in _NAMES} | {"files_dir": "SILO_STORAGE_ROOT_DIR"}
 
 
 def settings_from_environment(environ: Mapping[str, str] | None = None, **given: Any) -> Settings:

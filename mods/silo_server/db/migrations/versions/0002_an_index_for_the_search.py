@@ -16,8 +16,6 @@ from silo_server.db.migrate import rebuilt
 
 revision = "0002"
 down_revision = "0001"
-branch_labels = None
-depends_on = None
 
 
 def upgrade() -> None:
