@@ -90,11 +90,11 @@ def test_a_token_that_may_only_read_changes_nothing_at_all(api: Api) -> None:
 
 def test_a_token_makes_one_of_its_own_scope_unless_asked_for_less(api: Api) -> None:
     """Never a wider one, also where the request does not name a scope."""
-    writer = api.as_(token(api, scope="write")["token"])
+    writer = api.as_(token(api, scopes=["write"])["token"])
     same = api.as_(token(writer)["token"])
     same.bad(403, "GET", "/api/users")
     same.item()
-    api.as_(token(writer, scope="read")["token"]).bad(403, "POST", "/api/items", {"category": "F01"})
+    api.as_(token(writer, scopes=["read"])["token"]).bad(403, "POST", "/api/items", {"category": "F01"})
 
 
 def test_scopes_that_there_are_not(api: Api) -> None:

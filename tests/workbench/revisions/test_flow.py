@@ -158,7 +158,7 @@ def test_theirs_opens_beside_mine_and_the_question_stays(day: Day) -> None:
 
 
 def test_what_is_open_under_another_spelling_is_left_alone(day: Day, tmp_path: Path) -> None:
-    """On a disk that finds a name in any case: a link opened ``PLATE.fcstd``, the folder lists ``Plate.FCStd``."""
+    """On a disk that ignores case: a link opened ``PLATE.fcstd``, the folder lists ``Plate.FCStd``."""
     number = next(iter(day.office.silo.items.values())).item.part_number
     with other_disk(tmp_path) as disk:
         (disk / "Plate.FCStd").write_bytes(b"open, with edits")
