@@ -71,19 +71,17 @@ def main():
         reading = Reading(memory, pool)
         plan = make_plan(tops, reading)
         memory.save()
-        reads = reading.reads
+        reads, seconds = reading.reads, reading.seconds
         done = [time.perf_counter() - wall, time.process_time() - cpu]
         rows = hashlib.sha256()
         for layer in plan.layers:
             for node in layer:
                 rows.update(repr(plan.extraction(node, reading)).encode())
-    workers = resource.getrusage(resource.RUSAGE_CHILDREN)
     own = resource.getrusage(resource.RUSAGE_SELF)
     print(json.dumps({
-        "wall": done[0], "cpu": done[1] + workers.ru_utime + workers.ru_stime, "parent": done[1],
+        "wall": done[0], "cpu": done[1] + seconds, "parent": done[1],
         "reads": reads, "assemblies": len(plan.nodes), "errors": len(plan.errors),
-        "rss_mb": own.ru_maxrss / 1024,
-        "workers_mb": workers.ru_maxrss / 1024, "digest": rows.hexdigest(),
+        "rss_mb": own.ru_maxrss / 1024, "digest": rows.hexdigest(),
     }))
 
 if __name__ == "__main__":
@@ -165,7 +163,7 @@ def reading(folder: Path, scratch: Path, use_dask: bool) -> None:
         each = run["cpu"] / count * 1e6
         print(
             f"{name:8} cpu {run['cpu']:7.2f} s  wall {run['wall']:7.2f} s  {each:6.0f} µs each  "
-            f"reads {run['reads']:6}  parent {run['rss_mb']:.0f} MB  assemblies {run['assemblies']}"
+            f"reads {run['reads']:6}  parent {run['parent']:.2f} s, {run['rss_mb']:.0f} MB"
         )
     print(f"first : null = {first['cpu'] / null['cpu']:.2f}")
     print(f"first : second = {first['cpu'] / second['cpu']:.1f}")

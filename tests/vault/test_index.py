@@ -19,7 +19,7 @@ from tempfile import mkdtemp
 from typing import Any
 
 import pytest
-from fcstd_writer import Doc, locals_, part
+from fcstd_writer import Doc, XLink, locals_, part
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
@@ -222,7 +222,7 @@ def test_a_second_run_reads_nothing_and_a_change_reads_what_uses_it(vault: Path,
     assert indexed(vault, index)[1] == 0
     part("b", uuid="new").save(vault / "b.FCStd")
     found, reads = indexed(vault, index)
-    assert (found, reads) == (truth(vault), 4)
+    assert (found, reads) == (truth(vault), 3), "of the other part the facts are known"
     assert indexed(vault, index)[1] == 0
 
 
@@ -236,6 +236,65 @@ def test_an_edit_within_one_tick_of_the_clock_is_seen(vault: Path, tmp_path: Pat
     os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
     assert path.stat().st_size == status.st_size
     assert indexed(vault, index, Contents())[0] == truth(vault)
+
+
+def odd_target() -> Doc:
+    """A file with all that a link may name, and more objects than its facts tell of."""
+    doc = Doc("odd", meta={"SiloUUID/Screw": "screw", "SiloUUID": "odd"}, extra={"SiloUUID": "document"})
+    doc.add("Part::Box", "Pad").add("PartDesign::Body", "Body", Group=locals_("Pad"), SiloItemId="body")
+    doc.add("Part::FeaturePython", "Screw", Type="ISO4762", Diameter="M4", Length="16", Invert=False)
+    doc.add("Spreadsheet::Sheet", "Sheet").link("Chain", "", "Body").link("Out", "a.FCStd", "Box")
+    doc.add("Part::Box", "Hidden", SiloBomExclude=True).add("Part::Feature", "Ähn<lich", Label='a "b" & c')
+    doc.add("App::Part", "Inner", Group=locals_("Out", "Body")).link("Array", "", "Body", ElementCount=3)
+    doc.add("Future::Links", "Later", LinkedObject=XLink("a.FCStd", "Box"), ElementCount=2)
+    for number in range(30):
+        doc.add("Part::Box", f"More{number}", SiloItemId=f"more {number}")
+    return doc
+
+
+def test_facts_in_place_of_a_file_change_nothing(vault: Path, tmp_path: Path) -> None:
+    """Whatever a link names in a file of which the facts are known, also what they do not tell."""
+    odd_target().save(vault / "odd.FCStd")
+    named = [
+        *("Pad", "Body", "Screw", "Sheet", "Chain", "Out", "Hidden", "Ähn<lich", "Inner", "Array"),
+        "Later",
+    ]
+    links = [XLink("odd.FCStd", name) for name in (*named, "Gone", "More1", "More29")]
+    links += [
+        XLink("odd.FCStd", "Inner", (sub,)) for sub in ("Body.", "Out.", "Body.Face1", "Gone.", "$Out.")
+    ]
+    top = Doc("top").add("App::Part", "A", Group=locals_(*(f"L{n}" for n in range(len(links)))))
+    for number, link in enumerate(links):
+        top.add("App::Link", f"L{number}", LinkedObject=link)
+        one = Doc("one").add("App::Link", "L", LinkedObject=link).add("App::Part", "A", Group=locals_("L"))
+        one.save(vault / f"one{number}.FCStd")
+    top.save(vault / "top.FCStd")
+    asked = [
+        Question(str(path), below=below) for path in sorted(vault.glob("*.FCStd")) for below in (True, False)
+    ]
+    wanted = [Session().ask(question) for question in asked]
+    for _ in ("found out", "remembered", "walked again with the facts of the index"):
+        with Index(tmp_path / "index", contents=Contents(clock=later)) as memory:
+            found = [answer.known for answer in Reading(memory).ask_many(asked)]
+        assert [json.loads(one.answer) for one in found] == [json.loads(one.answer) for one in wanted]
+        assert [json.loads(one.trail) for one in found] == [json.loads(one.trail) for one in wanted]
+        if _ == "remembered":
+            with sqlite3.connect(tmp_path / "index") as database:
+                database.execute("DELETE FROM answers")
+
+
+def test_only_what_changed_is_read_again(vault: Path, tmp_path: Path) -> None:
+    """Of what an assembly links to the facts are known from before."""
+    index = tmp_path / "index"
+    asked = [Question(str(vault / name)) for name in ("a.FCStd", "b.FCStd", "c.FCStd", "d.FCStd")]
+    for change, reads in (("", 4), ("", 0), ("d.FCStd", 1)):
+        if change:
+            assembly("d", {"a.FCStd": 3, "b.FCStd": 1}).save(vault / change)
+        with Index(index, contents=Contents(clock=later)) as memory:
+            reading = Reading(memory)
+            found = [answer.known.answer for answer in reading.ask_many(asked)]
+            assert found == [Session().ask(question).answer for question in asked]
+            assert reading.reads == reads
 
 
 def test_a_file_that_was_only_touched_is_known_by_its_content(vault: Path, tmp_path: Path) -> None:

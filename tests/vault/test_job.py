@@ -26,7 +26,7 @@ from silo.testing import FakeSilo
 from silo.vault.index import Index
 from silo.vault.job import Job
 from silo.vault.plan import make_plan
-from silo.vault.reading import Pool, Question, Reading, ask_all, pool_of
+from silo.vault.reading import Pool, Question, Reading, pool_of, work
 
 
 def write(folder: Path, silo: FakeSilo | None, assemblies: dict[int, dict[int, int]], parts: int = 4) -> None:
@@ -238,10 +238,10 @@ def test_a_worker_that_dies_costs_its_task_only(tmp_path: Path) -> None:
     assert Dying.deaths > 4
 
 
-def _kill_some(questions: Any, run: str) -> Any:
+def _kill_some(questions: Any, supplies: Any, run: str) -> Any:
     if any("a107" in question.path for question in questions):
         os.kill(os.getpid(), signal.SIGKILL)
-    return ask_all(questions, run)
+    return work(questions, supplies, run)
 
 
 class Killing(ProcessPoolExecutor):
@@ -263,10 +263,17 @@ def test_a_file_that_kills_every_reader_is_named_and_the_others_are_read(tmp_pat
 
 
 def test_processes_give_the_same_answers(tmp_path: Path) -> None:
-    """To the byte and in order."""
+    """To the byte and in order; and each file is read once, whoever needs it."""
     write(tmp_path, FakeSilo(), {100 + n: {n % 4: n + 1} for n in range(12)})
-    with pool_of(2, worth=0) as pool:
-        assert answers(tmp_path, pool) == answers(tmp_path, None)
+    tops = documents_in([str(tmp_path)])
+    for jobs in (2, 1):
+        with pool_of(jobs, worth=0) as pool, Index(None) as memory:
+            if pool is not None:
+                pool.chunk = 3
+            reading = Reading(memory, pool)
+            found = [one.known.answer for one in reading.ask_many(Question(top) for top in tops)]
+        assert found == answers(tmp_path, None)
+        assert reading.reads == len(tops)
 
 
 def test_a_dask_cluster_gives_the_same_answers(tmp_path: Path) -> None:

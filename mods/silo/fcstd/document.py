@@ -19,16 +19,17 @@ from silo.fcstd.inflate import Inflater
 from silo.fcstd.locate import Found
 from silo.fcstd.objects import FcstdObject
 from silo.fcstd.problem import FcstdError
-from silo.fcstd.properties import Properties
+from silo.fcstd.properties import Kept, Properties
 from silo.fcstd.typetree import ancestors, is_listed
 from silo.fcstd.values import ABSENT, LocalList, Ref, Vector
 from silo.fcstd.xmltext import XmlText
 
 if TYPE_CHECKING:
-    from silo.fcstd.library import Content, Library
+    from silo.fcstd.library import Content, Library, Remembered
 
 # Objects of these types are read together with the rest of their file, for a walker looks at what they hold.
 _CONTAINERS = frozenset({"App::Part", "App::LinkGroup", "App::DocumentObjectGroup"})
+_GEOMETRY = frozenset({Kind.LOCAL, Kind.NOTHING, Kind.FOLDER})
 # What a target is and which item it is: without these a link to it would only be guessed at.
 _SAID_OF_ITSELF = ("SiloItemId", "SiloUUID", "Type")
 _BREP_TEXT = (b"CASCADE Topology", b"DBRep_DrawableShape")
@@ -36,7 +37,7 @@ _SIZE = Struct("<I")
 _DOUBLES, _FLOATS = Struct("<3d"), Struct("<3f")
 
 
-class _FileSurvey(Survey):
+class FileSurvey(Survey):
     """Objects by kind, most of them known by their type alone."""
 
     def __init__(self, document: FcstdDocument, xml: XmlText) -> None:
@@ -51,6 +52,7 @@ class _FileSurvey(Survey):
             for name, type_id in types.items()
         }
         self._there = set(self._kinds.values())
+        self._groups: list[tuple[Kind, tuple[str, ...]]] | None = None
 
     def of(self, kinds: Set[Kind], but: Set[str] = frozenset()) -> list[tuple[Any, Kind]]:
         if self._there.isdisjoint(kinds):
@@ -63,11 +65,17 @@ class _FileSurvey(Survey):
         ]
 
     def grouped(self, kinds: Set[Kind]) -> set[str]:
-        names: set[str] = set()
-        for obj, _ in self.of(kinds, self._kinds.keys() - self._xml.mentioning("Group")):
-            group = obj.properties.value("Group")
-            names.update(group.names if isinstance(group, LocalList) else ())
-        return names
+        if self._groups is None:
+            groups = [
+                obj for obj, _ in self.of(set(Kind), self._kinds.keys() - self._xml.mentioning("Group"))
+            ]
+            found = [(self._kinds[obj.Name], obj.properties.value("Group")) for obj in groups]
+            self._groups = [(kind, group.names) for kind, group in found if isinstance(group, LocalList)]
+        return {name for kind, names in self._groups if kind in kinds for name in names}
+
+    def only(self, kinds: Set[Kind]) -> bool:
+        """True where there are no objects but of these kinds."""
+        return self._there <= kinds
 
     def has_python(self) -> bool:
         return any(type_id.endswith("FeaturePython") for type_id in self._types)
@@ -82,15 +90,18 @@ class FcstdDocument:
 
     FileName: str
 
-    def __init__(self, library: Library, found: Found, content: Content) -> None:
+    def __init__(self, library: Library, found: Found, content: Content | Remembered) -> None:
         self.FileName = found.real
-        self._library, self._found, self._xml = library, found, content.xml
-        self._directory, self.state = content.directory, content.state
-        self.content = content
+        self._library, self._found = library, found
+        self.content, self.state = content, content.state
         self._table: Properties | None = None
         self._objects: dict[str, FcstdObject] = {}
         self._targets: dict[tuple[str, str], FcstdObject | LinkProblem] = {}
         self.values: dict[bytes, Any] = {}
+
+    @cached_property
+    def _xml(self) -> XmlText:
+        return self.content.xml
 
     @cached_property
     def Label(self) -> str:
@@ -134,10 +145,10 @@ class FcstdDocument:
         return self.members(self._xml.head.types)
 
     @cached_property
-    def survey(self) -> Survey:
+    def survey(self) -> FileSurvey:
         """The objects by what they are; only those that somebody asks for are made."""
         self.complete()
-        return _FileSurvey(self, self._xml)
+        return FileSurvey(self, self._xml)
 
     @property
     def PropertiesList(self) -> tuple[str, ...]:
@@ -147,9 +158,15 @@ class FcstdDocument:
     def getObject(self, name: str) -> FcstdObject | None:
         """The object of this ``Name`` (never a label), None where there is none."""
         known = self._objects.get(name)
-        if known is None and (kind := self._xml.head.types.get(name)) is not None:
+        if known is None and (kind := self._type_of(name)) is not None:
             known = self.object_of(name, kind)
         return known
+
+    def _type_of(self, name: str) -> str | None:
+        facts = self.content.facts
+        if facts is not None and name in facts.objects:
+            return facts.objects[name][0]
+        return self._xml.head.types.get(name)
 
     def getPropertyByName(self, name: str) -> Any:
         """A document property. AttributeError where there is none, or none with a plain value."""
@@ -167,6 +184,10 @@ class FcstdDocument:
     def __repr__(self) -> str:
         return f"<document {self.FileName}>"
 
+    def linked(self) -> set[str]:
+        """The recorded paths of linked files, about, where it holds more than geometry."""
+        return set() if self.survey.only(_GEOMETRY) else self._xml.linked()
+
     # For the objects of this document and the session; a walker has no use for what follows.
 
     def complete(self) -> None:
@@ -182,7 +203,8 @@ class FcstdDocument:
 
     def check(self, target: FcstdObject) -> None:
         """Make sure that what a walker asks of a link's target can be read. Raises DocumentError."""
-        if not _CONTAINERS.isdisjoint(ancestors(target.TypeId)):
+        # Facts are those of a file that was read to its end.
+        if self.content.facts is None and not _CONTAINERS.isdisjoint(ancestors(target.TypeId)):
             self._xml.complete()
         numbers = target.properties.numbers
         for name in _SAID_OF_ITSELF:
@@ -194,11 +216,21 @@ class FcstdDocument:
     def properties(self) -> Properties:
         """The property table of the document itself."""
         if self._table is None:
-            self._table = Properties(self._xml, self._xml.head.properties, "")
+            facts = self.content.facts
+            self._table = self._whole() if facts is None else Kept(*facts.document, self._whole)
         return self._table
+
+    def _whole(self) -> Properties:
+        return Properties(self._xml, self._xml.head.properties, "")
 
     def properties_of(self, obj: FcstdObject) -> Properties:
         """The property table of an object of this document."""
+        facts = self.content.facts
+        if facts is not None and obj.Name in facts.objects:
+            return Kept(*facts.objects[obj.Name][1:], lambda: self._whole_of(obj))
+        return self._whole_of(obj)
+
+    def _whole_of(self, obj: FcstdObject) -> Properties:
         span = self._xml.span(obj.Name)
         if span is None:
             raise self._xml.error(f"does not hold the data of the object {obj.Name!r}")
@@ -255,7 +287,7 @@ class FcstdDocument:
     @cached_property
     def _entries(self) -> dict[bytes, Entry]:
         try:
-            return {entry.name: entry for entry in self._directory.entries()}
+            return {entry.name: entry for entry in self.content.directory.entries()}
         except ValueError as error:
             raise FcstdError(self.FileName, str(error)) from error
 

@@ -3,23 +3,32 @@
 
 from __future__ import annotations
 
+import json
 import os
 import time
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
 
 from silo.bom.document import LinkProblem
 from silo.bom.findings import FindingCode
+from silo.bom.walk.kinds import Kind
 from silo.fcstd.container import DOCUMENT_XML, ContainerFile, Directory, FileState
 from silo.fcstd.document import FcstdDocument
 from silo.fcstd.limits import Limits
 from silo.fcstd.locate import Found, Locator, NotFound
 from silo.fcstd.objects import FcstdObject
 from silo.fcstd.problem import FcstdError
+from silo.fcstd.properties import to_keep
 from silo.fcstd.values import Ref
 from silo.fcstd.xmltext import Shared, XmlText
+
+# Which objects of a file its facts tell of: what may be a component, and lies in nothing else.
+_TARGETS = frozenset(Kind) - {Kind.NOTHING, Kind.FOLDER, Kind.LINK, Kind.ASSEMBLY_LINK, Kind.ELEMENT}
+_TARGETS_AT_MOST = 24
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,9 +53,84 @@ class Content:
         return self.xml.digest(self.directory.raw)
 
     @property
+    def facts(self) -> None:
+        """Nothing is known of it that could spare reading it."""
+        return None
+
+    @property
     def size(self) -> int:
         """Bytes that stay in memory, about; unpacked text is counted elsewhere."""
         return self.xml.packed_size + 2 * len(self.directory.raw) + 300 * self.directory.entry_count
+
+
+class Facts(NamedTuple):
+    """What a file was found to say of itself: enough for most links to it. Goes through JSON.
+
+    document
+        names and kept pieces of the document's own properties.
+    objects
+        name → (type, names, kept pieces), of those that links most likely mean.
+    """
+
+    digest: str
+    state: FileState
+    changed_ns: int
+    read_ns: int
+    document: tuple[Sequence[str], Mapping[str, str]]
+    objects: Mapping[str, tuple[str, Sequence[str], Mapping[str, str]]]
+
+
+class Remembered:
+    """The content of a file of which facts are known. It is read where they say too little.
+
+    Raises FcstdError then where the file is another one by now.
+    """
+
+    def __init__(self, path: str, facts: str, contents: Contents) -> None:
+        self._path, self._contents = path, contents
+        known = Facts(*json.loads(facts))
+        self.facts = known
+        self.digest, self.changed_ns, self.read_ns = known.digest, known.changed_ns, known.read_ns
+        self.state = FileState(*known.state)
+
+    @cached_property
+    def _content(self) -> Content:
+        found = self._contents.read(self._path)
+        if found.digest != self.digest:
+            raise FcstdError(self._path, "it is being written just now; try again", state=self.state)
+        return found
+
+    @property
+    def xml(self) -> XmlText:
+        """The text."""
+        return self._content.xml
+
+    @property
+    def directory(self) -> Directory:
+        """The directory of the container."""
+        return self._content.directory
+
+
+def facts_of(document: FcstdDocument) -> str:
+    """The facts of a document that was read to its end, as JSON; "" where none can be given."""
+    content = document.content
+    if content.facts is not None or content.xml.is_careful:
+        return ""
+    try:
+        survey = document.survey
+        targets = survey.of(_TARGETS, survey.grouped(_TARGETS))[:_TARGETS_AT_MOST]
+        objects = {obj.Name: (obj.TypeId, *to_keep(obj.properties)) for obj, _ in targets}
+        facts = Facts(
+            content.digest,
+            content.state,
+            content.changed_ns,
+            content.read_ns,
+            to_keep(document.properties),
+            objects,
+        )
+    except (FcstdError, UnicodeDecodeError):  # who asks for it gets the error
+        return ""
+    return json.dumps(facts, separators=(",", ":"))
 
 
 class Contents:
@@ -81,12 +165,22 @@ class Contents:
             return known
         found = self._read(path)
         self.reads += 1
-        self._known[path] = found
-        self._size += found.size
+        self._keep(path, found)
+        return found
+
+    def _keep(self, path: str, content: Content) -> None:
+        if (before := self._known.pop(path, None)) is not None:
+            self._size -= before.size
+        self._known[path] = content
+        self._size += content.size
         while self._size > self.limits.resident and len(self._known) > 1:
             _, oldest = self._known.popitem(last=False)
             self._size -= oldest.size
-        return found
+
+    def add(self, path: str, content: Content) -> None:
+        """Take what another process has read."""
+        content.xml.shared = self.shared
+        self._keep(path, content)
 
     def _read(self, path: str) -> Content:
         read_ns = self._clock()
@@ -110,6 +204,8 @@ class Library:
         limit, for projects use ``../`` freely.
     contents
         what was read before, by other sessions.
+    facts
+        path → the :class:`Facts` of a file as it is now, as JSON; "" where they are not known.
     notes
         what was taken in another way than recorded (a file name in other case), in plain words.
     documents, lookups
@@ -125,6 +221,7 @@ class Library:
         limits: Limits | None = None,
         contents: Contents | None = None,
         locator: Locator | None = None,
+        facts: Callable[[str], str] = lambda _path: "",
     ) -> None:
         self.limits = limits or Limits()
         self.notes: list[str] = []
@@ -132,6 +229,7 @@ class Library:
         self.lookups: dict[tuple[tuple[str, ...], str], Found | NotFound] = {}
         self._locator = locator or Locator(None if root is None else os.fspath(root))
         self._contents = contents or Contents(self.limits)
+        self._facts = facts
 
     def __enter__(self) -> Library:
         return self
@@ -194,6 +292,8 @@ class Library:
     def _load(self, found: Found) -> FcstdDocument | FcstdError:
         if len(self.documents) >= self.limits.documents:
             return FcstdError(found.real, f"more than {self.limits.documents} files are not read in one go")
+        if facts := self._facts(found.real):
+            return FcstdDocument(self, found, Remembered(found.real, facts, self._contents))
         try:
             try:
                 return FcstdDocument(self, found, self._contents.read(found.real))

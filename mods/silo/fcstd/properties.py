@@ -9,7 +9,7 @@ first.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from silo.fcstd import careful
@@ -50,6 +50,9 @@ _KEPT = frozenset(
     }
 )
 
+# What lies in a target is asked for only where a link names an object inside it.
+_NOT_OF_TARGETS = frozenset({"ElementList", "Group"})
+
 
 class Shape(NamedTuple):
     """A list of property names that many objects share. Piece 0 is what stands before the first property."""
@@ -75,10 +78,10 @@ _NOTHING = Shape.of((), b"")
 class Properties:
     """The property table of one element of a document's XML. Reading may raise FcstdError."""
 
-    __slots__ = ("_careful", "_span", "_xml", "kept", "names", "numbers")
+    __slots__ = ("_careful", "_decode", "_span", "_xml", "kept", "names", "numbers")
 
     def __init__(self, xml: XmlText, span: Span | None, kind: str) -> None:
-        self._xml, self._span = xml, span or (0, 0)
+        self._xml, self._span, self._decode = xml, span or (0, 0), xml.decode
         self._careful = xml.is_careful
         if span is None:  # a foreign document may have no properties of its own
             shape, pieces = _NOTHING, [b""]
@@ -111,7 +114,7 @@ class Properties:
             return ABSENT
         piece = self.piece(name)
         if (members := _MEMBERS.match(piece)) is not None:
-            return LocalList(tuple(_MEMBER.findall(self._xml.decode(members[1]))))
+            return LocalList(tuple(_MEMBER.findall(self._decode(members[1]))))
         return value_of(self._node(piece))
 
     def _cut(self) -> list[bytes]:
@@ -143,7 +146,7 @@ class Properties:
 
     def _node(self, piece: bytes) -> Node:
         if (found := _CANONICAL.match(piece)) is not None:
-            name, kind, tag, attributes, inner = (self._xml.decode(part or b"") for part in found.groups())
+            name, kind, tag, attributes, inner = (self._decode(part or b"") for part in found.groups())
             children = [Node(child, dict(_ATTRIBUTE.findall(own))) for child, own in _CHILD.findall(inner)]
             value = Node(tag, dict(_ATTRIBUTE.findall(attributes)), children)
             return Node("Property", {"name": name, "type": kind}, [value])
@@ -154,3 +157,44 @@ class Properties:
             return careful.parse_value(piece, self._xml.limits.depth)
         except Malformed as error:
             raise self._xml.malformed(error) from error
+
+
+def _utf8(raw: bytes) -> str:
+    return raw.decode()
+
+
+class Kept(Properties):
+    """The table of an object in a file that was read before; the file is read where it says too little.
+
+    pieces
+        of the properties that a walker asks of a link's target.
+    whole
+        reads the file.
+    """
+
+    __slots__ = ("_whole",)
+
+    def __init__(
+        self, names: Sequence[str], pieces: Mapping[str, str], whole: Callable[[], Properties]
+    ) -> None:
+        self._careful, self._decode, self._whole = False, _utf8, whole
+        self.names = tuple(names)
+        self.numbers = dict.fromkeys(self.names, 0)
+        self.kept = {name: piece.encode() for name, piece in pieces.items()}
+
+    def piece(self, name: str) -> bytes:
+        piece = self.kept.get(name)
+        return self._whole().piece(name) if piece is None else piece
+
+    def value(self, name: str) -> Any:
+        if name not in self.numbers:
+            return ABSENT
+        piece = self.kept.get(name, b"")
+        return super().value(name) if _CANONICAL.match(piece) else self._whole().value(name)
+
+
+def to_keep(table: Properties) -> tuple[tuple[str, ...], dict[str, str]]:
+    """What :class:`Kept` is made of. Raises UnicodeDecodeError."""
+    return table.names, {
+        name: piece.decode() for name, piece in table.kept.items() if name not in _NOT_OF_TARGETS
+    }

@@ -16,7 +16,8 @@ from bisect import bisect_right
 from collections.abc import Callable, Set
 from hashlib import sha256
 from itertools import accumulate, pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+from xml.sax.saxutils import unescape
 
 from silo.fcstd import careful
 from silo.fcstd.careful import Head, Malformed, Span
@@ -39,6 +40,7 @@ _OBJECT_TYPE = re.compile(rb'<Object type="([^"&]+)" name="([^"&]+)"')
 _OBJECT_DATA = re.compile(rb"</Objects>\s*<ObjectData" + _ATTRIBUTES + rb">")
 _OBJECT = re.compile(rb'\s*<Object name="([^"&]+)"' + _ATTRIBUTES + rb">")
 _CLOSING = b"</Object>"
+_LINKED = re.compile(rb'<XLink(?:Sub)?\s[^<>]*?\bfile="([^"<]+)"')
 _TAIL = re.compile(rb"\s*</ObjectData>\s*</Document>\s*\Z")
 
 # The first step holds the head and the object of a small part; then bigger ones, since more was needed.
@@ -71,8 +73,10 @@ class Shared:
 class XmlText:
     """The text of one Document.xml. All its methods may raise FcstdError."""
 
-    def __init__(self, path: str, entry: Entry, packed: bytes, limits: Limits, shared: Shared) -> None:
-        self.path, self.limits, self.shared = path, limits, shared
+    def __init__(
+        self, path: str, entry: Entry, packed: bytes, limits: Limits, shared: Shared | None = None
+    ) -> None:
+        self.path, self.limits, self.shared = path, limits, shared or Shared(limits.resident)
         self._entry, self._packed = entry, packed
         self._inflater: Inflater
         self._text: bytes | None = b""
@@ -85,6 +89,10 @@ class XmlText:
         self._failure: FcstdError | None = None
         self._sound: Malformed | bool | None = None  # expat's word on the whole, once a piece was refused
         self.is_careful = False
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """To another process goes what was read, not what was made of it."""
+        return XmlText, (self.path, self._entry, self._packed, self.limits)
 
     @property
     def text(self) -> bytes:
@@ -298,6 +306,10 @@ class XmlText:
             found.add(names[number])
             at = text.find(wanted, ends[number])
         return found
+
+    def linked(self) -> set[str]:
+        """The recorded paths of linked files, about; of a text that was read to its end."""
+        return {unescape(self.decode(path)) for path in _LINKED.findall(self.text)}
 
     def _read_carefully(self) -> None:
         text = self.text + self._inflater.rest()

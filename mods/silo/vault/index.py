@@ -25,35 +25,33 @@ import logging
 import os
 import sqlite3
 import time
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from functools import cache
-from hashlib import blake2b, sha256
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from hashlib import blake2b
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, BinaryIO
 
-import silo.bom
-import silo.fcstd
 from silo.bom.errors import InputError
 from silo.durable import remove_patiently
-from silo.fcstd.container import FileState
-from silo.fcstd.library import Content, Contents, Library
-from silo.fcstd.locate import Found, Locator, NotFound
+from silo.fcstd.library import Contents, Facts
+from silo.fcstd.locate import Locator
 from silo.fcstd.problem import FcstdError
 from silo.folders import cache_folder
 from silo.platform import hold_lock
+from silo.vault.answers import FORMAT, Known, Seen, engine, json_of, led_to
 
 log = logging.getLogger("silo.vault")
 
-FORMAT = 1
 _APPLICATION = 0x51107A11  # marks our databases (SQLite's application_id)
 _MAGIC = b"SQLite format 3\0"
-_SETTLED_NS = 2_500_000_000  # FAT has ticks of 2 s, the coarsest in use
 _KEPT_S = 30 * 24 * 3600.0
 _BUSY_S = 10.0
 _SAVED_EACH = 500
+_ANSWERS = "SELECT path, answer, trail, mark FROM answers"
+_VARIABLES = 250  # of one statement; SQLite takes at least 999
 
 _TABLES = """
 CREATE TABLE files (path TEXT PRIMARY KEY, seen TEXT NOT NULL, mark BLOB NOT NULL) WITHOUT ROWID;
+CREATE TABLE facts (path TEXT PRIMARY KEY, facts TEXT NOT NULL, mark BLOB NOT NULL);
 CREATE TABLE answers (
     path TEXT NOT NULL, question TEXT NOT NULL, answer TEXT NOT NULL, trail TEXT NOT NULL,
     made_at REAL NOT NULL, mark BLOB NOT NULL, PRIMARY KEY (path, question)
@@ -65,121 +63,6 @@ CREATE TABLE places (vault TEXT, uuid TEXT, path TEXT, PRIMARY KEY (vault, uuid,
 def default_path() -> Path:
     """The user's index."""
     return cache_folder() / "documents.sqlite3"
-
-
-@cache
-def engine() -> str:
-    """A name for the code that reads documents: another one where any of it differs."""
-    digest = sha256(f"{FORMAT}".encode())
-    for package in (silo.bom, silo.fcstd):
-        for folder in package.__path__:
-            for file in sorted(Path(folder).rglob("*.py")):
-                digest.update(file.name.encode() + b"\0" + file.read_bytes())
-    return digest.hexdigest()[:16]
-
-
-class Seen(NamedTuple):
-    """A file at the time of a look. ``content`` begins with "!" for a file that could not be read."""
-
-    content: str
-    inode: int
-    size: int
-    modified_ns: int
-    changed_ns: int
-    read_ns: int
-
-    @classmethod
-    def of(cls, content: Content) -> Seen:
-        """What was read."""
-        state = content.state
-        return cls(
-            content.digest,
-            state.inode,
-            state.size,
-            state.modified_ns,
-            content.changed_ns,
-            content.read_ns,
-        )
-
-    @classmethod
-    def unread(cls, error: FcstdError) -> Seen | None:
-        """What could not be read: known by its state, so that any change of it counts. None without one."""
-        state = error.state
-        if not isinstance(state, FileState):
-            return None
-        content = f"!{state.inode}:{state.size}:{state.modified_ns}:{error.reason}"
-        return cls(content, state.inode, state.size, state.modified_ns, 0, 0)
-
-    def still(self, status: os.stat_result) -> bool:
-        """True where the file certainly is what it was then."""
-        then = (self.inode, self.size, self.modified_ns, self.changed_ns)
-        now = (status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns)
-        return then == now and max(self.modified_ns, self.changed_ns) + _SETTLED_NS < self.read_ns
-
-
-class Known(NamedTuple):
-    """An answer with its trail; it travels between processes and machines.
-
-    answer
-        JSON.
-    trail
-        JSON: [{path: content}, [[folders in which links' paths begin, {recorded path: where it leads}], …]].
-    seen
-        path → the file when it was read; empty where the answer comes from the index.
-    lasting
-        False where the answer must not be kept: a file was being written, or its state is not known.
-    """
-
-    answer: str
-    trail: str
-    seen: Mapping[str, Seen] = {}
-    lasting: bool = True
-
-    @classmethod
-    def found_in(cls, library: Library, answer: Any) -> Known:
-        """An answer that was found in a session which did nothing else."""
-        seen: dict[str, Seen] = {}
-        lasting = True
-        for path, document in library.documents.items():
-            if not isinstance(document, FcstdError):
-                seen[path] = Seen.of(document.content)
-            elif (unread := Seen.unread(document)) is not None:
-                seen[path] = unread
-            else:
-                lasting = False
-        led: dict[tuple[str, ...], dict[str, str]] = {}
-        for (folders, recorded), found in library.lookups.items():
-            led.setdefault(folders, {})[recorded] = _led_to(found)
-        files = {path: one.content for path, one in seen.items()}
-        return cls(_json(answer), _json([files, list(led.items())]), seen, lasting)
-
-    @property
-    def links(self) -> frozenset[str]:
-        """The files that links lead to, counted or not; of those that are not there what is recorded."""
-        files, lookups = json.loads(self.trail)
-        found = {
-            _target(to) or os.path.normpath(os.path.join(folders[-1], recorded))
-            for folders, led in lookups
-            for recorded, to in led.items()
-        }
-        return frozenset(found) - {next(iter(files), "")}
-
-
-def _led_to(found: Found | NotFound) -> str:
-    if isinstance(found, NotFound):
-        return f"!{found.code}:{found.detail}"
-    if found.opened == found.real and not found.respelt:
-        return found.real
-    return f"{found.opened}\0{found.real}\0{found.respelt}"
-
-
-def _target(led: str) -> str | None:
-    return None if led.startswith("!") else (led.split("\0") * 2)[1]
-
-
-def _json(value: Any) -> str:
-    # Escaped: a file's name need not be valid Unicode, and SQLite takes nothing else.
-    return json.dumps(value, separators=(",", ":"))
 
 
 def _mark(*texts: str) -> bytes:
@@ -207,6 +90,7 @@ class Index:
         self._led: dict[tuple[tuple[str, ...], str], str] = {}
         self._locator = Locator()
         self._unsaved: dict[tuple[str, str], Known] = {}
+        self._facts: dict[str, str] = {}
         self._files: dict[str, Seen] = {}
         self._rows: dict[str, tuple[str, bytes]] = {}
         self._expected = ""
@@ -233,40 +117,75 @@ class Index:
 
     def recall(self, path: str, question: str) -> Known | None:
         """The answer to a question about a file; None where it must be found out (again)."""
-        known = self._unsaved.get((path, question)) or self._row(path, question)
-        if known is None:
-            return None
+        return next(self.recall_all([(path, question)]))
+
+    def recall_all(self, asked: Sequence[tuple[str, str]]) -> Iterator[Known | None]:
+        """The same for several questions, in their order."""
+        rows: dict[tuple[str, str], tuple[str, str, bytes]] = {}
+        for question in dict.fromkeys(question for _, question in asked):
+            paths = [_text(path) for path, one in asked if one == question]
+            found = self._select_in(f"{_ANSWERS} WHERE question = ? AND path IN", paths, question)
+            rows |= {(path, question): row for path, *row in found}
+        for path, question in asked:
+            known = self._unsaved.get((path, question))
+            answer, trail, mark = rows.get((_text(path), question), ("", "", b""))
+            if known is None and mark and mark == _mark(path, question, answer, trail):
+                known = Known(answer, trail)
+            yield known if known is not None and self._holds(known) else None
+
+    def _holds(self, known: Known) -> bool:
         files, lookups = json.loads(known.trail)
         if not all(self.content(file) == content for file, content in files.items()):
-            return None
+            return False
+        plainly = self._locator.leads_plainly
         for folders, led in lookups:
             start = tuple(folders)
-            if any(self._leads(start, recorded) != to for recorded, to in led.items()):
-                return None
-        return known
-
-    def _row(self, path: str, question: str) -> Known | None:
-        rows = self._select(
-            "SELECT answer, trail, mark FROM answers WHERE path = ? AND question = ?", _text(path), question
-        )
-        found = rows[0] if rows else None
-        if found is None or found[2] != _mark(path, question, found[0], found[1]):
-            return None
-        return Known(found[0], found[1])
+            for recorded, to in led.items():
+                if not plainly(recorded, start, to) and self._leads(start, recorded) != to:
+                    return False
+        return True
 
     def remember(self, path: str, question: str, known: Known) -> None:
         """Keep an answer; on disk with the next :meth:`save`."""
         if not known.lasting:
             return
         for file, seen in known.seen.items():
-            before = self._now.get(file)
-            if before is None or before.content != seen.content:
-                self._now[file] = seen
-                if not seen.content.startswith("!"):
-                    self._files[file] = seen
+            self._note(file, seen)
         self._unsaved[path, question] = Known(known.answer, known.trail)
         if len(self._unsaved) >= _SAVED_EACH:
             self.save()
+
+    def _note(self, file: str, seen: Seen) -> None:
+        before = self._now.get(file)
+        if before is None or before.content != seen.content:
+            self._now[file] = seen
+            if not seen.content.startswith("!"):
+                self._files[file] = seen
+
+    def remember_facts(self, path: str, facts: str) -> None:
+        """Keep the facts of a file as it was read."""
+        known = Facts(*json.loads(facts))
+        _, inode, size, modified_ns = known.state
+        self._note(path, Seen(known.digest, inode, size, modified_ns, known.changed_ns, known.read_ns))
+        self._facts[path] = facts
+        if len(self._facts) >= _SAVED_EACH:
+            self.save()
+
+    def facts(self, paths: Sequence[str]) -> dict[str, str]:
+        """The facts of these files, of those that are what they were then."""
+        found = {path: self._facts[path] for path in paths if path in self._facts}
+        rows = {
+            path: (facts, mark)
+            for path, facts, mark in self._select_in(
+                "SELECT path, facts, mark FROM facts WHERE path IN",
+                [_text(path) for path in paths if path not in found],
+            )
+        }
+        for path in paths:
+            facts, mark = rows.get(_text(path), ("", b""))
+            if facts and mark == _mark(engine(), path, facts):
+                found[path] = facts
+        return {path: text for path, text in found.items() if text.startswith(f'["{self.content(path)}"')}
 
     def content(self, path: str) -> str | None:
         """What a file holds now, as the trails name it; None where nobody can say."""
@@ -293,7 +212,7 @@ class Index:
     def _leads(self, folders: tuple[str, ...], recorded: str) -> str:
         key = (folders, recorded)
         if (known := self._led.get(key)) is None:
-            known = self._led[key] = _led_to(self._locator.find(recorded, folders))
+            known = self._led[key] = led_to(self._locator.find(recorded, folders))
         return known
 
     def untouched(self, path: str) -> bool:
@@ -329,6 +248,7 @@ class Index:
         gone = [path for (path,) in rows if path not in but]
         self._write(
             ("DELETE FROM files WHERE path = ?", [(path,) for path in gone]),
+            ("DELETE FROM facts WHERE path = ?", [(path,) for path in gone]),
             ("DELETE FROM answers WHERE path = ?", [(path,) for path in gone]),
             (
                 "DELETE FROM answers WHERE made_at < ? AND substr(question, 1, 16) <> ?",
@@ -340,22 +260,25 @@ class Index:
 
     def save(self) -> None:
         """Write what is not yet on disk, all or nothing."""
-        if not self._writes or not (self._unsaved or self._files):
+        if not self._writes or not (self._unsaved or self._files or self._facts):
             return
         now = time.time()
         files = [
             (_text(path), text, _mark(path, text))
-            for path, text in ((path, _json(seen)) for path, seen in self._files.items())
+            for path, text in ((path, json_of(seen)) for path, seen in self._files.items())
         ]
         answers = [
             (_text(path), question, one.answer, one.trail, now, _mark(path, question, one.answer, one.trail))
             for (path, question), one in self._unsaved.items()
         ]
+        facts = [(_text(path), text, _mark(engine(), path, text)) for path, text in self._facts.items()]
         if self._write(
             ("INSERT OR REPLACE INTO files VALUES (?, ?, ?)", files),
+            ("INSERT OR REPLACE INTO facts VALUES (?, ?, ?)", facts),
             ("INSERT OR REPLACE INTO answers VALUES (?, ?, ?, ?, ?, ?)", answers),
         ):
             self._files.clear()
+            self._facts.clear()
             self._unsaved.clear()
 
     def _known_file(self, path: str) -> Seen | None:
@@ -384,6 +307,13 @@ class Index:
         except sqlite3.Error as error:
             self._give_up(error)
             return []
+
+    def _select_in(self, statement: str, paths: Sequence[str], *values: str) -> Iterator[Any]:
+        """Rows whose path is one of these; ``statement`` ends with ``IN``."""
+        for at in range(0, len(paths), _VARIABLES):
+            some = paths[at : at + _VARIABLES]
+            marks = ",".join("?" * len(some))
+            yield from self._select(f"{statement} ({marks})", *values, *some)
 
     def _write(self, *changes: tuple[str, Sequence[tuple[Any, ...]]]) -> bool:
         if not self._writes:

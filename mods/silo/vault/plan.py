@@ -124,14 +124,14 @@ def make_plan(
         if isinstance(error := _error(answer), SiloError):
             plan.errors[top] = error
             continue
-        node = _node(answer, top)
-        plan._files.setdefault(node.key[0], top)
+        head, _ = _rows(answer.plain)
+        plan._files.setdefault(head["doc_path"], top)
         if skip_parts and _is_part(answer.plain):
             plan.parts += 1
-            plan.spares.add(((node.uuid or "").lower(), node.key[0]))
-            plan._assemblies.setdefault(node.key, node.is_assembly)
+            plan.spares.add(((head["silo_uuid"] or "").lower(), head["doc_path"]))
+            plan._assemblies.setdefault((head["doc_path"], head["object_name"]), head["is_assembly"])
         else:
-            _add(plan, node, answer, wanted)
+            _add(plan, _node(answer, top), answer, wanted)
     while recursive and (asked := {key: top for key, top in wanted.items() if key not in plan._assemblies}):
         wanted.clear()
         questions = [Question(path, name, hardware, name_only=True) for path, name in asked]

@@ -2,9 +2,11 @@
 """Reading many files: each question about a file once, from the index or by any executor.
 
 A question has a file and a kind: the whole BOM below its assembly, or that one assembly alone. It is answered
-in a session of its own, so that the answer's trail is exactly what the session has read; what files hold is
-shared between the sessions of a worker. Work travels as chunks of neighbouring files, for files of one folder
-use each other. Answers come back in the order of the questions, whoever found them.
+in a session of its own, so that the answer's trail is exactly what the session has read.
+
+Many questions are answered in two steps, each spread over the executor. First every file is read, once: that
+gives its facts, and the answer where it links to no other. Then the assemblies are walked, with the facts of
+what they link to in place of the files. Answers come back in the order of the questions, whoever found them.
 """
 
 from __future__ import annotations
@@ -13,16 +15,17 @@ import json
 import os
 import signal
 import threading
+import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import islice
 from multiprocessing import get_all_start_methods, get_context, parent_process
-from typing import Any
+from typing import Any, NamedTuple, TypeVar
 from uuid import uuid4
 
 from silo.bom.errors import DocumentError, InputError, SiloError
@@ -31,11 +34,17 @@ from silo.bom.links import extract
 from silo.bom.model import Extraction
 from silo.bom.roots import choose_assembly
 from silo.bom.snapshot import from_plain, to_plain
-from silo.fcstd.library import Contents, Library
-from silo.fcstd.locate import Locator
-from silo.vault.index import Index, Known, engine
+from silo.fcstd.library import Content, Contents, Library, facts_of
+from silo.fcstd.locate import Found, Locator
+from silo.vault.answers import Known, engine
+from silo.vault.index import Index
 
+T = TypeVar("T")
 CHUNK = 64
+# Questions that are worked on together; of the files of others an assembly has no facts yet.
+_TOGETHER = 20_000
+# Bytes of assemblies' files that are kept from the first step to the second.
+_HELD = 48 << 20
 # A worker process costs some 0.3 s to start; reading a file some milliseconds.
 _WORTH_A_POOL = 128
 _TRIES = 3
@@ -98,6 +107,31 @@ class Answer:
 # --- in the worker --------------------------------------------------------------------------------------
 
 
+class First(NamedTuple):
+    """What reading one file gave.
+
+    known
+        the answer; None where that needs other files.
+    facts
+        of the file, "" where there are none.
+    content, linked
+        where there is no answer yet: the file itself, and the files that it links to.
+    """
+
+    known: Known | None
+    facts: str = ""
+    content: Content | None = None
+    linked: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Supplies:
+    """What is known already of the files that some questions need: contents, and facts."""
+
+    contents: Mapping[str, Content] = field(default_factory=dict)
+    facts: Mapping[str, str] = field(default_factory=dict)
+
+
 class Session:
     """What a worker keeps between questions."""
 
@@ -105,38 +139,74 @@ class Session:
         self.contents = contents or Contents()
         self.locator = Locator()
 
-    def ask(self, question: Question) -> Known:
+    def ask(self, question: Question, facts: Callable[[str], str] = lambda _path: "") -> Known:
         """The answer with its trail."""
+        library = Library(contents=self.contents, locator=self.locator, facts=facts)
+        return Known.found_in(library, self._answer(library, question))
+
+    def read(self, question: Question) -> First:
+        """The file of a question, and the answer where no other file is needed for it."""
         library = Library(contents=self.contents, locator=self.locator)
-        plain: dict[str, Any]
+        facts, linked = "", set[str]()
+        try:
+            document = library.open(question.path)
+            facts = facts_of(document)
+            for recorded in document.linked():
+                if isinstance(found := self.locator.find(recorded, document.folders), Found):
+                    linked.add(found.real)
+        except DocumentError:
+            pass  # which is the answer
+        else:
+            if linked - {document.FileName} and isinstance(document.content, Content):
+                return First(None, facts, document.content, tuple(linked))
+        return First(Known.found_in(library, self._answer(library, question)), facts)
+
+    def _answer(self, library: Library, question: Question) -> dict[str, Any]:
         try:
             document = library.open(question.path)
             top = document.getObject(question.assembly or "") if question.name_only else None
             top = choose_assembly(document, question.assembly) if top is None else top
             found = extract(top, hardware=question.hardware, below=question.below)
             told = respelt_findings(library.notes, document.FileName)
-            plain = to_plain(replace(found, findings=(*found.findings, *told)))
+            return to_plain(replace(found, findings=(*found.findings, *told)))
         except DocumentError as error:
-            plain = {"document": [error.path, error.reason]}
+            return {"document": [error.path, error.reason]}
         except InputError as error:
-            plain = {"input": str(error)}
-        return Known.found_in(library, plain)
+            return {"input": str(error)}
+
+
+class Done(NamedTuple):
+    """Some questions worked on: what they gave in order, how many files were read, seconds of processor."""
+
+    found: list[First]
+    reads: int
+    seconds: float
 
 
 _mine = threading.local()
 
 
-def ask_all(questions: Sequence[Question], run: str) -> tuple[list[Known], int]:
-    """The answers in order, and how many files were read; this is what travels to workers.
+def work(questions: Sequence[Question], supplies: Supplies | None, run: str) -> Done:
+    """Read the files of questions, or with supplies answer them; this is what travels to workers.
 
     run
         names the run: what a worker of a cluster keeps from another one may be old.
     """
     if getattr(_mine, "run", None) != run:
         _mine.run, _mine.session = run, Session()
-    session: Session = _mine.session
-    before = session.contents.reads
-    return [session.ask(question) for question in questions], session.contents.reads - before
+    return _work(_mine.session, questions, supplies)
+
+
+def _work(session: Session, questions: Sequence[Question], supplies: Supplies | None) -> Done:
+    reads, begin = session.contents.reads, time.thread_time()
+    if supplies is None:
+        found = [session.read(question) for question in questions]
+    else:
+        for path, content in supplies.contents.items():
+            session.contents.add(path, content)
+        facts = supplies.facts
+        found = [First(session.ask(question, lambda path: facts.get(path, ""))) for question in questions]
+    return Done(found, session.contents.reads - reads, time.thread_time() - begin)
 
 
 # --- where the work is done -----------------------------------------------------------------------------
@@ -168,11 +238,11 @@ class Pool:
         self._run = str(uuid4())
         self._executor: Executor | None = None
 
-    def submit(self, questions: Sequence[Question]) -> Future[Any]:
-        """Have questions answered."""
+    def submit(self, questions: Sequence[Question], supplies: Supplies | None) -> Future[Done]:
+        """Have questions worked on."""
         if self._executor is None:
             self._executor = self._make()
-        return self._executor.submit(ask_all, questions, self._run)
+        return self._executor.submit(work, questions, supplies, self._run)
 
     def renew(self) -> None:
         """Give up an executor that lost its workers."""
@@ -231,16 +301,12 @@ def _dask_client(address: str) -> Any:
 
 @dataclass
 class _Chunk:
-    """Neighbouring questions: what the index knows, and who finds out the rest."""
+    """Neighbouring questions, and who works on them."""
 
     questions: Sequence[Question]
-    known: dict[int, Known]
-    asked: Future[Any] | None = None
+    supplies: Supplies | None
+    asked: Future[Done] | None = None
     tries: int = 0
-
-    @property
-    def open(self) -> list[Question]:
-        return [one for number, one in enumerate(self.questions) if number not in self.known]
 
 
 class Reading:
@@ -248,13 +314,14 @@ class Reading:
 
     pool
         where files are read when they are many; None: in this process.
-    reads
-        how many files were read so far, here and by others.
+    asked, reads, seconds
+        questions that the index did not answer, files read for them, seconds of processor of workers.
     """
 
     def __init__(self, index: Index, pool: Pool | None = None) -> None:
         self.index = index
         self.asked = 0
+        self.seconds = 0.0
         self._elsewhere = 0
         self._pool = pool
         self._session = Session(index.contents)
@@ -265,106 +332,123 @@ class Reading:
 
     def ask(self, question: Question) -> Answer:
         """One question."""
-        return Answer(question, self.index.recall(question.path, question.name) or self._find_out(question))
+        known = self.index.recall(question.path, question.name)
+        if known is None:
+            self.asked += 1
+            known = self._session.ask(question, lambda path: self.index.facts([path]).get(path, ""))
+            self.index.remember(question.path, question.name, known)
+        return Answer(question, known)
 
     def ask_many(self, questions: Iterable[Question]) -> Iterator[Answer]:
-        """The answers in the order of the questions, as they come."""
-        waiting: deque[_Chunk] = deque()
-        for group in _grouped(questions, self._pool.chunk if self._pool is not None else CHUNK):
-            waiting.append(self._begin(group))
-            while waiting and (waiting[0].asked is None or len(waiting) > 3 * self._jobs):
-                yield from self._end(waiting)
-        while waiting:
-            yield from self._end(waiting)
+        """The answers in the order of the questions."""
+        for some in _grouped(questions, _TOGETHER):
+            known: dict[int, Known] = {}
+            for numbers in _grouped(range(len(some)), CHUNK):
+                asked = [(some[number].path, some[number].name) for number in numbers]
+                for number, found in zip(numbers, self.index.recall_all(asked), strict=True):
+                    if found is not None:
+                        known[number] = found
+            if left := [number for number in range(len(some)) if number not in known]:
+                self._find_out(some, left, known)
+            for number, question in enumerate(some):
+                yield Answer(question, known.pop(number))
 
-    @property
-    def _jobs(self) -> int:
-        return self._pool.jobs if self._pool is not None else 1
+    def _find_out(self, some: Sequence[Question], left: Sequence[int], known: dict[int, Known]) -> None:
+        """Read the files of the questions that are left, then walk the assemblies among them."""
+        self.asked += len(left)
+        pool = self._pool if self._pool is not None and len(left) >= self._pool.worth else None
+        size = CHUNK if pool is None else pool.chunk
+        contents, linked, held = dict[str, Content](), dict[int, tuple[str, ...]](), 0
+        chunks = (_Chunk([some[number] for number in group], None) for group in _grouped(left, size))
+        for number, first in zip(left, self._worked_on(chunks, pool), strict=True):
+            if first.facts:
+                self.index.remember_facts(os.path.realpath(some[number].path), first.facts)
+            if first.known is not None:
+                known[number] = self._remembered(some[number], first.known)
+            else:
+                linked[number] = first.linked
+                if first.content is not None and held < _HELD:  # else it is read again
+                    contents[first.content.xml.path] = first.content
+                    held += first.content.size
+        walks = (self._walk(some, group, linked, contents) for group in _grouped(linked, size))
+        for number, first in zip(list(linked), self._worked_on(walks, pool), strict=True):
+            assert first.known is not None  # since supplies were given
+            known[number] = self._remembered(some[number], first.known)
 
-    def _begin(self, questions: Sequence[Question]) -> _Chunk:
-        known = {}
-        for number, question in enumerate(questions):
-            if (found := self.index.recall(question.path, question.name)) is not None:
-                known[number] = found
-        chunk = _Chunk(questions, known)
-        if chunk.open:
-            self._submit(chunk)
-        return chunk
+    def _walk(
+        self,
+        some: Sequence[Question],
+        group: Sequence[int],
+        linked: Mapping[int, Sequence[str]],
+        contents: dict[str, Content],
+    ) -> _Chunk:
+        own = {os.path.realpath(some[number].path) for number in group}
+        given = {path: contents.pop(path) for path in own if path in contents}
+        paths = {path: None for number in group for path in linked[number]}
+        return _Chunk([some[number] for number in group], Supplies(given, self.index.facts([*own, *paths])))
 
-    def _submit(self, chunk: _Chunk) -> None:
-        if self._pool is not None and self.asked >= self._pool.worth:
-            chunk.asked = self._pool.submit(chunk.open)
-            return
-        for number, question in enumerate(chunk.questions):
-            if number not in chunk.known:
-                chunk.known[number] = self._find_out(question)
-
-    def _find_out(self, question: Question) -> Known:
-        self.asked += 1
-        known = self._session.ask(question)
+    def _remembered(self, question: Question, known: Known) -> Known:
         self.index.remember(question.path, question.name, known)
         return known
 
-    def _end(self, waiting: deque[_Chunk]) -> Iterator[Answer]:
-        """The answers of the first chunk that waits."""
-        chunk = waiting[0]
-        if chunk.asked is not None:
-            self._collect(chunk, waiting)
-        waiting.popleft()
-        for number, question in enumerate(chunk.questions):
-            yield Answer(question, chunk.known[number])
+    def _worked_on(self, chunks: Iterable[_Chunk], pool: Pool | None) -> Iterator[First]:
+        """What the chunks gave, in their order."""
+        waiting: deque[_Chunk] = deque()
+        for chunk in chunks:
+            if pool is None:
+                yield from _work(self._session, chunk.questions, chunk.supplies).found
+                continue
+            chunk.asked = pool.submit(chunk.questions, chunk.supplies)
+            waiting.append(chunk)
+            while len(waiting) > 3 * pool.jobs:
+                yield from self._collect(waiting, pool)
+        while pool is not None and waiting:
+            yield from self._collect(waiting, pool)
 
-    def _collect(self, chunk: _Chunk, waiting: deque[_Chunk]) -> None:
+    def _collect(self, waiting: deque[_Chunk], pool: Pool) -> list[First]:
+        """What the first chunk that waits gave."""
+        chunk = waiting[0]
         while chunk.asked is not None:
             try:
-                found, reads = chunk.asked.result()
+                done = chunk.asked.result()
             except _WORKER_LOST:
-                self._again(waiting)
+                self._again(waiting, pool)
                 continue
-            chunk.asked = None
-            self._elsewhere += reads
-            self._take(chunk, found)
+            waiting.popleft()
+            return self._counted(done)
+        waiting.popleft()
+        return [self._alone(question, chunk.supplies, pool) for question in chunk.questions]
 
-    def _take(self, chunk: _Chunk, found: Sequence[Known]) -> None:
-        missing = [number for number in range(len(chunk.questions)) if number not in chunk.known]
-        self.asked += len(missing)
-        for number, known in zip(missing, found, strict=True):
-            question = chunk.questions[number]
-            chunk.known[number] = known
-            self.index.remember(question.path, question.name, known)
+    def _counted(self, done: Done) -> list[First]:
+        self._elsewhere += done.reads
+        self.seconds += done.seconds
+        return done.found
 
-    def _again(self, waiting: Iterable[_Chunk]) -> None:
+    def _again(self, waiting: Iterable[_Chunk], pool: Pool) -> None:
         """A worker died. What it had not finished is asked again; a file that kills twice is found alone."""
-        assert self._pool is not None  # chunks are asked elsewhere only where there is one
         lost = [chunk for chunk in waiting if chunk.asked is not None and not _succeeded(chunk.asked)]
-        self._pool.renew()
+        pool.renew()
         for chunk in lost:
             chunk.tries += 1
-            if chunk.tries < _TRIES:
-                chunk.asked = self._pool.submit(chunk.open)
-            else:
-                chunk.asked = None
-                self._take(chunk, [self._alone(question) for question in chunk.open])
+            chunk.asked = pool.submit(chunk.questions, chunk.supplies) if chunk.tries < _TRIES else None
 
-    def _alone(self, question: Question) -> Known:
+    def _alone(self, question: Question, supplies: Supplies | None, pool: Pool) -> First:
         """One question in a process of its own."""
-        assert self._pool is not None  # as above
-        with self._pool.alone() as executor:
+        with pool.alone() as executor:
             try:
-                found, reads = executor.submit(ask_all, [question], str(uuid4())).result()
+                return self._counted(executor.submit(work, [question], supplies, str(uuid4())).result())[0]
             except BrokenProcessPool:
                 reason = "the process that read it died; the file may need more memory than there is"
-                return Known(json.dumps({"document": [question.path, reason]}), "[{},[]]", lasting=False)
-        self._elsewhere += reads
-        known: Known = found[0]
-        return known
+                return First(
+                    Known(json.dumps({"document": [question.path, reason]}), "[{},[]]", lasting=False)
+                )
 
 
 def _succeeded(future: Future[Any]) -> bool:
     return future.done() and not future.cancelled() and future.exception() is None
 
 
-def _grouped(questions: Iterable[Question], size: int) -> Iterator[list[Question]]:
-    left = iter(questions)
+def _grouped(several: Iterable[T], size: int) -> Iterator[list[T]]:
+    left = iter(several)
     while group := list(islice(left, size)):
         yield group
