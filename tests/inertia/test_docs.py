@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from silo.cli import inertia, links, mass
+from silo.cli import inertia
 from silo.inertia.bom import BomCode
 from silo.inertia.codes import Decided, MassCode, Rule, Source
 from silo.inertia.model import GeometryCode
@@ -31,8 +31,6 @@ def test_every_option_of_the_page_exists() -> None:
     parser = argparse.ArgumentParser()
     commands = parser.add_subparsers()
     inertia.register(commands)
-    links.register(commands)
-    mass.register(commands)
     known = {option for one in commands.choices.values() for option in one._option_string_actions}
     named = set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", PAGE))
     assert named <= known, named - known

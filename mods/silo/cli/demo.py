@@ -30,7 +30,7 @@ from silo.bom_sync import Outcome, Status, resolve, sync_tree
 from silo.cli import common, show
 from silo.cli.common import Commands
 from silo.cli.register import proposals_for, register_all
-from silo.cli.serve import need_server_extra
+from silo.cli.server import need_server_extra
 from silo.files import shipped
 
 if TYPE_CHECKING:

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""``silo-mod inertia``: mass, centre of mass and inertia tensor per link, from a STEP assembly and a BOM."""
+"""``silo-mod inertia``, ``mass`` and ``links``: mass properties of an assembly, by link or as a whole."""
 
 from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from silo.bom.errors import InputError
@@ -13,15 +15,23 @@ from silo.cli import inertia_common as shared
 from silo.cli.common import Commands
 
 if TYPE_CHECKING:
+    from silo.bom.model import BomEntry
     from silo.inertia.calculator import Task
     from silo.inertia.report import InertiaReport
+
+
+def register(commands: Commands) -> None:
+    """Add the commands."""
+    _add_inertia(commands)
+    _add_links(commands)
+    _add_mass(commands)
+
 
 FRAMES = ("assembly", "own", "urdf")
 SNIPPETS = ("urdf", "sdf", "mjcf")
 
 
-def register(commands: Commands) -> None:
-    """Add the command."""
+def _add_inertia(commands: Commands) -> None:
     parser = common.add_command(
         commands,
         "inertia",
@@ -70,10 +80,10 @@ def register(commands: Commands) -> None:
     shared.add_geometry_options(parser)
     shared.add_result_options(parser)
     shared.add_push_options(parser)
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run_inertia)
 
 
-def run(args: argparse.Namespace) -> int:
+def run_inertia(args: argparse.Namespace) -> int:
     """Calculate and show; 1 for warnings with --strict, or items that a push did not find."""
     shared.need_inertia_extra()
     shared.check_options(args, asks_server=args.push and not args.dry_run)
@@ -168,3 +178,165 @@ def _print_snippet(kind: str, report: InertiaReport) -> None:
     # The elements do not say it themselves, and in another frame than the link's they are wrong.
     for name, link in report.links.items():
         print(f"{plain(name)}: frame of the numbers: {plain(link.frame.description)}", file=sys.stderr)
+
+
+def _add_links(commands: Commands) -> None:
+    parser = common.add_command(
+        commands,
+        "links",
+        "a link map to start from: which part of an assembly belongs to which link of the robot",
+        "silo-mod links examples/arm/arm.step --urdf examples/arm/arm.urdf > map.yaml",
+    )
+    parser.add_argument(
+        "assembly", metavar="ASSEMBLY", help="STEP, mesh (STL, OBJ, 3MF, GLB, PLY) or FCStd file"
+    )
+    parser.add_argument("--urdf", metavar="FILE", help="give parts to links by the names in this URDF")
+    parser.add_argument(
+        "--clusters",
+        type=int,
+        metavar="N",
+        help="make N links of parts that lie together, whatever their names",
+    )
+    parser.add_argument(
+        "--preview",
+        action="append",
+        default=[],
+        metavar="OUT",
+        help="draw the links, one colour each: .png or .glb; may be repeated",
+    )
+    parser.add_argument("--out", metavar="MAP", help="write the map here, not to standard output")
+    shared.add_geometry_options(parser)
+    parser.set_defaults(run=run_links)
+
+
+def run_links(args: argparse.Namespace) -> int:
+    """Read, group, write."""
+    shared.need_inertia_extra()
+    if args.clusters is not None and args.clusters < 1:
+        raise InputError(f"--clusters: wanted a number of links above 0, got {args.clusters}")
+    if args.clusters is not None and args.urdf:
+        raise InputError("--clusters groups by position and --urdf by names; give one of them")
+    shared.check_outputs([*args.preview, *([args.out] if args.out else [])], args.preview)
+    from silo.inertia.links import ROOT_LINK, claim
+    from silo.inertia.output.files import write_whole
+    from silo.inertia.output.urdf import link_meshes, read_urdf, root_link
+    from silo.inertia.starting_map import as_map, as_yaml, starting_map
+
+    links, root = None, ROOT_LINK
+    if args.urdf:
+        data = read_urdf(args.urdf)
+        links, root = link_meshes(data, args.urdf), root_link(data, args.urdf)
+    assembly = shared.read(args.assembly, args)
+    if not assembly.instances:
+        raise InputError(f"{args.assembly}: holds no part, so there is nothing to give to links")
+    start = starting_map(assembly, links, root=root, clusters=args.clusters)
+    text = as_yaml(start, assembly)
+    if claim(assembly, as_map(start, assembly)).members != start.members:
+        print(
+            f"silo-mod: {args.assembly}: the names of some parts make their lines match other parts as well; "
+            "look at the picture (--preview) before you use the map",
+            file=sys.stderr,
+        )
+    for name in args.preview:
+        from silo.inertia.preview.write import LinkView, preview_bytes
+
+        views = [
+            LinkView(link, tuple(assembly.instances[index] for index in ids))
+            for link, ids in start.members.items()
+        ]
+        write_whole(name, preview_bytes(assembly, views, Path(name).suffix))
+    if args.out:
+        write_whole(args.out, text.encode("utf-8"))
+    else:
+        sys.stdout.write(text)
+    print(f"{args.out or 'map'}: {start.how}.", file=sys.stderr)
+    return 0
+
+
+def _add_mass(commands: Commands) -> None:
+    parser = common.add_command(
+        commands,
+        "mass",
+        "mass, centre of mass and inertia of a FreeCAD assembly, from its parts' shapes and materials",
+        "silo-mod mass TopAssembly.FCStd --push",
+    )
+    common.add_assembly_options(parser)
+    shared.add_bom_options(parser)
+    shared.add_material_options(parser)
+    parser.add_argument(
+        "--default-density",
+        type=float,
+        metavar="RHO",
+        help="kg/m³ of parts without a material (default: they count as zero, and are listed)",
+    )
+    parser.add_argument(
+        "--via",
+        choices=("files", "freecad"),
+        default="files",
+        help="read the files directly (default), or let freecadcmd open and measure them",
+    )
+    shared.add_geometry_options(parser)
+    shared.add_result_options(parser)
+    shared.add_push_options(parser)
+    parser.set_defaults(run=run_mass)
+
+
+def run_mass(args: argparse.Namespace) -> int:
+    """Calculate and show; 1 for warnings with --strict, or items that a push did not find."""
+    shared.need_inertia_extra(args.via)
+    if args.no_hardware:
+        raise InputError(
+            "mass weighs every part that is there; --no-hardware cannot leave standard parts out"
+        )
+    # The documents hold identities; their part numbers are the server's, for a preview as well.
+    shared.check_options(args, asks_server=args.push)
+    from silo.inertia.calculator import Task, calculate
+    from silo.inertia.links import Link, LinkMap
+    from silo.inertia.massrule import Options
+    from silo.inertia.model import GeometryCode
+
+    parser = shared.bom_parser(args)
+    table = parser.parse(args.bom) if args.bom else None
+    materials = shared.material_table(args)
+    assembly = shared.read(args.top, args, via=args.via, object_name=args.assembly)
+    name = assembly.name or "assembly"
+    # A FreeCAD document is its own BOM: where it states no material, nobody does.
+    options = Options(
+        args.default_density or 1000.0,
+        step_density=True,
+        unknown_is_zero=args.default_density is None,
+        own_bom=True,
+    )
+    whole = LinkMap((Link(name, ("**",)),)) if assembly.instances else None
+    report = calculate(assembly, table, Task(materials, options, whole, simulated=False))
+    if not assembly.instances:
+        words = "the document holds no part with a shape: there is nothing to weigh"
+        report.add_warning("", "", words, GeometryCode.NO_GEOMETRY)
+    shared.show(args, report, assembly)
+    pushed = _push(args, report) if args.push else 0
+    return max(pushed, shared.verdict(args, report))
+
+
+def _push(args: argparse.Namespace, report: InertiaReport) -> int:
+    """The documents' identities give the part numbers; the top assembly's own, unless --item says another."""
+    from silo.bom.paths import relative
+    from silo.bom.report import base_of
+    from silo.bom_sync import resolve
+
+    extraction = common.read_top(args)
+    base = base_of(extraction)
+    with common.client_of(args) as client:
+        resolved = resolve(extraction, client)
+    numbers = {
+        f"{relative(entry.doc_path, base)}#{entry.object_name}": entry.part_number
+        for entry in _all((*resolved.entries, resolved.assembly))
+        if entry.part_number
+    }
+    args.item = args.item or resolved.assembly.part_number
+    return shared.push_report(args, report, numbers)
+
+
+def _all(entries: Sequence[BomEntry]) -> Iterator[BomEntry]:
+    for entry in entries:
+        yield entry
+        yield from _all(entry.children)

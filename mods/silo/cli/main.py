@@ -23,25 +23,17 @@ from silo.bom.errors import CancelledError, ConflictError, RejectedError, Remote
 T = TypeVar("T")
 OK, UNDONE, BAD_INPUT, REMOTE, CANCELLED = 0, 1, 2, 3, 130
 
-_COMMANDS = (
+_MODULES = (
     "bom",
     "diff",
-    "bom_diff",
-    "where_used",
+    "linked_files",
     "sync",
     "register",
     "pull",
-    "relink",
-    "serve",
-    "backup",
-    "watch",
-    "login",
-    "doctor",
+    "server",
+    "setup",
     "inertia",
-    "links",
-    "mass",
     "demo",
-    "install_addon",
 )
 
 _EPILOG = """exit codes: 0 done, 1 differences or something left undone, 2 bad input, 3 server, 130 cancelled
@@ -60,7 +52,7 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"silo-mod {_version()}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for name in _COMMANDS:
+    for name in _MODULES:
         importlib.import_module(f"silo.cli.{name}").register(commands)
     return parser
 

@@ -138,7 +138,7 @@ def _loaded() -> ForkServerContext:
     modules = [
         "psycopg",
         "silo.cli.main",
-        "silo.cli.backup",
+        "silo.cli.server",
         "silo_server.operation.backup",
         "silo_server.run",
     ]

@@ -1,26 +1,75 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""``silo-mod doctor``: what is where on this machine, which server is meant, and what does not work.
-
-Each line that is not in order says what to do about it.
-"""
+"""``silo-mod login``, ``doctor`` and ``install-addon``: what the other commands need, and what is wrong."""
 
 from __future__ import annotations
 
 import argparse
+import getpass
 import importlib.metadata
 import importlib.util
 import os
 import sys
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from silo.bom.errors import ConfigError, ForbiddenError, NotFoundError, SiloError
+from silo.bom.errors import ConfigError, ForbiddenError, InputError, NotFoundError, SiloError
 from silo.cli import common
 from silo.cli.common import Commands
 
 if TYPE_CHECKING:
     from silo.addon_install import Place
     from silo.api.client import SiloClient
+
+
+def register(commands: Commands) -> None:
+    """Add the commands."""
+    _add_login(commands)
+    _add_doctor(commands)
+    _add_install_addon(commands)
+
+
+def _add_login(commands: Commands) -> None:
+    parser = common.add_command(
+        commands,
+        "login",
+        "try a server's address and a token, and remember both for this user",
+        "silo-mod login https://silo.example.com",
+    )
+    parser.add_argument("url", metavar="URL", help="address of the Silo server")
+    parser.add_argument("--token", help="API token (else it is asked for, or read from standard input)")
+    parser.add_argument("--ca", metavar="FILE", help="certificate authorities to trust")
+    parser.set_defaults(run=run_login)
+
+
+def run_login(args: argparse.Namespace) -> int:
+    """Save what was seen to work; nothing is written where the server refuses."""
+    from silo.api.client import SiloClient
+    from silo.api.config import config_path, resolve_server, save_config
+
+    where = resolve_server(args.url, args.token or _token(args.url), args.ca, env={}, path=config_path())
+    with SiloClient(where.url, where.token, verify=where.verify) as client:
+        client.ready()
+        try:
+            user = client.whoami()
+            who = f"{user.username}, {user.role}" if user.role else user.username
+        except NotFoundError:
+            who = "this server does not say who you are"
+            client.search_items(limit=1)
+    path = save_config(where.url, where.token, where.verify)
+    print(f"{client.base_url}: {who}. Kept in {path}, which only you can read.")
+    return 0
+
+
+def _token(url: str) -> str:
+    if sys.stdin.isatty():
+        token = getpass.getpass(f"API token of {url} (its page “API tokens” makes one): ")
+    else:
+        token = sys.stdin.readline()
+    if not token.strip():
+        raise InputError("no token was given; nothing was changed")
+    return token.strip()
+
 
 NOBODY = "00000000-0000-4000-8000-000000000000"
 # One package of each extra, and what the extra is for.
@@ -29,8 +78,7 @@ Rows = dict[str, "str | SiloError"]
 T = TypeVar("T")
 
 
-def register(commands: Commands) -> None:
-    """Add the command."""
+def _add_doctor(commands: Commands) -> None:
     parser = common.add_command(
         commands,
         "doctor",
@@ -40,10 +88,10 @@ def register(commands: Commands) -> None:
     parser.add_argument("--schema", default="kindred-rd", help="part number schema (default: kindred-rd)")
     common.add_json_option(parser)
     common.add_server_options(parser)
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run_doctor)
 
 
-def run(args: argparse.Namespace) -> int:
+def run_doctor(args: argparse.Namespace) -> int:
     """Print what was found; 3 where something that the commands need does not work."""
     found = {**_machine(), **_server(args)}
     failed = [name for name, value in found.items() if isinstance(value, SiloError)]
@@ -192,3 +240,28 @@ def _modules(client: SiloClient) -> str:
 def _events(client: SiloClient) -> str:
     client.open_events().close()
     return "live"
+
+
+def _add_install_addon(commands: Commands) -> None:
+    parser = common.add_command(
+        commands,
+        "install-addon",
+        "put the add-on and its Python packages into a FreeCAD found on this machine",
+        "silo-mod install-addon --freecadcmd /usr/bin/freecadcmd",
+    )
+    parser.add_argument("--freecadcmd", metavar="PATH", help="freecadcmd (default: found on the PATH)")
+    parser.add_argument("--freecad-data", metavar="DIR", help="its data folder (default: FreeCAD is asked)")
+    parser.add_argument("--copy", action="store_true", help="copy the add-on, do not link to this checkout")
+    parser.set_defaults(run=run_install_addon)
+
+
+def run_install_addon(args: argparse.Namespace) -> int:
+    """Install, and say where."""
+    from silo.addon_install import ask_freecad, install_folder, install_packages
+
+    place = ask_freecad(args.freecadcmd, Path(args.freecad_data) if args.freecad_data else None)
+    print("FreeCAD {}.{} with Python {}.{}".format(*place.freecad, *place.python))
+    print(f"Add-on:   {install_folder(place, copy=args.copy)}")
+    print(f"Packages: {install_packages(place)}")
+    print("Start FreeCAD again, and choose the workbench Silo.")
+    return 0
