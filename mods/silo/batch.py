@@ -20,8 +20,7 @@ from silo.bom.errors import SiloError
 from silo.bom.findings import Finding
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.paths import relative
-from silo.bom.paths import project_folder
-from silo.bom.report import base_of, diff_json, entry_json, finding_json
+from silo.bom.report import base_of, diff_json, entry_json, finding_json, project_folder
 from silo.bom_sync import (
     Outcome,
     Resolved,

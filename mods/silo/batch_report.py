@@ -19,7 +19,7 @@ from typing import Any, BinaryIO, Protocol
 from xml.sax.saxutils import escape, quoteattr
 
 from silo.batch import TopResult, result_json
-from silo.bom.errors import InputError, RemoteError
+from silo.bom.errors import Exit, InputError, RemoteError
 from silo.bom.findings import Finding, FindingCode, Severity
 from silo.bom.naming import display_name
 from silo.bom.report import finding_json, shorten
@@ -82,8 +82,8 @@ class Summary:
     def exit_code(self) -> int:
         """0 where all is in order, 1 where something was left undone, 3 where only the server is to blame."""
         if self.fine == self.files:
-            return 0
-        return 3 if self.remote and self.remote == self.files - self.fine else 1
+            return Exit.DONE
+        return Exit.REMOTE if self.remote and self.remote == self.files - self.fine else Exit.UNDONE
 
     def add(self, result: TopResult) -> None:
         """Count a file's result."""

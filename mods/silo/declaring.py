@@ -15,12 +15,9 @@ from silo.bom.errors import DocumentError, InputError, SiloError
 from silo.bom.identity import document_identity
 from silo.bom.naming import Proposal
 from silo.bom.roots import choose_assembly
-from silo.fcstd import Library, check_stampable, stamp
+from silo.fcstd import Library
 from silo.fcstd.objects import FcstdObject
-from silo.registration import Ask, Journal, Registration, RegistrationApi, register, unclear
-
-# Writes an identity on all objects of an article at once.
-Write = Callable[[str], None]
+from silo.registration import Ask, Journal, Registration, RegistrationApi, register
 
 
 def modelled(path: str, assembly: str | None = None) -> list[Modelled]:
@@ -70,40 +67,34 @@ def declare(
     journal: Journal,
     *,
     schema: str,
-    ask: Ask = unclear,
-    check: Callable[[str], None] = lambda _path: None,
-    write: Write | None = None,
+    ask: Ask,
+    check: Callable[[], None],
+    write: Callable[[str], None],
 ) -> Registration:
     """Give all objects of an article one identity: of the file it was imported from, else of a new item.
 
     check
         raises DocumentError where the file must not be written now.
     write
-        writes an identity on all its objects; where none is given, in the file.
+        writes an identity on all its objects.
     """
-    path = article.entry.doc_path
-
-    def stamp_all(_entry: object, identity: str) -> None:
-        if write is not None:
-            write(identity)
-            return
-        for name in article.objects:
-            stamp(path, identity, object_name=name, item_object=name)
-
-    def check_all(_entry: object) -> None:
-        check(path)
-        for name in article.objects if write is None else ():
-            check_stampable(path, object_name=name, item_object=name)
-
     try:
         known = source_identity(article)
         item = api.get_item_by_uuid(known) if known else None
         if item is not None:
-            check_all(article.entry)
-            stamp_all(article.entry, str(item["id"]))
+            check()
+            write(str(item["id"]))
             number = str(item["part_number"])
             return Registration(proposal, part_number=number, item_id=str(item["id"]), found=True)
     except SiloError as error:
         return Registration(proposal, error=error)
     proposal = replace(proposal, entry=replace(proposal.entry, silo_uuid=None), shares_file=True)
-    return register(proposal, api, journal, stamp_all, schema=schema, check=check_all, ask=ask)
+    return register(
+        proposal,
+        api,
+        journal,
+        lambda _entry, identity: write(identity),
+        schema=schema,
+        check=lambda _entry: check(),
+        ask=ask,
+    )

@@ -11,6 +11,7 @@ from itertools import chain
 from pathlib import Path
 
 from silo.bom.errors import ConfigError, DocumentError, InputError
+from silo.spelling import Spelling
 
 IGNORE_FILE = ".siloignore"
 
@@ -18,20 +19,34 @@ IGNORE_FILE = ".siloignore"
 def documents_in(tops: Iterable[str]) -> list[str]:
     """The files that are meant, each once: a folder stands for all FCStd files below it, backups left out.
 
-    What the folder's ``.siloignore`` names (in the syntax of ``.gitignore``) is left out. Raises SiloError.
-    A pattern (``*.FCStd``) stands for what fits it: the shells of Windows hand patterns over as they are.
+    What the folder's ``.siloignore`` names (in the syntax of ``.gitignore``) is left out. A pattern
+    (``*.FCStd``) stands for what fits it: the shells of Windows hand patterns over as they are. InputError
+    names all that is not there.
     """
-    found: list[str] = []
-    for top in chain.from_iterable(map(_meant, tops)):
-        path = Path(top)
-        if path.is_dir():
-            found += sorted(_below(top))
-        else:
-            found.append(top)
+    meant = list(chain.from_iterable(map(_meant, tops)))
+    must_exist(*meant)
+    spelling = Spelling()
     once: dict[str, str] = {}
-    for path_given in found:
-        once.setdefault(os.path.normcase(os.path.abspath(path_given)), path_given)
+    for top in meant:
+        real = spelling.real(top)  # a file may be named in several ways
+        if not os.path.isdir(top):
+            once.setdefault(real, top)
+        for path in sorted(_below(top)):
+            once.setdefault(os.path.join(real, os.path.relpath(path, top)), path)
     return list(once.values())
+
+
+def must_exist(*paths: str) -> None:
+    """InputError for files and folders that are not there, before anything is done; it names all of them."""
+    lost = [path for path in paths if not os.path.exists(path)]
+    if len(lost) == 1:
+        raise InputError(f"{_quoted(lost[0])}: there is no such file or folder")
+    if lost:
+        raise InputError(f"{len(lost)} of {len(paths)} files are not there; nothing was done", lost)
+
+
+def _quoted(path: str) -> str:
+    return path if path.strip() else repr(path)
 
 
 def _below(folder: str) -> Iterator[str]:

@@ -7,13 +7,16 @@ import json
 import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+import jsonschema_rs
 import pytest
 
 from silo.api.client import SiloClient
 from silo.cli.main import main
+from silo.cli.shapes import schema_of
 from silo_server.run import running_server
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "gearbox"
@@ -29,14 +32,22 @@ class Silo:
 
 @dataclass(frozen=True)
 class Ran:
-    """What a command printed, and its exit code."""
+    """What a command printed, and its exit code. Its JSON is held against the command's schema."""
 
+    command: str
     code: int
     out: str
     err: str
 
     def json(self) -> Any:
-        return json.loads(self.out)
+        data = json.loads(self.out)
+        validator_of(self.command).validate(data)
+        return data
+
+
+@cache
+def validator_of(command: str) -> jsonschema_rs.Validator:
+    return jsonschema_rs.validator_for(schema_of(command))
 
 
 @pytest.fixture
@@ -76,6 +87,6 @@ def run(capsys: pytest.CaptureFixture[str]) -> Any:
     def _run(*words: object) -> Ran:
         code = main([str(word) for word in words])
         captured = capsys.readouterr()
-        return Ran(code, captured.out, captured.err)
+        return Ran(str(words[0]), code, captured.out, captured.err)
 
     return _run

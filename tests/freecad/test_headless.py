@@ -308,10 +308,10 @@ def test_the_line_in_the_docs_works_as_it_stands(vault: Vault, version: str, tmp
 def test_freecadcmd_without_packages_still_writes_the_boms(
     vault: Vault, version: str, tmp_path: Path
 ) -> None:
-    """No requests in FreeCAD's Python: one plain sentence, the BOMs as JSON, exit code 3, no traceback."""
+    """No requests in FreeCAD's Python: one plain sentence, the BOMs as JSON, exit code 2, no traceback."""
     args = {"tops": ["vault/top.FCStd"], "json": "out.json"}
     done = headless(machines.need(version), vault, args, tmp_path, dependencies=False)
-    assert done.returncode == 3, done.stdout
+    assert done.returncode == 2, done.stdout
     assert "Traceback" not in done.stdout
     assert "has no package" in done.stdout
     (result,) = json.loads((tmp_path / "out.json").read_text())["results"]

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from sqlalchemy import select
 
 from silo.bom.errors import ConflictError, RejectedError
+from silo.bom.headers import plain_cell, safe_cell
 from silo_server.clock import stamp, utc_now, wire
 from silo_server.db.bulk import insert_rows, one_of, update_rows
 from silo_server.db.engine import Database
@@ -27,7 +28,7 @@ from silo_server.services.access.credentials import (
     secret_of_form,
 )
 from silo_server.services.bom.edits import check_state, edited_state
-from silo_server.services.bom.exports import _item_numbers, plain_cell, safe_cell
+from silo_server.services.bom.exports import _item_numbers
 from silo_server.services.bom.lines import state_to_json, stored_state
 from silo_server.services.bom.merge_json import quantity_problem, read_merge_order
 from silo_server.services.bom.rollup import positive_number

@@ -17,6 +17,8 @@ from silo.bom.errors import SiloError
 from silo.bom.findings import Finding
 from silo.bom.model import BomEntry, Extraction
 from silo.outbox.send import Sent
+from silo.registering.offer import Candidate, Offer, Seen, State
+from silo.registering.orders import Order
 from silo.registration import Registration
 from silo.testing import FakeSilo
 from silo.workbench.commit.desk import Answer, Look
@@ -24,7 +26,6 @@ from silo.workbench.commit.opened import Base, stamp_of
 from silo.workbench.commit.plan import Plan
 from silo.workbench.commit.snapshot import Snapshot
 from silo.workbench.preview.rows import Preview
-from silo.workbench.register.registering import Candidate, Offer, Order, Seen, State
 from silo.workbench.session.session import Listener, Session
 from silo.workbench.settings.preferences import DEFAULTS, Preferences
 from silo.workbench.settings.server import Known

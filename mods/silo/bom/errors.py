@@ -30,7 +30,25 @@ A message says what was wanted, what was got, where, and what to do.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from enum import IntEnum
 from typing import Any, ClassVar
+
+
+class Exit(IntEnum):
+    """What every command and job ends with, and what documents and scripts rely on."""
+
+    DONE = 0
+    UNDONE = 1  # differences with --check, or something was left undone; the output says what
+    BAD_INPUT = 2  # an argument, a file or the configuration cannot be used
+    REMOTE = 3  # the server, or the way to it
+    CANCELLED = 130  # Ctrl-C, SIGINT or SIGTERM
+
+
+def exit_of(error: BaseException) -> Exit:
+    """Whose fault an error is, as an exit code."""
+    if isinstance(error, KeyboardInterrupt | CancelledError):
+        return Exit.CANCELLED
+    return Exit.REMOTE if isinstance(error, RemoteError | ConflictError) else Exit.BAD_INPUT
 
 
 class SiloError(Exception):
@@ -41,10 +59,14 @@ class SiloError(Exception):
 
 
 class InputError(SiloError):
-    """Something given to us is unusable."""
+    """Something given to us is unusable. ``problems`` lists all that is wrong with it."""
 
     status_hint = 400
     code = "bad_input"
+
+    def __init__(self, message: str, problems: Sequence[str] = ()) -> None:
+        super().__init__(message)
+        self.problems = tuple(problems)
 
 
 class DocumentError(InputError):

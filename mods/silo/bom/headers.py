@@ -11,6 +11,10 @@ import re
 import unicodedata
 from collections.abc import Collection, Mapping, Sequence
 from enum import StrEnum
+from typing import Any
+
+# What Excel, LibreOffice and Google Sheets take for the beginning of a formula (OWASP, CSV injection).
+FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
 
 
 class Role(StrEnum):
@@ -122,3 +126,15 @@ def _title(role: Role) -> str:
 
 def _others(role: Role) -> str:
     return ", ".join(name.strip() for name in _ALIASES[role].split(";")[1:5])
+
+
+def safe_cell(value: Any) -> Any:
+    """A cell for CSV: what would be run as a formula is made text; numbers stay numbers."""
+    if isinstance(value, str) and value.startswith(FORMULA_STARTS):
+        return "'" + value
+    return value
+
+
+def plain_cell(text: str) -> str:
+    """What :func:`safe_cell` was given."""
+    return text[1:] if text.startswith("'") and text[1:].startswith(FORMULA_STARTS) else text

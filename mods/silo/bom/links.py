@@ -70,8 +70,8 @@ def extract(
     hardware
         False leaves standard parts out.
     below
-        False reads this one assembly only. ``is_assembly`` then says of the head whether it is one, and of
-        each entry whether it may be; nothing is said of what needs the whole tree (rings, shared identities).
+        False reads this one assembly only. ``is_assembly`` then says of each entry whether it may be one;
+        nothing is said of what needs the whole tree (rings, shared identities).
     """
     walker = _Walker(inspect, canonical, whole, hardware, below)
     top = assembly_obj
@@ -83,7 +83,8 @@ def extract(
         top = target.obj
         entries = walker.tree(top, level)
     head = walker.entry_for(top)
-    head = replace(head, level=level - 1, is_assembly=below or head.is_assembly or walker.holds(top))
+    holds = head.is_assembly or (below and bool(entries)) or walker.holds(top)
+    head = replace(head, level=level - 1, is_assembly=holds)
     if entries or walker.notes.any_blocking():
         walker.notes.container(top)
     else:

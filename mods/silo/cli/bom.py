@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from silo.batch import suggest_by_identity
-from silo.bom.errors import InputError, SiloError
+from silo.bom.errors import Exit, InputError, SiloError
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.paths import relative
 from silo.bom.report import base_of, bom_json, flat_json
@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
         extraction = replace(extraction, findings=(*extraction.findings, *told))
     if args.json:
         common.print_json(flat_json(extraction) if args.flat else bom_json(extraction))
-        return 1 if extraction.blocked else 0
+        return Exit.UNDONE if extraction.blocked else Exit.DONE
     from silo.cli import show
 
     out = show.console()
@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
     if extraction.findings:
         out.print()
         out.print(show.findings_text(extraction.findings, base_of(extraction)))
-    return 1 if extraction.blocked else 0
+    return Exit.UNDONE if extraction.blocked else Exit.DONE
 
 
 def _folder(args: argparse.Namespace) -> int:
@@ -98,7 +98,7 @@ def _folder(args: argparse.Namespace) -> int:
         common.print_json({"assemblies": data, "errors": errors})
     for path, words in errors.items() if not args.json else ():
         out.print(f"✗ {show.plain(path)}: {show.plain(words)}", style="red", markup=False)
-    return 0 if fine and not errors else 1
+    return Exit.DONE if fine and not errors else Exit.UNDONE
 
 
 def _verify(args: argparse.Namespace) -> int:
@@ -111,7 +111,7 @@ def _verify(args: argparse.Namespace) -> int:
     fine = found.agrees and not found.extraction.blocked
     if args.json:
         common.print_json({**bom_json(found.extraction), "witness": list(found.accounts)})
-        return 0 if fine else 1
+        return Exit.DONE if fine else Exit.UNDONE
     from silo.cli import show
 
     out = show.console()
@@ -120,7 +120,7 @@ def _verify(args: argparse.Namespace) -> int:
         out.print(f"{mark} {show.plain(account['sentence'])}", markup=False)
     if found.extraction.blocked:
         out.print(show.findings_text(found.extraction.findings, base_of(found.extraction)))
-    return 0 if fine else 1
+    return Exit.DONE if fine else Exit.UNDONE
 
 
 def _whole(entry: BomEntry, unresolved: Mapping[tuple[str, str], BomEntry]) -> BomEntry:

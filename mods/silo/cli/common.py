@@ -77,7 +77,10 @@ def add_reading_options(parser: argparse.ArgumentParser, *, jobs: bool = True) -
     """``--index``, ``--no-index``, and for many files ``--jobs`` and ``--dask``."""
     group = parser.add_argument_group("reading")
     group.add_argument(
-        "--index", metavar="FILE", type=Path, help="where to remember what files hold (else the user's cache)"
+        "--index",
+        metavar="FILE",
+        type=a_path,
+        help="where to remember what files hold (else the user's cache)",
     )
     group.add_argument("--no-index", action="store_true", help="read every file, and remember nothing")
     if jobs:
@@ -87,6 +90,13 @@ def add_reading_options(parser: argparse.ArgumentParser, *, jobs: bool = True) -
         group.add_argument(
             "--dask", metavar="ADDRESS", help="read on a Dask cluster that sees the same files (extra: dask)"
         )
+
+
+def a_path(text: str) -> Path:
+    """An argument that is a path; an empty one would be the current folder."""
+    if not text:
+        raise argparse.ArgumentTypeError("it is empty ('')")
+    return Path(text)
 
 
 def job_count(text: str) -> int:

@@ -22,7 +22,7 @@ from urllib.parse import quote
 
 from silo.api.activity import activity_text
 from silo.batch import source_document
-from silo.bom.errors import InputError, ServerFaultError
+from silo.bom.errors import Exit, InputError, ServerFaultError
 from silo.bom.model import Extraction
 from silo.bom.report import base_of
 from silo.bom.resolve import consolidation_findings
@@ -73,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
         demo.play()
         if args.keep:
             demo.stay()
-    return 0
+    return Exit.DONE
 
 
 @contextmanager

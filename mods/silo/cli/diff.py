@@ -15,7 +15,7 @@ from typing import Any, Literal
 from silo.batch import suggest_by_identity
 from silo.bom.changes import AssemblyChange, LineChange, changes_json, compare_assemblies
 from silo.bom.diff import diff_findings
-from silo.bom.errors import InputError
+from silo.bom.errors import Exit, InputError
 from silo.bom.model import BomDiff, BomEntry
 from silo.bom.naming import display_name
 from silo.bom.paths import relative
@@ -70,7 +70,9 @@ def run_diff(args: argparse.Namespace) -> int:
         common.print_json({"drift": drifted, "assemblies": data, "findings": findings})
     else:
         _show(whole, compared, names_of(whole, chain.from_iterable(lines)), base)
-    return 1 if args.check and drifted else 0
+    # What cannot be compared whole is no answer, whether one wants to know of differences or not.
+    broken = any(blocking(one) for one, _ in compared)
+    return Exit.UNDONE if broken or (args.check and drifted) else Exit.DONE
 
 
 def _folder(args: argparse.Namespace) -> int:
@@ -85,19 +87,24 @@ def _folder(args: argparse.Namespace) -> int:
         if not plan.uuids:
             common.reach(client)
         summary = Summary(base)
-        drifted = False
+        drifted = broken = False
+        compared_count = 0
         for result in Job(plan, reading, client, Options(recursive=True, dry_run=True), base).results():
             summary.add(result)
+            broken = broken or result.error is not None
             drifted = drifted or not result.fine or bool(result.unregistered)
             for outcome in result.outcomes:
                 news = is_news(outcome)
+                whole = not blocking(outcome.resolved)
+                broken = broken or not whole or outcome.error is not None
+                compared_count += outcome.plan is not None and whole
                 drifted = drifted or (outcome.plan is not None and outcome.plan.diff.drifted)
                 if args.json:
                     compared = {"diff": diff_json(outcome.plan.diff)} if outcome.plan is not None else {}
                     data.append({**_head(outcome.resolved, base), **compared})
                 elif news:
                     out.print(show.outcome_text(outcome))
-                    if outcome.plan is not None and not blocking(outcome.resolved):
+                    if outcome.plan is not None and whole:
                         out.print(show.diff_table(outcome.plan.diff, outcome.names))
     if args.json:
         findings = [finding_json(finding, base) for finding in summary.findings]
@@ -106,11 +113,13 @@ def _folder(args: argparse.Namespace) -> int:
     else:
         for words in (*summary.warnings, *summary.errors):
             out.print(show.plain(words), markup=False)
-        compared_count = sum(summary.statuses.values())
-        out.print(f"Assemblies compared: {compared_count}; {'they differ' if drifted else 'no differences'}.")
-    if summary.exit_code == 3:
-        return 3
-    return 1 if args.check and drifted else 0
+        words = "no differences"
+        if drifted:
+            words = "there are differences, or what could not be compared (see above)"
+        out.print(f"Assemblies compared: {compared_count}; {words}.")
+    if summary.exit_code is Exit.REMOTE:
+        return Exit.REMOTE
+    return Exit.UNDONE if broken or (args.check and drifted) else Exit.DONE
 
 
 def _head(one: Resolved, base: str) -> dict[str, Any]:
@@ -139,7 +148,7 @@ def _show(
                 f"{name}: no part number yet, so nothing to compare with (silo-mod register)", markup=False
             )
         if head.part_number or diff.added:
-            out.print(show.diff_table(diff, names))
+            out.print(show.diff_table(diff, names, whole=not (blocking(one) or one.unresolved)))
         out.print()
     out.print(show.findings_text(whole.findings, base))
 
@@ -189,7 +198,7 @@ def run_bom_diff(args: argparse.Namespace) -> int:
     else:
         _show_changes(changes, old, new)
     # An old state that is damaged cannot be mended any more; a new one can.
-    return 1 if not new.complete or (args.check and changes) else 0
+    return Exit.UNDONE if not new.complete or (args.check and changes) else Exit.DONE
 
 
 @contextmanager

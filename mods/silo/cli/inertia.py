@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from silo.bom.errors import InputError
+from silo.bom.errors import Exit, InputError
 from silo.cli import common
 from silo.cli import inertia_common as shared
 from silo.cli.common import Commands
@@ -205,6 +205,7 @@ def _add_links(commands: Commands) -> None:
         help="draw the links, one colour each: .png or .glb; may be repeated",
     )
     parser.add_argument("--out", metavar="MAP", help="write the map here, not to standard output")
+    common.add_json_option(parser)
     shared.add_geometry_options(parser)
     parser.set_defaults(run=run_links)
 
@@ -230,8 +231,13 @@ def run_links(args: argparse.Namespace) -> int:
     if not assembly.instances:
         raise InputError(f"{args.assembly}: holds no part, so there is nothing to give to links")
     start = starting_map(assembly, links, root=root, clusters=args.clusters)
-    text = as_yaml(start, assembly)
-    if claim(assembly, as_map(start, assembly)).members != start.members:
+    made = as_map(start, assembly)
+    if args.json:
+        patterns = {link.name: {"parts": list(link.patterns)} for link in made.links}
+        text = common.json_text({"links": patterns}, indent=2) + "\n"
+    else:
+        text = as_yaml(start, assembly)
+    if claim(assembly, made).members != start.members:
         print(
             f"silo-mod: {args.assembly}: the names of some parts make their lines match other parts as well; "
             "look at the picture (--preview) before you use the map",
@@ -250,7 +256,7 @@ def run_links(args: argparse.Namespace) -> int:
     else:
         sys.stdout.write(text)
     print(f"{args.out or 'map'}: {start.how}.", file=sys.stderr)
-    return 0
+    return Exit.DONE
 
 
 def _add_mass(commands: Commands) -> None:

@@ -13,7 +13,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from silo.bom.errors import ConfigError, InputError
+from silo.bom.errors import ConfigError, Exit, InputError
 from silo.cli import common
 from silo.inertia.wording import counted
 
@@ -313,13 +313,13 @@ def _report_text(path: Path, report: InertiaReport, picture: Path | None) -> str
 def verdict(args: argparse.Namespace, report: InertiaReport) -> int:
     """The exit code: with --strict, 1 where a warning is not allowed."""
     if not args.strict:
-        return 0
+        return Exit.DONE
     left = [w for w in report.warnings if str(w.code) not in args.allow]
     if left:
         codes = sorted({str(w.code) for w in left})
         count = counted(len(left), "warning")
         print(f"silo-mod: --strict: {count} ({', '.join(codes)})", file=sys.stderr)
-    return 1 if left else 0
+    return Exit.UNDONE if left else Exit.DONE
 
 
 def push_report(
@@ -331,7 +331,7 @@ def push_report(
     plan = plan_push(report, part_numbers, args.item)
     if args.dry_run:
         _tell_plan(plan)
-        return 0
+        return Exit.DONE
     with common.client_of(args) as client:
         done = push(client, plan)
     written = counted(len(done.written), "item")
@@ -341,7 +341,7 @@ def push_report(
     for number, error in done.failed:
         _say(f"Not written: {number}: {error}")
     _tell_skipped(plan)
-    return 3 if done.failed else 1 if done.unknown else 0
+    return Exit.REMOTE if done.failed else Exit.UNDONE if done.unknown else Exit.DONE
 
 
 def _tell_plan(plan: PushPlan) -> None:

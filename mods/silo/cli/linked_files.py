@@ -7,7 +7,7 @@ import argparse
 import os
 from collections.abc import Mapping
 
-from silo.bom.errors import DocumentError, InputError, SiloError
+from silo.bom.errors import DocumentError, Exit, InputError, SiloError
 from silo.bom.identity import walk_entries
 from silo.bom.paths import relative
 from silo.cli import common
@@ -70,7 +70,7 @@ def run_where_used(args: argparse.Namespace) -> int:
                 "unreadable": [relative(one, base) for one in unread],
             }
         )
-        return 1 if unread else 0
+        return Exit.UNDONE if unread else Exit.DONE
     from silo.cli import show
 
     out = show.console()
@@ -87,7 +87,7 @@ def run_where_used(args: argparse.Namespace) -> int:
             f"✗ {show.plain(relative(one, base))} could not be read, so nobody knows what it links to.",
             markup=False,
         )
-    return 1 if unread else 0
+    return Exit.UNDONE if unread else Exit.DONE
 
 
 def _above(part: str, users: Mapping[str, set[str]]) -> set[str]:
@@ -152,7 +152,7 @@ def run_relink(args: argparse.Namespace) -> int:
             for one in done
         ]
         common.print_json({"dry_run": args.dry_run, "to": relative(new, folder), "files": rows})
-        return 0
+        return Exit.DONE
     from silo.cli import show
 
     out = show.console()
@@ -161,7 +161,7 @@ def run_relink(args: argparse.Namespace) -> int:
         verb = "would lead" if args.dry_run else "now leads" if one.links == 1 else "now lead"
         text = f"✓ {relative(one.path, folder)}: {links} {verb} to {relative(new, folder)}"
         out.print(show.plain(text), markup=False)
-    return 0
+    return Exit.DONE
 
 
 def _any(_path: str) -> None:

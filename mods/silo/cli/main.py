@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """``silo-mod``: the command line. Each command is parse → call → print.
 
-Exit codes: 0 done · 1 differences or something left undone · 2 bad input · 3 the server or the way to it
-· 130 cancelled.
+Exit codes: :class:`silo.bom.errors.Exit`.
 """
 
 from __future__ import annotations
@@ -18,10 +17,9 @@ from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from typing import TextIO, TypeVar
 
-from silo.bom.errors import CancelledError, ConflictError, RejectedError, RemoteError, SiloError
+from silo.bom.errors import CancelledError, Exit, InputError, SiloError, exit_of
 
 T = TypeVar("T")
-OK, UNDONE, BAD_INPUT, REMOTE, CANCELLED = 0, 1, 2, 3, 130
 
 _MODULES = (
     "bom",
@@ -87,21 +85,29 @@ def _run(argv: Sequence[str] | None) -> int:
         args = build_parser().parse_args(argv)
         if getattr(args, "ends_with_its_reader", False):
             sys.stdout.strict = True  # type: ignore[union-attr]
+        _refuse_empty(args)
         code: int = args.run(args)
         return code
     except KeyboardInterrupt:
         print("\nCancelled.", file=sys.stderr)
-        return CANCELLED
+        return Exit.CANCELLED
     except BrokenPipeError:
-        return OK  # of a command that only ends with its reader
+        return Exit.DONE  # of a command that only ends with its reader
     except OSError as error:
         return _system_said_no(error)
     except CancelledError:
         print("Cancelled.", file=sys.stderr)
-        return CANCELLED
+        return Exit.CANCELLED
     except SiloError as error:
         _tell(error)
-        return REMOTE if isinstance(error, RemoteError | ConflictError) else BAD_INPUT
+        return exit_of(error)
+
+
+def _refuse_empty(args: argparse.Namespace) -> None:
+    """A variable of a script that is not set must not mean the current folder."""
+    for name, value in vars(args).items():
+        if value == "" or (isinstance(value, list) and "" in value):
+            raise InputError(f"the argument {name.upper()} is empty (''); leave it out, or give it a value")
 
 
 def _open_streams() -> None:
@@ -167,12 +173,12 @@ def _system_said_no(error: OSError) -> int:
     """A file that we were asked to write, or the output itself: no such folder, no right, a full disk."""
     what = error.filename or "the output cannot be written"
     print(f"silo-mod: {what}: {error.strerror or error}", file=sys.stderr)
-    return BAD_INPUT
+    return Exit.BAD_INPUT
 
 
 def _tell(error: SiloError) -> None:
     print(f"silo-mod: {error}", file=sys.stderr)
-    for problem in error.problems if isinstance(error, RejectedError) else ():
+    for problem in getattr(error, "problems", ()):
         print(f"  - {problem}", file=sys.stderr)
 
 

@@ -8,7 +8,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from silo.bom.errors import InputError, SiloError
+from silo.bom.errors import Exit, InputError, SiloError
 from silo.cli import common
 from silo.cli.common import Commands
 
@@ -84,7 +84,7 @@ def run_pull(args: argparse.Namespace) -> int:
         common.print_json(pulled_json(pulled, Path(os.path.realpath(into))))
     else:
         _show_pulled(pulled, into)
-    return 0 if pulled.complete else 1
+    return Exit.DONE if pulled.complete else Exit.UNDONE
 
 
 _MARKS = {
@@ -155,7 +155,7 @@ def run_log(args: argparse.Namespace) -> int:
         common.print_json(_log_json(item.part_number, shown, here, changes, args.bom))
     else:
         _show_log(item.part_number, item.name, shown, here, changes, len(known))
-    return 0
+    return Exit.DONE
 
 
 def _here(

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""``silo-mod register``: items for components without a number, and the identity into their files."""
+"""``silo-mod register``: items for components without a number, and the identity into their files.
+
+Asked one by one, as a table to edit (``--plan``, ``--apply``), or all at once (``--yes``).
+"""
 
 from __future__ import annotations
 
@@ -8,10 +11,13 @@ import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from silo.bom.declare import Modelled
-from silo.bom.errors import ConflictError, DocumentError, InputError, SiloError
+from silo.bom.errors import ConflictError, DocumentError, Exit, InputError
+from silo.bom.findings import Finding
+from silo.bom.identity import walk_entries
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.naming import Proposal, propose, propose_all
 from silo.bom.paths import relative
@@ -19,15 +25,16 @@ from silo.bom.report import base_of
 from silo.bom_sync import resolve
 from silo.cli import common
 from silo.cli.common import Commands
-from silo.declaring import chosen, declare, modelled
+from silo.cli.register_dialog import Dialog
+from silo.declaring import chosen, modelled
 from silo.open_in_freecad import open_in_any
-from silo.registration import Ask, Journal, Registration, unclear
-from silo.registration import register as register_component
-from silo.standard_items import register_standard
+from silo.registering.offer import Candidate, Offer, Seen, State, offer
+from silo.registering.orders import Order, carry_out
+from silo.registering.table import doubts, orders_of, read_table, write_table
+from silo.registration import Journal, Registration, component_key, document_uid, unclear
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
-    from silo.bom.categories import Categories
 
 _MOST_MODELLED = 40
 _OPEN = (
@@ -42,10 +49,21 @@ def register(commands: Commands) -> None:
         commands,
         "register",
         "create items for components without a part number and write their identity into the files",
-        "silo-mod register TopAssembly.FCStd --yes",
+        "silo-mod register vault/ --plan parts.csv      (edit the table, then)\n"
+        "  silo-mod register vault/ --apply parts.csv",
     )
-    common.add_assembly_options(parser)
-    parser.add_argument("--yes", action="store_true", help="take every proposal without asking")
+    common.add_assembly_options(parser, folders=True)
+    how = parser.add_mutually_exclusive_group()
+    how.add_argument("--yes", action="store_true", help="take every proposal without asking")
+    how.add_argument("--plan", metavar="FILE", help="write the proposals as a table (CSV) to edit; no more")
+    how.add_argument("--apply", metavar="FILE", help="register what an edited table says")
+    parser.add_argument(
+        "--duplicates",
+        choices=("leave", "join", "new"),
+        default="leave",
+        help="with --yes, what Silo seems to have already: leave it out and say so (default), join the one "
+        "item that it seems to be, or make a new item",
+    )
     parser.add_argument(
         "--schema",
         default="kindred-rd",
@@ -86,52 +104,309 @@ def register(commands: Commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Register what is unregistered; 1 where something was skipped or failed."""
-    if not args.yes and not sys.stdin.isatty():
-        raise InputError("register asks before it creates items, and there is nobody to ask here; say --yes")
+    if not (args.yes or args.plan or args.apply or args.undeclare or sys.stdin.isatty()):
+        raise InputError(
+            "register asks before it creates items, and there is nobody to ask here; say --yes, "
+            "or write a table with --plan FILE, edit it, and use it with --apply FILE"
+        )
+    if (args.declare or args.undeclare) and (args.plan or args.apply or os.path.isdir(args.top)):
+        raise InputError("--declare and --undeclare are for one file, and not for a table")
     if args.undeclare:
         return _undeclare(args)
     if args.declare:
         return _declare(args)
-    extraction = common.read_top(args)
-    articles = [one for one in modelled(args.top, args.assembly) if not one.declared]
+    rows = read_table(Path(args.apply).read_bytes(), args.apply) if args.apply else []
+    extraction, unused = _folder(args) if os.path.isdir(args.top) else (common.read_top(args), frozenset())
+    base = os.path.realpath(args.top) if os.path.isdir(args.top) else base_of(extraction)
     with common.client_of(args) as client:
         schema = client.find_schema(args.schema)
-        proposals = proposals_for(extraction, client, schema)
-        if args.category:
-            proposals = [p if p.entry.is_assembly else replace(p, category=args.category) for p in proposals]
-        is_open = _never if args.even_if_open else _now
-        chosen = proposals if args.yes else _ask(proposals, base_of(extraction))
-        done = register_all(chosen, client, schema=schema, ask=_asker(args.unclear), is_open=is_open)
-    skipped = [p for p in proposals if p not in chosen]
-    _tell(args, extraction, done, skipped, articles)
-    return 1 if skipped or any(r.error for r in done) else 0
+        found = _offer(extraction, client, schema, args)
+        _tell_rules(found.categories)
+        if args.category and args.category not in found.categories:
+            known = ", ".join(found.categories)
+            raise InputError(f"--category: schema {schema} has no {args.category}; it has {known}")
+        run = _Run(args, client, schema, found, base)
+        if args.plan:
+            return run.write_plan(unused)
+        if args.apply:
+            planned = orders_of(rows, found, base, client, args.apply)
+            return run.register(planned.orders, planned.unlisted, already=planned.done)
+        if args.yes:
+            orders, left = run.all_but_duplicates(unused)
+            return run.register(orders, left)
+        offered = [
+            one for one in found.candidates if one.article is None and one.entry.doc_path not in unused
+        ]
+        orders, left = Dialog(offered, found, client, base, _own).ask()
+        return run.register(orders, left)
+
+
+# --- what there is --------------------------------------------------------------------------------------
+
+
+def _folder(args: argparse.Namespace) -> tuple[Extraction, frozenset[str]]:
+    """All components of a folder's assemblies, and the files that no assembly uses."""
+    from silo.vault.reading import Question
+
+    entries: dict[tuple[str, str], BomEntry] = {}
+    findings: list[Finding] = []
+    with common.plan_of(args) as (plan, reading, base):
+        for node in (node for layer in plan.layers for node in layer):
+            found = plan.extraction(node, reading)
+            findings += found.findings
+            for entry in (*found.entries, found.assembly):
+                entries.setdefault(entry.key, replace(entry, children=()))
+        used = {path for path, _ in entries}
+        alone = [top for top in plan.tops if os.path.realpath(top) not in used and top not in plan.errors]
+        for answer in reading.ask_many(Question(top, None, not args.no_hardware) for top in alone):
+            if isinstance(part := answer.found, Extraction):
+                head = part.assembly
+                entries.setdefault(head.key, replace(head, children=(), is_assembly=False))
+        for path, error in plan.errors.items():
+            print(f"silo-mod: {relative(path, base)} is left out: {error}", file=sys.stderr)
+    unused = frozenset(path for path, _ in entries) - used
+    head = BomEntry(base, object_name="", is_assembly=True, level=0)
+    return Extraction(head, tuple(entries.values()), tuple(dict.fromkeys(findings))), unused
+
+
+def _offer(extraction: Extraction, client: SiloClient, schema: str, args: argparse.Namespace) -> Offer:
+    folder = os.path.isdir(args.top)
+    paths = {entry.doc_path for entry in walk_entries((extraction.assembly, *extraction.entries))}
+    seen = {path: Seen(_state(path, args.even_if_open)) for path in paths}
+    journal = Journal()
+    found = offer(
+        extraction, seen, client, schema, _Told(), journal.pending(), most=None, own_file=not folder
+    )
+    candidates = [one for one in found.candidates if not folder or one.entry.key != extraction.assembly.key]
+    if args.category:
+        candidates = [
+            one
+            if one.entry.is_assembly
+            else replace(one, proposal=replace(one.proposal, category=args.category, is_guess=False))
+            for one in candidates
+        ]
+    return replace(found, candidates=tuple(candidates))
+
+
+def _tell_rules(categories: Mapping[str, str]) -> None:
+    """A mistake in the site's rules costs proposals, no more; it is said on stderr."""
+    from silo.api.activity import rules_text
+    from silo.cli.show import plain
+
+    if problem := getattr(categories, "problem", ""):
+        print(f"silo-mod: {plain(rules_text(problem))}", file=sys.stderr)
+
+
+def _state(path: str, even_if_open: bool) -> State:
+    if not os.path.isfile(path):
+        return State.MISSING
+    if not os.access(path, os.W_OK):
+        return State.READ_ONLY
+    return State.ELSEWHERE if not even_if_open and open_in_any().has_file(path) else State.READY
+
+
+def _own(candidate: Candidate) -> bool:
+    """True where the look-alike is its own item, made by a run that was interrupted or undone."""
+    record = Journal().find(component_key(candidate.entry))
+    if record is None:
+        return False
+    return not record.finished or record.document_uid == document_uid(candidate.entry)
+
+
+class _Told:
+    """A long run on a terminal says where it is; Ctrl-C ends it."""
+
+    def progress(self, detail: str = "", fraction: float | None = None) -> None:
+        from silo.cli import show
+
+        if fraction and sys.stderr.isatty():
+            print(f"[{fraction:4.0%}] {show.plain(detail)}", file=sys.stderr)
+
+    def check(self) -> None:
+        return
+
+
+# --- doing it -------------------------------------------------------------------------------------------
+
+
+class _Run:
+    """One registration, from orders to the report."""
+
+    def __init__(
+        self, args: argparse.Namespace, client: SiloClient, schema: str, found: Offer, base: str
+    ) -> None:
+        self.args, self.client, self.schema, self.found, self.base = args, client, schema, found, base
+        self.done: list[Registration] = []
+
+    def write_plan(self, unused: frozenset[str]) -> int:
+        """The table; nothing is registered."""
+        from silo.durable import replacing
+
+        earlier: list[Candidate] = []
+
+        def wanted(one: Candidate) -> bool:
+            doubtful = bool(doubts(one, earlier)) and not _own(one)
+            earlier.append(one)
+            return not doubtful and one.article is None and one.entry.doc_path not in unused
+
+        table = write_table(self.found, wanted, self.base)
+        if self.args.plan == "-":
+            sys.stdout.write(table.decode("utf-8-sig", "surrogateescape"))
+            return Exit.DONE
+        with replacing(Path(self.args.plan)) as file:
+            file.write(table)
+        count = sum(not one.declared for one in self.found.candidates)
+        print(
+            f"{self.args.plan}: {count} {'row' if count == 1 else 'rows'}. Edit it, then: "
+            f"silo-mod register {self.args.top} --apply {self.args.plan}",
+            file=sys.stderr,
+        )
+        return Exit.DONE
+
+    def all_but_duplicates(self, unused: frozenset[str]) -> tuple[list[Order], list[Candidate]]:
+        """Every proposal; what seems to be an item already is treated as ``--duplicates`` says."""
+        orders, left = [], []
+        earlier: list[Candidate] = []
+        for one in self.found.candidates:
+            if one.article is not None or one.same_as or one.entry.doc_path in unused:
+                continue
+            doubtful = bool(doubts(one, earlier)) and not _own(one)
+            earlier.append(one)
+            if not doubtful or self.args.duplicates == "new":
+                orders.append(Order.of(one))
+            elif self.args.duplicates == "join" and len(one.similar) == 1:
+                orders.append(replace(Order.of(one), existing=one.similar[0]))
+            else:
+                left.append(one)
+        if unused and not self.args.json:
+            count = len(unused)
+            files = "1 file" if count == 1 else f"{count} files"
+            print(
+                f"{files} that no assembly uses: left alone (name the file, or use --plan)", file=sys.stderr
+            )
+        return orders, left
+
+    def register(self, orders: Sequence[Order], left: Sequence[Candidate], *, already: int = 0) -> int:
+        """Carry out; what was done is reported also where Ctrl-C ends it."""
+        try:
+            done = carry_out_in_files(
+                orders,
+                self.client,
+                schema=self.schema,
+                ask=_asker(self.args.unclear),
+                even_if_open=self.args.even_if_open,
+                done=self.done,
+            )
+        finally:
+            self._report(left, already)
+        return Exit.UNDONE if left or any(one.error for one in done) else Exit.DONE
+
+    def _report(self, left: Sequence[Candidate], already: int) -> None:
+        articles = [
+            one.article for one in self.found.candidates if one.article is not None and not one.declared
+        ]
+        declared = {one.proposal.entry.key for one in self.done}
+        report(
+            self.args,
+            self.base,
+            self.done,
+            [(one.proposal, "; ".join(doubts(one, self.found.candidates))) for one in left],
+            [one for one in articles if one.entry.key not in declared],
+        )
+        if already and not self.args.json:
+            print(f"{already} of the table's components had their number already.")
+
+
+def carry_out_in_files(
+    orders: Sequence[Order],
+    client: SiloClient,
+    *,
+    schema: str,
+    ask: Callable[[Proposal, Sequence[Mapping[str, Any]]], Mapping[str, Any] | None] = unclear,
+    even_if_open: bool = True,
+    done: list[Registration] | None = None,
+) -> list[Registration]:
+    """Register, with the identities written into the files; ``done`` grows with each.
+
+    even_if_open
+        also files that a running FreeCAD has open; else they are left alone, and are an error.
+    """
+    from silo.fcstd import check_stampable, stamp
+
+    results: list[Registration] = [] if done is None else done
+
+    def places(candidate: Candidate) -> list[tuple[str | None, str | None]]:
+        """(the object that the identity is for, the object that gets the property), each once."""
+        if candidate.article is not None:
+            return [(name, name) for name in candidate.article.objects]
+        name = candidate.entry.object_name
+        return [(name if candidate.shares_file else None, name or None)]
+
+    def write(candidate: Candidate, identity: str) -> None:
+        for own, item in places(candidate):
+            again = bool(candidate.same_as)
+            stamp(candidate.entry.doc_path, identity, object_name=own, item_object=item, replace=again)
+
+    def check(candidate: Candidate) -> None:
+        # Looked at anew for each file: people open files while a long run is under way.
+        if not even_if_open and open_in_any().has_file(candidate.entry.doc_path):
+            raise DocumentError(candidate.entry.doc_path, _OPEN)
+        for own, item in places(candidate):
+            again = bool(candidate.same_as)
+            check_stampable(candidate.entry.doc_path, object_name=own, item_object=item, replace=again)
+
+    carry_out(
+        orders,
+        client,
+        Journal(),
+        write,
+        schema=schema,
+        control=_Told(),
+        done=lambda _order, result: results.append(result),
+        check=check,
+        ask=lambda _order, proposal, items: ask(proposal, items),
+    )
+    return results
+
+
+def proposals_for(extraction: Extraction, client: SiloClient, schema: str) -> list[Proposal]:
+    """What to register: the components without an item, parts first, and the assembly itself last."""
+    wanted = resolve(extraction, client).unregistered
+    tree = (extraction.assembly, *extraction.entries)
+    return propose_all(wanted, tree, client.categories(schema)) if wanted else []
+
+
+def register_all(
+    proposals: Sequence[Proposal], client: SiloClient, *, schema: str, **more: Any
+) -> list[Registration]:
+    """Register these as they were proposed (:func:`carry_out_in_files`)."""
+    orders = [Order.of(Candidate(one, State.READY)) for one in proposals]
+    return carry_out_in_files(orders, client, schema=schema, **more)
 
 
 def _declare(args: argparse.Namespace) -> int:
     """Give what is modelled in the file an identity; 1 where that failed."""
     articles = modelled(args.top, args.assembly)
     wanted = chosen(articles, args.declare, apart=args.apart)
-    extraction = common.read_assembly(args.top, args.assembly, hardware=not args.no_hardware)
-    done = []
+    for one in wanted:
+        if one.declared:
+            raise InputError(f"{one.entry.label} is a component already; --undeclare takes that back")
     with common.client_of(args) as client:
         schema = client.find_schema(args.schema)
-        categories = _categories(client, schema)
-        is_open = _never if args.even_if_open else _now
-
-        def check(path: str) -> None:
-            if is_open(path):
-                raise DocumentError(path, _OPEN)
-
-        for one in wanted:
-            if one.declared:
-                raise InputError(f"{one.entry.label} is a component already; --undeclare takes that back")
-            proposal = propose(one.entry, categories, shares_file=True)
-            if args.category:
-                proposal = replace(proposal, category=args.category)
-            asker = _asker(args.unclear)
-            done.append(declare(one, proposal, client, Journal(), schema=schema, ask=asker, check=check))
-    _tell(args, extraction, done, [], [one for one in articles if one not in wanted and not one.declared])
-    return 1 if any(result.error for result in done) else 0
+        categories = client.categories(schema)
+        _tell_rules(categories)
+        found = Offer(
+            tuple(
+                Candidate(propose(one.entry, categories, shares_file=True), State.READY, article=one)
+                for one in (*wanted, *(one for one in articles if one not in wanted))
+            ),
+            categories,
+        )
+        orders = [Order.of(one) for one in found.candidates[: len(wanted)]]
+        if args.category:
+            orders = [replace(one, category=args.category) for one in orders]
+        base = os.path.dirname(os.path.realpath(args.top))
+        return _Run(args, client, schema, found, base).register(orders, ())
 
 
 def _undeclare(args: argparse.Namespace) -> int:
@@ -141,7 +416,7 @@ def _undeclare(args: argparse.Namespace) -> int:
     articles = [one for one in modelled(args.top, args.assembly) if one.declared]
     path = articles[0].entry.doc_path if articles else os.path.realpath(args.top)
     wanted = chosen(articles, args.undeclare)
-    if not args.even_if_open and _now(path):
+    if not args.even_if_open and open_in_any().has_file(path):
         raise DocumentError(path, _OPEN)
     names = [name for one in wanted for name in one.objects]
     taken = [name for name in names if unstamp(path, name)]
@@ -149,83 +424,10 @@ def _undeclare(args: argparse.Namespace) -> int:
         common.print_json({"undeclared": taken})
     else:
         print(f"No component any more: {', '.join(taken)}. The next sync flags the line as unreferenced.")
-    return 0
+    return Exit.DONE
 
 
-def proposals_for(extraction: Extraction, client: SiloClient, schema: str) -> list[Proposal]:
-    """What to register: the components without an item, parts first, and the assembly itself last."""
-    wanted = resolve(extraction, client).unregistered
-    tree = (extraction.assembly, *extraction.entries)
-    return propose_all(wanted, tree, _categories(client, schema)) if wanted else []
-
-
-def _categories(client: SiloClient, schema: str) -> Categories:
-    """A mistake in the site's rules costs proposals, no more; it is said on stderr."""
-    from silo.api.activity import rules_text
-    from silo.cli.show import plain
-
-    found = client.categories(schema)
-    if found.problem:
-        print(f"silo-mod: {plain(rules_text(found.problem))}", file=sys.stderr)
-    return found
-
-
-def _never(_path: str) -> bool:
-    return False
-
-
-def _now(path: str) -> bool:
-    # Looked at anew for each file: people open files while a long run is under way.
-    return open_in_any().has_file(path)
-
-
-def register_all(
-    proposals: Sequence[Proposal],
-    client: SiloClient,
-    *,
-    schema: str,
-    ask: Ask = unclear,
-    is_open: Callable[[str], bool] = _never,
-) -> list[Registration]:
-    """Register each; one failure does not stop the rest, unless it concerns all of them.
-
-    is_open
-        True for a file that a running FreeCAD has open; it is left alone, and its component is an error.
-    """
-    from silo.api.policy import ends_run
-    from silo.fcstd import check_stampable, stamp
-
-    shared = {proposal.entry.key for proposal in proposals if proposal.shares_file}
-
-    def own_name(entry: BomEntry) -> str | None:
-        return entry.object_name if entry.key in shared else None
-
-    def write(entry: BomEntry, identity: str) -> None:
-        item = entry.object_name or None
-        stamp(entry.doc_path, identity, object_name=own_name(entry), item_object=item)
-
-    def check(entry: BomEntry) -> None:
-        item = entry.object_name or None
-        if is_open(entry.doc_path):
-            raise DocumentError(entry.doc_path, _OPEN)
-        check_stampable(entry.doc_path, object_name=own_name(entry), item_object=item)
-
-    journal, done = Journal(), []
-    stopped: SiloError | None = None
-    for proposal in proposals:
-        if stopped is not None:
-            done.append(Registration(proposal, error=stopped))
-            continue
-        if proposal.entry.is_standard:
-            result = register_standard(proposal, client, schema=schema)
-        else:
-            result = register_component(proposal, client, journal, write, schema=schema, check=check, ask=ask)
-        stopped = result.error if result.error is not None and ends_run(result.error, client) else None
-        done.append(result)
-    return done
-
-
-def _asker(how: str) -> Ask:
+def _asker(how: str) -> Callable[[Proposal, Sequence[Mapping[str, Any]]], Mapping[str, Any] | None]:
     """Which of the items that fit an interrupted run made: as ``--unclear`` says."""
 
     def ask(proposal: Proposal, found: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
@@ -249,46 +451,23 @@ def _asker(how: str) -> Ask:
     return ask
 
 
-def _guess(proposal: Proposal) -> str:
-    return " (a guess)" if proposal.is_guess else ""
+# --- what people and machines see -----------------------------------------------------------------------
 
 
-def _ask(proposals: Sequence[Proposal], base: str) -> list[Proposal]:
-    chosen: list[Proposal] = []
-    for number, proposal in enumerate(proposals, start=1):
-        where = relative(proposal.entry.doc_path, base)
-        what = proposal.entry.standard or f"{where}#{proposal.entry.object_name}"
-        question = (
-            f"[{number}/{len(proposals)}] {what}: register as "
-            f"{proposal.item_type} {proposal.name!r} in category {proposal.category}{_guess(proposal)}? "
-            "[Y/n/q/new name] "
-        )
-        try:
-            answer = input(question).strip()
-        except EOFError:
-            break
-        if answer.lower() == "q":
-            break
-        if answer.lower() in ("n", "no"):
-            continue
-        chosen.append(proposal if answer.lower() in ("", "y", "yes") else replace(proposal, name=answer))
-    return chosen
-
-
-def _tell(
+def report(
     args: argparse.Namespace,
-    extraction: Extraction,
+    base: str,
     done: Sequence[Registration],
-    skipped: Sequence[Proposal],
-    articles: Sequence[Modelled] = (),
+    left: Sequence[tuple[Proposal, str]],
+    articles: Sequence[Modelled],
 ) -> None:
-    base = base_of(extraction)
+    """What became of each; ``left``: proposals that were not registered, and why."""
     if args.json:
         common.print_json(
             {
                 "registered": [_row(r.proposal, base, r) for r in done if r.error is None],
                 "failed": [_row(r.proposal, base, r) for r in done if r.error is not None],
-                "unregistered": [_row(p, base) for p in skipped],
+                "unregistered": [_row(proposal, base, note=why) for proposal, why in left],
                 "modelled": [_modelled_row(one, base) for one in articles],
             }
         )
@@ -296,17 +475,26 @@ def _tell(
     from silo.cli import show
 
     out = show.console()
-    if not done and not skipped:
+    if not done and not left:
         out.print("Every component has its part number already.")
     for result in done:
         name = show.plain(result.proposal.name)
         if result.error is None:
-            out.print(f"✓ {result.part_number}  {name}{_guess(result.proposal)}", markup=False)
+            guess = " (the category is a guess)" if result.proposal.is_guess else ""
+            found = " (the item was there already)" if result.found else ""
+            out.print(f"✓ {result.part_number}  {name}{guess}{found}", markup=False)
         else:
             out.print(f"✗ {name}: {show.plain(str(result.error))}", style="red", markup=False)
-    for proposal in skipped:
-        where = relative(proposal.entry.doc_path, base)
-        out.print(f"⚠ {show.plain(where)}: unregistered, left out of the BOM", style="yellow", markup=False)
+    for proposal, why in left:
+        where = proposal.entry.standard or relative(proposal.entry.doc_path, base)
+        reason = f" ({show.plain(why)})" if why else ""
+        text = f"⚠ {show.plain(where)}: unregistered, left out of the BOM{reason}"
+        out.print(text, style="yellow", markup=False)
+    if args.yes and any(why for _, why in left):
+        out.print(
+            "Is it the same part? --duplicates join takes the item, --duplicates new makes another; "
+            "--plan asks for each."
+        )
     for line in _modelled_text(articles, base) if articles else ():
         out.print(line, markup=False, highlight=False)
 
@@ -339,7 +527,9 @@ def _modelled_text(articles: Sequence[Modelled], base: str) -> list[str]:
     return lines
 
 
-def _row(proposal: Proposal, base: str, result: Registration | None = None) -> Mapping[str, Any]:
+def _row(
+    proposal: Proposal, base: str, result: Registration | None = None, note: str = ""
+) -> Mapping[str, Any]:
     row: dict[str, Any] = {
         "doc_path": relative(proposal.entry.doc_path, base),
         "object": proposal.entry.object_name,
@@ -348,9 +538,10 @@ def _row(proposal: Proposal, base: str, result: Registration | None = None) -> M
         "item_type": proposal.item_type,
         "category": proposal.category,
         "guess": proposal.is_guess,
+        "note": note,
     }
     if result is not None and result.error is None:
-        row |= {"part_number": result.part_number, "silo_uuid": result.item_id}
+        row |= {"part_number": result.part_number, "silo_uuid": result.item_id, "found": result.found}
     if result is not None and result.error is not None:
         row |= {"error": {"code": result.error.code, "message": str(result.error)}}
     return row

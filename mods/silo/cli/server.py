@@ -11,11 +11,10 @@ import signal
 import sys
 from contextlib import suppress
 from dataclasses import asdict
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from silo.api.activity import activity_text
-from silo.bom.errors import AuthError, ConfigError, NotFoundError, RouteMissingError
+from silo.bom.errors import AuthError, ConfigError, Exit, NotFoundError, RouteMissingError
 from silo.cli import common
 from silo.cli.common import Commands
 
@@ -80,7 +79,7 @@ def run_serve(args: argparse.Namespace) -> int:
         serve(
             args.host, args.port, args.database, workers=args.workers, reset_admin=args.reset_admin, tell=tell
         )
-    return 0
+    return Exit.DONE
 
 
 def _add_backup(commands: Commands) -> None:
@@ -90,7 +89,9 @@ def _add_backup(commands: Commands) -> None:
         "save a server's database and files to a new folder, while it serves",
         "silo-mod backup /backups/silo-2026-02-08 --database postgresql://silo@localhost/silo",
     )
-    backup.add_argument("target", metavar="TARGET", type=Path, help="a folder that does not exist yet")
+    backup.add_argument(
+        "target", metavar="TARGET", type=common.a_path, help="a folder that does not exist yet"
+    )
     _add_place(backup)
     backup.set_defaults(run=run_backup)
     restore = common.add_command(
@@ -99,7 +100,7 @@ def _add_backup(commands: Commands) -> None:
         "bring a server's database and files back from a backup, to SQLite or PostgreSQL",
         "silo-mod restore /backups/silo-2026-02-08 --database sqlite:///silo.db",
     )
-    restore.add_argument("source", metavar="SOURCE", type=Path, help="the folder of a backup")
+    restore.add_argument("source", metavar="SOURCE", type=common.a_path, help="the folder of a backup")
     restore.add_argument(
         "--replace", action="store_true", help="replace a database that has items; they are lost"
     )
@@ -115,7 +116,10 @@ def _add_place(parser: argparse.ArgumentParser) -> None:
         "--database", metavar="URL", help="sqlite:///FILE or postgresql://… (else SILO_DATABASE_URL)"
     )
     parser.add_argument(
-        "--files", metavar="FOLDER", type=Path, help="the folder of files (else SILO_STORAGE_ROOT_DIR)"
+        "--files",
+        metavar="FOLDER",
+        type=common.a_path,
+        help="the folder of files (else SILO_STORAGE_ROOT_DIR)",
     )
     common.add_json_option(parser)
 
@@ -132,7 +136,7 @@ def run_backup(args: argparse.Namespace) -> int:
         print(f"missing: the file {checksum} is lost or damaged in the server's store", file=sys.stderr)
     text = f"Backup {args.target}: {sum(made.rows.values())} rows, {made.files} files."
     print(json.dumps(asdict(made)) if args.json else text)
-    return 1 if made.missing_files else 0
+    return Exit.UNDONE if made.missing_files else Exit.DONE
 
 
 def run_restore(args: argparse.Namespace) -> int:
@@ -149,7 +153,7 @@ def run_restore(args: argparse.Namespace) -> int:
         made = restore(settings, args.source, replace=args.replace, report=_report)
         text = f"Restored the backup of {made.made_at}: {sum(made.rows.values())} rows, {made.files} files."
     print(json.dumps(asdict(made)) if args.json else text)
-    return 0
+    return Exit.DONE
 
 
 def _report(text: str) -> None:
@@ -227,7 +231,7 @@ def _print_events(
             )
         else:
             _show_event(client, event)
-    return 0
+    return Exit.DONE
 
 
 def _show_event(client: SiloClient, event: ServerEvent) -> None:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from silo.bom.errors import ConfigError, ForbiddenError, InputError, NotFoundError, SiloError
+from silo.bom.errors import ConfigError, Exit, ForbiddenError, InputError, NotFoundError, SiloError
 from silo.cli import common
 from silo.cli.common import Commands
 
@@ -27,6 +27,7 @@ def register(commands: Commands) -> None:
     _add_login(commands)
     _add_doctor(commands)
     _add_install_addon(commands)
+    _add_schema(commands)
 
 
 def _add_login(commands: Commands) -> None:
@@ -39,6 +40,7 @@ def _add_login(commands: Commands) -> None:
     parser.add_argument("url", metavar="URL", help="address of the Silo server")
     parser.add_argument("--token", help="API token (else it is asked for, or read from standard input)")
     parser.add_argument("--ca", metavar="FILE", help="certificate authorities to trust")
+    common.add_json_option(parser)
     parser.set_defaults(run=run_login)
 
 
@@ -50,15 +52,20 @@ def run_login(args: argparse.Namespace) -> int:
     where = resolve_server(args.url, args.token or _token(args.url), args.ca, env={}, path=config_path())
     with SiloClient(where.url, where.token, verify=where.verify) as client:
         client.ready()
+        name, role = None, None
         try:
             user = client.whoami()
-            who = f"{user.username}, {user.role}" if user.role else user.username
+            name, role = user.username, user.role or None
         except NotFoundError:
-            who = "this server does not say who you are"
             client.search_items(limit=1)
     path = save_config(where.url, where.token, where.verify)
-    print(f"{client.base_url}: {who}. Kept in {path}, which only you can read.")
-    return 0
+    if args.json:
+        data = {"url": client.base_url, "username": name, "role": role, "configuration": str(path)}
+        common.print_json(data)
+    else:
+        who = ", ".join(filter(None, (name, role))) or "this server does not say who you are"
+        print(f"{client.base_url}: {who}. Kept in {path}, which only you can read.")
+    return Exit.DONE
 
 
 def _token(url: str) -> str:
@@ -103,7 +110,7 @@ def run_doctor(args: argparse.Namespace) -> int:
         width = max(map(len, found))
         for name, value in found.items():
             print(f"{'✗' if name in failed else ' '} {name:<{width}}  {show.plain(str(value))}")
-    return 3 if failed else 0
+    return Exit.REMOTE if failed else Exit.DONE
 
 
 def _machine() -> Rows:
@@ -252,6 +259,7 @@ def _add_install_addon(commands: Commands) -> None:
     parser.add_argument("--freecadcmd", metavar="PATH", help="freecadcmd (default: found on the PATH)")
     parser.add_argument("--freecad-data", metavar="DIR", help="its data folder (default: FreeCAD is asked)")
     parser.add_argument("--copy", action="store_true", help="copy the add-on, do not link to this checkout")
+    common.add_json_option(parser)
     parser.set_defaults(run=run_install_addon)
 
 
@@ -260,8 +268,39 @@ def run_install_addon(args: argparse.Namespace) -> int:
     from silo.addon_install import ask_freecad, install_folder, install_packages
 
     place = ask_freecad(args.freecadcmd, Path(args.freecad_data) if args.freecad_data else None)
-    print("FreeCAD {}.{} with Python {}.{}".format(*place.freecad, *place.python))
-    print(f"Add-on:   {install_folder(place, copy=args.copy)}")
-    print(f"Packages: {install_packages(place)}")
-    print("Start FreeCAD again, and choose the workbench Silo.")
-    return 0
+    found = {
+        "freecad": "FreeCAD {}.{} with Python {}.{}".format(*place.freecad, *place.python),
+        "addon": str(install_folder(place, copy=args.copy)),
+        "packages": str(install_packages(place)),
+    }
+    if args.json:
+        common.print_json(found)
+    else:
+        print(f"{found['freecad']}\nAdd-on:   {found['addon']}\nPackages: {found['packages']}")
+        print("Start FreeCAD again, and choose the workbench Silo.")
+    return Exit.DONE
+
+
+def _add_schema(commands: Commands) -> None:
+    parser = common.add_command(
+        commands,
+        "schema",
+        "print the JSON Schema of what a command prints with --json",
+        "silo-mod schema bom > bom.schema.json",
+    )
+    parser.add_argument("name", metavar="COMMAND", nargs="?", help="the command (default: list them)")
+    common.add_json_option(parser)
+    parser.set_defaults(run=run_schema)
+
+
+def run_schema(args: argparse.Namespace) -> int:
+    """Print one schema, or the names of all."""
+    from silo.cli.shapes import NAMES, schema_of
+
+    if args.name is not None:
+        common.print_json(schema_of(args.name))
+    elif args.json:
+        common.print_json(NAMES)
+    else:
+        print("\n".join(NAMES))
+    return Exit.DONE

@@ -115,8 +115,12 @@ def _quantity(value: float | None) -> str:
     return "?" if value is None else f"{value:g}"
 
 
-def diff_table(diff: BomDiff, names: Mapping[str, str]) -> RenderableType:
-    """CAD against server, one row per line that differs or is a person's own."""
+def diff_table(diff: BomDiff, names: Mapping[str, str], *, whole: bool = True) -> RenderableType:
+    """CAD against server, one row per line that differs or is a person's own.
+
+    whole
+        False where components are missing or have no number: then nobody knows that nothing differs.
+    """
     table = Table(box=None, pad_edge=False)
     for title, justify in (
         ("", "left"),
@@ -152,6 +156,8 @@ def diff_table(diff: BomDiff, names: Mapping[str, str]) -> RenderableType:
     for line in diff.manual:
         if line.part_number not in disputed:
             row("✎", "blue", line.part_number, _quantity(line.quantity), "manual line; not touched")
+    if not table.row_count and not whole:
+        return Text(f"Lines that agree: {len(diff.unchanged)}; the others cannot be compared.", "yellow")
     if not table.row_count:
         return Text(f"No differences; lines that agree: {len(diff.unchanged)}.", "green")
     if not diff.unchanged:

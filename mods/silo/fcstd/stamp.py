@@ -66,6 +66,7 @@ def check_stampable(
     *,
     object_name: str | None = None,
     item_object: str | None = None,
+    replace: bool = False,
     limits: Limits | None = None,
 ) -> None:
     """Raise the DocumentError that :func:`stamp` would raise for a new identity; changes nothing.
@@ -75,7 +76,7 @@ def check_stampable(
     real = os.path.realpath(path)
     limits = limits or Limits()
     with ContainerFile(real, limits) as container:
-        _present(real, container.state, "", object_name, False, limits, item_object)
+        _present(real, container.state, "", object_name, replace, limits, item_object)
         check_writable(real)
         _stamped_xml(container, meta_key(object_name or ""), "0" * 36, limits, item_object)
 

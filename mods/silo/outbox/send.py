@@ -49,7 +49,7 @@ from silo.bom.errors import (
     SiloError,
 )
 from silo.bom.merge import MergePlan
-from silo.bom.paths import project_folder
+from silo.bom.report import project_folder
 from silo.bom.snapshot import from_plain
 from silo.bom_sync import Resolved, Status, decide, merge_request, resolve, server_lines
 from silo.outbox.database import OutboxError

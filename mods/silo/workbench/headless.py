@@ -11,7 +11,7 @@ With ``lines`` the BOMs are only read, and
 written there one JSON object per line as they are finished: that is how ``silo-mod … --via freecad`` asks.
 Otherwise they are synced with the server of ``SILO_API_URL`` and ``SILO_API_TOKEN`` (or the configuration).
 
-Exit codes: 0 done, 1 something was left undone, 2 bad arguments, 3 no server is named or can be reached.
+Exit codes: those of the command line (:class:`silo.bom.errors.Exit`).
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ if __name__ == "__main__":
         del sys.modules[_name]
     sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from silo.bom.errors import ConfigError, InputError, SiloError
+from silo.bom.errors import ConfigError, Exit, InputError, SiloError, exit_of
 from silo.files import check_writable, documents_in, job_text
 
 if TYPE_CHECKING:
@@ -41,8 +41,6 @@ if TYPE_CHECKING:
     from silo.bom.model import Extraction
     from silo.bom_sync import Outcome
     from silo.workbench.freecad.witness import Account
-
-OK, UNDONE, BAD_INPUT, REMOTE = 0, 1, 2, 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,17 +94,15 @@ def main(env: Mapping[str, str] = os.environ) -> int:
             with open(job.lines, "a", encoding="utf-8") as out:
                 return _write_lines(job, out)
         return _sync(job)
-    except ConfigError as error:
-        return _tell(error, REMOTE)
     except (SiloError, OSError) as error:
-        return _tell(error, BAD_INPUT)
+        return _tell(error)
 
 
-def _tell(error: Exception, code: int) -> int:
+def _tell(error: Exception) -> int:
     from silo.workbench.freecad import host
 
     host.error(f"Silo: {error}")
-    return code
+    return exit_of(error)
 
 
 def _extractions(
@@ -151,7 +147,7 @@ def _write_lines(job: Job, out: TextIO) -> int:
         else:
             told = {"witness": [account.as_dict() for account in seen]} if job.verify else {}
             _line(out, {"top": top, "extraction": to_plain(result), **told})
-    return OK if fine else UNDONE
+    return Exit.DONE if fine else Exit.UNDONE
 
 
 def _line(out: TextIO, data: Mapping[str, Any]) -> None:
@@ -206,7 +202,7 @@ def _sync(job: Job) -> int:
         report.close(summary)
         if report.trouble:
             host.error(f"Silo: {report.trouble}")
-    return summary.exit_code or (UNDONE if any(report.trouble for report in reports) else OK)
+    return summary.exit_code or (Exit.UNDONE if any(report.trouble for report in reports) else Exit.DONE)
 
 
 def _each(tops: list[str], job: Job) -> Iterator[tuple[str, Extraction | SiloError]]:
@@ -253,7 +249,7 @@ def _without_server(job: Job, error: ImportError) -> int:
         ]
         _write_json(job.json, {"results": results})
         told = ConfigError(f"{told}. The BOMs themselves were written to {job.json}")
-    return _tell(told, REMOTE)
+    return _tell(told)
 
 
 def _write_json(path: str, data: Any) -> None:

@@ -24,7 +24,7 @@ from silo.cli.inertia_common import read_options
 from silo.cli.main import build_parser
 
 Run = Callable[..., Any]
-SCHEMA = Path(__file__).parents[3] / "docs" / "inertia-schema.json"
+SCHEMA = Path(__file__).parents[3] / "mods" / "silo" / "inertia" / "schema.json"
 
 
 def by_name(rows: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:

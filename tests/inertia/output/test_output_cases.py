@@ -30,7 +30,7 @@ from silo.inertia.output.values import number, settled, writable
 from silo.inertia.report import LinkResult
 
 Fixture = Callable[..., Any]
-SCHEMA = Path(__file__).parents[3] / "docs" / "inertia-schema.json"
+SCHEMA = Path(__file__).parents[3] / "mods" / "silo" / "inertia" / "schema.json"
 BOM = (
     "Item,Quantity,Material,Mass,Name\n1,1,steel,,plate\n2,3,,0.25 kg,rod\n"
     "3,1,Unobtainium,,block\n4,1,,,pad\n5,1,,,glue\n"

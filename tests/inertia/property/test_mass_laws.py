@@ -38,7 +38,9 @@ NAMES = (
 )
 MATERIALS = (None, "steel", "PLA", "Unobtainium")
 MASSES = (None, 0.0, 0.0785, 0.5)
-SCHEMA = json.loads((Path(__file__).parents[3] / "docs" / "inertia-schema.json").read_text("utf-8"))
+SCHEMA = json.loads(
+    (Path(__file__).parents[3] / "mods" / "silo" / "inertia" / "schema.json").read_text("utf-8")
+)
 quietly = settings(
     max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None
 )

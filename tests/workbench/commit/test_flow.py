@@ -6,11 +6,11 @@ from __future__ import annotations
 import pytest
 from desk import Office
 
+from silo.registering.orders import Order
 from silo.registration import Journal
 from silo.workbench.commit.flow import CommitFlow
 from silo.workbench.pane.activity import Do
 from silo.workbench.register.flow import RegisterFlow
-from silo.workbench.register.registering import Order
 
 
 @pytest.fixture(name="flow")

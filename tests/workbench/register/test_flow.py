@@ -9,10 +9,10 @@ import pytest
 from desk import Document, Office
 
 from silo.bom.errors import ReadOnlyError, SiloError
+from silo.registering.orders import Order
 from silo.registration import Journal
 from silo.workbench.commit.flow import CommitFlow
 from silo.workbench.register.flow import RegisterFlow
-from silo.workbench.register.registering import Order
 
 
 @pytest.fixture(name="flow")

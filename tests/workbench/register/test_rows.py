@@ -7,7 +7,7 @@ import pytest
 
 from silo.bom.model import BomEntry
 from silo.bom.naming import Proposal
-from silo.workbench.register.registering import Candidate, Similar, State
+from silo.registering.offer import Candidate, Similar, State
 from silo.workbench.register.rows import ASK, NEW, SAME, EditedRow, choose, number_texts, retype
 
 NUMBERS = {"M01": "M01-0007"}

@@ -6,13 +6,12 @@ Masses need more than an alias: their headers state units and say whether they a
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from silo.bom.errors import InputError
-from silo.bom.headers import Role, alias, normal
+from silo.bom.headers import Role, alias, normal, plain_cell
 from silo.inertia.bom.massheader import read_mass_header
 
 ROLES = (
@@ -47,7 +46,7 @@ class Columns:
         """
         index = self.at.get(role)
         text = row[index].strip() if index is not None and index < len(row) else ""
-        return text[1:] if re.match(r"'[=+\-@]", text) else text
+        return plain_cell(text)
 
     @property
     def usable(self) -> bool:

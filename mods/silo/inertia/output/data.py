@@ -8,6 +8,7 @@ import io
 import json
 from typing import Any
 
+from silo.bom.headers import safe_cell
 from silo.inertia.core import MassProps
 from silo.inertia.report import InertiaReport, LinkResult, PartResult, SubAssemblyResult
 
@@ -123,9 +124,9 @@ def report_csv(report: InertiaReport) -> str:
     for link, part in report.parts():
         writer.writerow(
             [
-                _text(link),
-                _text(part.name),
-                _text(part.part_number),
+                safe_cell(link),
+                safe_cell(part.name),
+                safe_cell(part.part_number),
                 part.quantity,
                 repr(part.mass),
                 repr(part.total_mass),
@@ -134,14 +135,10 @@ def report_csv(report: InertiaReport) -> str:
                 part.source,
                 part.rule,
                 part.decided_by,
-                _text(part.material or ""),
+                safe_cell(part.material or ""),
                 " ".join(str(line) for line in part.lines),
-                _text(part.paths[0] if part.paths else ""),
+                safe_cell(part.paths[0] if part.paths else ""),
                 " ".join(dict.fromkeys(str(w.code) for w in part.warnings)),
             ]
         )
     return out.getvalue()
-
-
-def _text(cell: str) -> str:
-    return "'" + cell if cell[:1] in ("=", "+", "-", "@", "\t", "\r") else cell

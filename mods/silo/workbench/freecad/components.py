@@ -10,9 +10,9 @@ from typing import Any
 
 from silo.bom.errors import DocumentError
 from silo.open_in_freecad import open_in_others
+from silo.registering.offer import Candidate, Seen, State
 from silo.workbench.commit.plan import leaves_first
 from silo.workbench.freecad import host, live, saving
-from silo.workbench.register.registering import Candidate, Seen, State
 
 
 def look_at(paths: Iterable[str]) -> dict[str, Seen]:

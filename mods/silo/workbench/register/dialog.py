@@ -9,12 +9,13 @@ from typing import Any
 
 from silo.api.activity import rules_text
 from silo.bom.errors import SiloError
+from silo.registering.offer import Offer
+from silo.registering.orders import Order
 from silo.registration import Registration
 from silo.workbench.gui import widgets
 from silo.workbench.gui.choice_cell import KEY, ChoiceDelegate
 from silo.workbench.gui.qt import QtCore, QtGui, QtWidgets
 from silo.workbench.pane.activity import Tone
-from silo.workbench.register.registering import Offer, Order
 from silo.workbench.register.rows import (
     APART,
     NEW,

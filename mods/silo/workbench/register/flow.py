@@ -20,10 +20,11 @@ from typing import Any
 from silo.bom.errors import SiloError
 from silo.bom.identity import walk_entries
 from silo.bom.model import BomEntry, Extraction
+from silo.registering.offer import Candidate, next_number, offer
+from silo.registering.orders import Order, carry_out
 from silo.registration import Journal, Registration
 from silo.workbench.commit.flow import CommitFlow
 from silo.workbench.commit.snapshot import Snapshot
-from silo.workbench.register.registering import Candidate, Order, carry_out, next_number, offer
 from silo.workbench.register.rows import EditedRow
 from silo.workbench.register.window import RegisterDesk, Window, Wishes
 from silo.workbench.session.session import Session

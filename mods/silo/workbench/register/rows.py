@@ -5,16 +5,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
-from silo.bom.categories import proposed_category
+from silo.registering.offer import Candidate, Similar, State
+from silo.registering.orders import Order
 from silo.registration import Registration
 from silo.workbench.pane.activity import Tone
-from silo.workbench.register.registering import Candidate, Order, Similar, State, state_words
 from silo.workbench.words import counted, plain, translate
-
-TYPES = ("part", "assembly", "consumable", "tool")
 
 NEW = "new"
 SAME = "same"
@@ -39,6 +37,23 @@ def type_words() -> dict[str, str]:
         "assembly": translate("Silo", "Assembly"),
         "consumable": translate("Silo", "Consumable"),
         "tool": translate("Silo", "Tool"),
+    }
+
+
+def state_words() -> dict[State, str]:
+    """The states for people."""
+    return {
+        State.READY: "",
+        State.EDITED: translate("Silo", "its unsaved edits are saved too"),
+        State.ELSEWHERE: translate(
+            "Silo", "open in another FreeCAD: close it there first, or saving there undoes this"
+        ),
+        State.READ_ONLY: translate("Silo", "the file is read-only"),
+        State.PARTIAL: translate("Silo", "has edits, but is loaded only in part: open the file itself first"),
+        State.NEWER: translate("Silo", "has changed on disk since you opened it: open it again first"),
+        State.MISSING: translate("Silo", "the file is missing"),
+        State.UNNAMED: translate("Silo", "has no file yet: save it first"),
+        State.LOST: translate("Silo", "made by a newer FreeCAD: cannot be saved here"),
     }
 
 
@@ -267,15 +282,8 @@ def retype(row: EditedRow, item_type: str, categories: Mapping[str, str]) -> Non
     categories
         code → description, as the schema has them.
     """
-
-    def proposed(kind: str) -> str:
-        entry = replace(row.candidate.entry, is_assembly=kind == "assembly")
-        return proposed_category(entry, row.name, categories).code
-
-    was = row.item_type
-    row.item_type = item_type
-    if row.category in (row.candidate.proposal.category, proposed(was)):
-        row.category = proposed(item_type)
+    order = row.order().retyped(item_type, categories)
+    row.item_type, row.category = order.item_type, order.category
 
 
 def number_texts(rows: list[EditedRow], numbers: Mapping[str, str]) -> list[str]:

@@ -20,6 +20,7 @@ from enum import StrEnum
 from itertools import chain
 from typing import IO, Any
 
+from silo.bom.headers import safe_cell
 from silo.bom.numbers import as_decimal, plain
 from silo_server.clock import wire
 from silo_server.db.engine import Tx
@@ -63,8 +64,6 @@ PROPERTIES = {
     "Manufacturer's part number": "manufacturer_part_number",
     "Material": "material",
 }
-# What Excel, LibreOffice and Google Sheets take for the beginning of a formula (OWASP, CSV injection).
-FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
 
 Row = dict[str, Any]
 
@@ -220,18 +219,6 @@ def to_json(made: Export) -> dict[str, Any]:
         "notes": list(made.notes),
         "lines": [{names[column]: row.get(column) for column in COLUMNS} for row in made.rows],
     }
-
-
-def safe_cell(value: Any) -> Any:
-    """A cell for CSV: what would be run as a formula is made text; numbers stay numbers."""
-    if isinstance(value, str) and value.startswith(FORMULA_STARTS):
-        return "'" + value
-    return value
-
-
-def plain_cell(text: str) -> str:
-    """What :func:`safe_cell` was given."""
-    return text[1:] if text.startswith("'") and text[1:].startswith(FORMULA_STARTS) else text
 
 
 def _row(

@@ -19,7 +19,7 @@ from typing import Any
 from sqlalchemy import select
 
 from silo.bom.errors import RejectedError
-from silo.bom.headers import Role, find_roles, missing_columns
+from silo.bom.headers import Role, find_roles, missing_columns, plain_cell
 from silo.bom.numbers import Mark, common_mark, parse_number, read_quantity
 from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
@@ -36,7 +36,6 @@ from silo_server.services.bom.changes import (
     parent_to_change,
 )
 from silo_server.services.bom.edits import check_state, edited_state
-from silo_server.services.bom.exports import plain_cell
 from silo_server.services.bom.lines import lines_of
 from silo_server.services.items import get_item
 from silo_server.values import Item, Line, LineState

@@ -11,8 +11,8 @@ import pytest
 
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.model import BomEntry, Extraction
+from silo.registering.offer import Candidate, Offer, Seen, State, offer
 from silo.testing import FakeSilo
-from silo.workbench.register.registering import Candidate, Offer, Seen, State, offer
 from silo.workbench.register.rows import EditedRow
 from silo.workbench.session.jobs import Control
 

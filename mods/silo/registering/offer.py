@@ -1,34 +1,48 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""What the Register Parts dialog shows and does, without the dialog (spec bom-sync §2 and §6).
+"""What can be registered, and what a person should know of it first (spec bom-sync §2 and §6).
 
-A :class:`Candidate` is one component without a part number. Questions to the server run in the worker; the
-identity is written into the document in the GUI thread, through a function that waits for it there.
+The Register Parts dialog in FreeCAD and ``silo-mod register`` both ask this module. A :class:`Candidate` is
+one component without a part number.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import hashlib
+import re
+import zipfile
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import Any
+from typing import Any, Protocol
 
 from silo.api.revisions import other_name
 from silo.bom.declare import Modelled
 from silo.bom.errors import NotFoundError, SiloError
 from silo.bom.findings import FindingCode
-from silo.bom.identity import walk_entries
+from silo.bom.identity import meta_key, walk_entries
 from silo.bom.model import BomEntry, Extraction
-from silo.bom.naming import Proposal, clean_name, propose_all
-from silo.registration import Journal, Registration, RegistrationApi, component_key, register, unclear
-from silo.standard_items import register_standard
-from silo.workbench.register.on_disk import changed_since, sha256_or_nothing
-from silo.workbench.session.jobs import Control
-from silo.workbench.words import translate
+from silo.bom.naming import Proposal, clean_name, propose, propose_all
+from silo.declaring import modelled
+from silo.files import content_hash
+from silo.registration import component_key
 
+ITEM_TYPES = ("part", "assembly", "consumable", "tool")
 # Looking for look-alikes costs a request each; beyond this many nobody reads them.
 MOST_LOOKED_UP = 100
+# What a single file may offer.
+MOST_MODELLED = 200
 _AT_ONCE = 6
+_SAVED_AT = re.compile(rb'name="LastModifiedDate"[^>]*>\s*<String value="([^"]{0,40})"')
+
+
+class Control(Protocol):
+    """A running job's way to the outside."""
+
+    def progress(self, detail: str = "", fraction: float | None = None) -> None: ...
+
+    def check(self) -> None:
+        """Raise CancelledError where somebody wants the job to stop."""
 
 
 class State(StrEnum):
@@ -48,23 +62,6 @@ class State(StrEnum):
     def usable(self) -> bool:
         """True where the identity can be written."""
         return self in (State.READY, State.EDITED, State.ELSEWHERE)
-
-
-def state_words() -> dict[State, str]:
-    """The states for people."""
-    return {
-        State.READY: "",
-        State.EDITED: translate("Silo", "its unsaved edits are saved too"),
-        State.ELSEWHERE: translate(
-            "Silo", "open in another FreeCAD: close it there first, or saving there undoes this"
-        ),
-        State.READ_ONLY: translate("Silo", "the file is read-only"),
-        State.PARTIAL: translate("Silo", "has edits, but is loaded only in part: open the file itself first"),
-        State.NEWER: translate("Silo", "has changed on disk since you opened it: open it again first"),
-        State.MISSING: translate("Silo", "the file is missing"),
-        State.UNNAMED: translate("Silo", "has no file yet: save it first"),
-        State.LOST: translate("Silo", "made by a newer FreeCAD: cannot be saved here"),
-    }
 
 
 @dataclass(frozen=True)
@@ -133,11 +130,14 @@ class Offer:
 
     numbers
         category → the number that its next item would get.
+    registered
+        key of a component → the number that it has.
     """
 
     candidates: tuple[Candidate, ...]
     categories: Mapping[str, str]
     numbers: Mapping[str, str] = field(default_factory=dict)
+    registered: Mapping[tuple[str, str], str] = field(default_factory=dict)
 
 
 # --- which components, and what of them -------------------------------------------------------------------
@@ -161,15 +161,21 @@ def offer(
     schema: str,
     control: Control,
     begun: Mapping[str, str] | None = None,
+    *,
+    most: int | None = MOST_LOOKED_UP,
+    own_file: bool = True,
 ) -> Offer:
-    """What the dialog shows. Worker.
+    """What can be registered of an assembly; a part is an extraction without entries.
 
+    most
+        look-alikes are searched for so many components; None for all.
+    own_file
+        with what is modelled in the assembly's own file.
     begun
         registrations that were interrupted (:meth:`silo.registration.Journal.pending`): the item that such a
         one made is no look-alike of the component, it is its own.
     """
     from silo.bom_sync import resolve
-    from silo.workbench.register.modelled import modelled_candidates
 
     resolved = resolve(extraction, api)
     schema = api.find_schema(schema)
@@ -187,10 +193,15 @@ def offer(
         for p in propose_all(copies, tree, categories)
     ]
     candidates.sort(key=lambda candidate: candidate.entry.is_standard)
-    candidates += modelled_candidates(extraction, seen, categories)
+    candidates += _modelled(extraction, seen, categories) if own_file else []
     control.check()
-    looked = _with_look_alikes(candidates, api, control, begun or {})
-    return Offer(_with_twins(looked), categories, _next_numbers(looked, api, schema))
+    looked = _with_look_alikes(candidates, api, control, begun or {}, most)
+    registered = {
+        entry.key: numbers[entry.silo_uuid.lower()]
+        for entry in walk_entries(tree)
+        if entry.silo_uuid and entry.silo_uuid.lower() in numbers
+    }
+    return Offer(_with_twins(looked), categories, _next_numbers(looked, api, schema), registered)
 
 
 def _perhaps_copies(extraction: Extraction, numbers: Mapping[str, str], api: Any) -> tuple[BomEntry, ...]:
@@ -223,17 +234,74 @@ def _candidate(proposal: Proposal, seen: Mapping[str, Seen], same_as: str = "") 
     return Candidate(proposal, state, same_as=same_as, sha256=digest)
 
 
-def _with_look_alikes(
-    candidates: Sequence[Candidate], api: Any, control: Control, begun: Mapping[str, str]
+def _modelled(
+    extraction: Extraction, seen: Mapping[str, Seen], categories: Mapping[str, str]
 ) -> list[Candidate]:
-    first, rest = candidates[:MOST_LOOKED_UP], candidates[MOST_LOOKED_UP:]
+    """What the saved file of the assembly holds that could be declared, or is; those come last."""
+    top = extraction.assembly
+    look = seen.get(top.doc_path, Seen(State.MISSING))
+    try:
+        articles = modelled(top.doc_path, top.object_name or None) if look.state.usable else []
+    except SiloError:  # the walk has said what is wrong with the file
+        return []
+    if look.saved_at and changed_since(top, look.saved_at):
+        look = Seen(State.NEWER)
+    return [
+        Candidate(propose(one.entry, categories, shares_file=True), look.state, article=one)
+        for one in articles[:MOST_MODELLED]
+    ]
+
+
+def changed_since(entry: BomEntry, saved_at: str) -> bool:
+    """True where the file is not the one that was opened: saved by somebody else, or registered meanwhile.
+
+    saved_at
+        the open document's own time stamp.
+    """
+    head, _ = _look_into(entry.doc_path)
+    found = _SAVED_AT.search(head)
+    if found and found[1].decode("ascii", "replace") != saved_at:
+        return True
+    # An identity that the command line has stamped into the file leaves FreeCAD's time stamp as it is.
+    marks = (b'<Item key="%s" value="' % key.encode() for key in (meta_key(), meta_key(entry.object_name)))
+    return not entry.silo_uuid and any(mark in head for mark in marks)
+
+
+def fingerprint(path: str) -> str:
+    """What changes whenever FreeCAD saves a file, and stays when an identity is stamped; "" where unknown."""
+    head, content = _look_into(path)
+    found = _SAVED_AT.search(head)
+    return hashlib.sha256(repr((found and found[1], content)).encode()).hexdigest()[:16] if head else ""
+
+
+def _look_into(path: str) -> tuple[bytes, list[tuple[str, int]]]:
+    """The document's own properties, which come first (a hostile file may never end), and what is beside."""
+    try:
+        with zipfile.ZipFile(path) as file, file.open("Document.xml") as xml:
+            beside = [(one.filename, one.CRC) for one in file.infolist() if one.filename != "Document.xml"]
+            return xml.read(1 << 18), sorted(beside)
+    except (OSError, KeyError, zipfile.BadZipFile, NotImplementedError, EOFError, RuntimeError):
+        return b"", []
+
+
+def sha256_or_nothing(path: str) -> str:
+    """The hash of a file's content; "" where it cannot be read."""
+    try:
+        return content_hash(path)
+    except OSError:
+        return ""
+
+
+def _with_look_alikes(
+    candidates: Sequence[Candidate], api: Any, control: Control, begun: Mapping[str, str], most: int | None
+) -> list[Candidate]:
+    first, rest = (candidates, ()) if most is None else (candidates[:most], candidates[most:])
 
     def one(candidate: Candidate) -> Candidate:
         # An item of a standard part's designation is joined, whoever made it.
         if candidate.entry.is_standard or candidate.declared:
             return candidate
-        if control.cancelled.is_set():
-            return candidate
+        control.check()
         own = begun.get(component_key(candidate.entry), "")
         return replace(candidate, similar=_look_alikes(candidate, api, own))
 
@@ -295,98 +363,3 @@ def next_number(api: Any, schema: str, category: str) -> str:
         return str(api.generate_part_number(api.find_schema(schema), category))
     except SiloError:
         return ""
-
-
-# --- registering -----------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Order:
-    """A row that is to be registered, as the person left it.
-
-    existing
-        item to join instead of making a new one.
-    apart
-        of equal copies that are modelled in the file, each gets an item of its own.
-    """
-
-    candidate: Candidate
-    name: str
-    item_type: str
-    category: str
-    existing: Similar | None = None
-    apart: bool = False
-
-    @property
-    def proposal(self) -> Proposal:
-        return replace(
-            self.candidate.proposal, name=self.name, item_type=self.item_type, category=self.category
-        )
-
-
-# Writes an identity into the component's document and saves it: (candidate, identity).
-Write = Callable[[Candidate, str], None]
-
-
-def carry_out(
-    orders: Sequence[Order],
-    api: RegistrationApi,
-    journal: Journal,
-    write: Write,
-    *,
-    schema: str,
-    control: Control,
-    done: Callable[[Order, Registration], None],
-) -> None:
-    """Register one after another; ``done`` is called with each result. Worker.
-
-    One item's failure does not stop the rest. An error that concerns all of them does: a token that is not
-    accepted, a server that is gone or busy (:mod:`silo.api.policy`).
-    """
-    from silo.api.policy import ends_run
-
-    gone: SiloError | None = None
-    for number, order in enumerate(orders):
-        control.check()
-        control.progress(order.name, number / len(orders))
-        if gone is not None:
-            done(order, Registration(order.proposal, error=gone))
-            continue
-        result = _carry_out(order, api, journal, write, schema)
-        gone = result.error if result.error is not None and ends_run(result.error, api) else None
-        done(order, result)
-
-
-def _carry_out(
-    order: Order, api: RegistrationApi, journal: Journal, write: Write, schema: str
-) -> Registration:
-    from silo.workbench.register.modelled import declare_article
-
-    if order.candidate.entry.is_standard:
-        return register_standard(order.proposal, api, schema=schema)
-    if order.candidate.article is not None and order.existing is None:
-        return declare_article(order, order.candidate.article, api, journal, write, schema)
-    if order.existing is not None:
-        try:
-            write(order.candidate, order.existing.item_id)
-        except SiloError as error:
-            return Registration(order.proposal, error=error)
-        return Registration(
-            order.proposal, part_number=order.existing.part_number, item_id=order.existing.item_id
-        )
-    return register(
-        order.proposal,
-        api,
-        journal,
-        lambda _entry, identity: write(order.candidate, identity),
-        schema=schema,
-        properties={"file_sha256": order.candidate.sha256} if order.candidate.sha256 else None,
-        ask=lambda proposal, found: seen_before(order, proposal, found),
-    )
-
-
-def seen_before(order: Order, proposal: Proposal, found: Sequence[Mapping[str, Any]]) -> None:
-    """None (make a new item) where the person saw these items in the dialog and took none of them."""
-    shown = {similar.item_id for similar in order.candidate.similar}
-    if not all(str(item["id"]) in shown for item in found):
-        unclear(proposal, found)

@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Carry out what a person ordered: items on the server, identities in the files.
+
+How an identity gets into a file is the caller's: FreeCAD writes into open documents, the command line into
+files.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+from silo.bom.categories import proposed_category
+from silo.bom.declare import Modelled
+from silo.bom.errors import SiloError
+from silo.bom.model import BomEntry
+from silo.bom.naming import Proposal
+from silo.declaring import declare
+from silo.registering.offer import Candidate, Control, Similar
+from silo.registration import Journal, Registration, RegistrationApi, register, unclear
+from silo.standard_items import register_standard
+
+
+@dataclass(frozen=True)
+class Order:
+    """A row that is to be registered, as the person left it.
+
+    existing
+        item to join instead of making a new one.
+    apart
+        of equal copies that are modelled in the file, each gets an item of its own.
+    """
+
+    candidate: Candidate
+    name: str
+    item_type: str
+    category: str
+    existing: Similar | None = None
+    apart: bool = False
+
+    @classmethod
+    def of(cls, candidate: Candidate) -> Order:
+        """A row as it was proposed."""
+        proposal = candidate.proposal
+        return cls(candidate, proposal.name, proposal.item_type, proposal.category)
+
+    @property
+    def proposal(self) -> Proposal:
+        return replace(
+            self.candidate.proposal, name=self.name, item_type=self.item_type, category=self.category
+        )
+
+    def retyped(self, item_type: str, categories: Mapping[str, str]) -> Order:
+        """With another type; the category follows where it is still one that was proposed.
+
+        categories
+            code → description, as the schema has them.
+        """
+
+        def proposed(kind: str) -> str:
+            entry = replace(self.candidate.entry, is_assembly=kind == "assembly")
+            return proposed_category(entry, self.name, categories).code
+
+        follows = self.category in (self.candidate.proposal.category, proposed(self.item_type))
+        return replace(self, item_type=item_type, category=proposed(item_type) if follows else self.category)
+
+
+# Writes an identity into the component's document and saves it: (candidate, identity).
+Write = Callable[[Candidate, str], None]
+# Raises DocumentError where that could not be done, before anything is made on the server.
+Check = Callable[[Candidate], None]
+# Which of the items that fit an interrupted run made: one of them, or None for a new item.
+Ask = Callable[[Order, Proposal, Sequence[Mapping[str, Any]]], Mapping[str, Any] | None]
+
+
+def seen_before(order: Order, proposal: Proposal, found: Sequence[Mapping[str, Any]]) -> None:
+    """None (make a new item) where the person saw these items in the dialog and took none of them."""
+    shown = {similar.item_id for similar in order.candidate.similar}
+    if not all(str(item["id"]) in shown for item in found):
+        unclear(proposal, found)
+
+
+def carry_out(
+    orders: Sequence[Order],
+    api: RegistrationApi,
+    journal: Journal,
+    write: Write,
+    *,
+    schema: str,
+    control: Control,
+    done: Callable[[Order, Registration], object],
+    check: Check = lambda _candidate: None,
+    ask: Ask = seen_before,
+) -> None:
+    """Register one after another; ``done`` is called with each result. Worker.
+
+    One item's failure does not stop the rest. An error that concerns all of them does: a token that is not
+    accepted, a server that is gone or busy (:mod:`silo.api.policy`).
+    """
+    from silo.api.policy import ends_run
+
+    gone: SiloError | None = None
+    run = _Run(api, journal, write, schema, check, ask)
+    for number, order in enumerate(orders):
+        control.check()
+        control.progress(order.name, number / len(orders))
+        result = Registration(order.proposal, error=gone) if gone is not None else run.one(order)
+        gone = result.error if result.error is not None and ends_run(result.error, api) else None
+        done(order, result)
+
+
+@dataclass(frozen=True)
+class _Run:
+    api: RegistrationApi
+    journal: Journal
+    write: Write
+    schema: str
+    check: Check
+    ask: Ask
+
+    def one(self, order: Order) -> Registration:
+        candidate = order.candidate
+        if candidate.entry.is_standard:
+            return register_standard(order.proposal, self.api, schema=self.schema)
+        if order.existing is not None:
+            return self._join(order, order.existing)
+        if candidate.article is not None:
+            return self._declare(order, candidate.article)
+        return register(
+            order.proposal,
+            self.api,
+            self.journal,
+            lambda _entry, identity: self.write(candidate, identity),
+            schema=self.schema,
+            properties={"file_sha256": candidate.sha256} if candidate.sha256 else None,
+            check=lambda _entry: self.check(candidate),
+            ask=lambda proposal, found: self.ask(order, proposal, found),
+        )
+
+    def _join(self, order: Order, item: Similar) -> Registration:
+        try:
+            self.check(order.candidate)
+            self.write(order.candidate, item.item_id)
+        except SiloError as error:
+            return Registration(order.proposal, error=error)
+        return Registration(order.proposal, part_number=item.part_number, item_id=item.item_id, found=True)
+
+    def _declare(self, order: Order, article: Modelled) -> Registration:
+        """Declare what is modelled in the file; an error of one copy leaves the others as they are."""
+        done = []
+        for one in article.apart() if order.apart else (article,):
+            entry: BomEntry = replace(one.entry, silo_uuid=None)
+            name = f"{order.name} {entry.object_name}" if order.apart else order.name
+            proposal = replace(order.proposal, entry=entry, name=name)
+            candidate = replace(order.candidate, article=one, proposal=proposal)
+            result = declare(
+                one,
+                proposal,
+                self.api,
+                self.journal,
+                schema=self.schema,
+                ask=lambda of, found: self.ask(order, of, found),
+                check=partial(self.check, candidate),
+                write=partial(self.write, candidate),
+            )
+            if result.error is not None:
+                return replace(result, proposal=order.proposal)
+            done.append(result)
+        numbers = ", ".join(str(result.part_number) for result in done)
+        return replace(done[0], proposal=order.proposal, part_number=numbers)

@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What all commands agree on: exit codes, and JSON by a schema."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import shutil
+from pathlib import Path
+from typing import Any
+
+import jsonschema_rs
+import pytest
+
+from silo.bom.errors import Exit
+from silo.cli.main import build_parser
+from silo.cli.shapes import NAMES, schema_of
+from silo.files import documents_in
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def parsers() -> dict[str, argparse.ArgumentParser]:
+    (commands,) = (a for a in build_parser()._actions if isinstance(a, argparse._SubParsersAction))
+    return dict(commands.choices)
+
+
+# Every command that is given a file or folder that must be there, and where in its words it stands.
+WITH_PATHS = {
+    "bom": "bom @",
+    "diff": "diff @",
+    "bom-diff": "bom-diff @ @",
+    "where-used": "where-used part.FCStd @",
+    "relink": "relink @ --from a --to b",
+    "sync": "sync @",
+    "register": "register @ --yes",
+    "log": "log @",
+    "restore": "restore @ --verify",
+    "inertia": "inertia @",
+    "links": "links @",
+    "mass": "mass @",
+}
+WITHOUT_PATHS = {
+    *("pull", "serve", "backup", "watch", "login", "doctor", "install-addon", "demo", "schema"),
+}
+
+
+def test_every_command_is_in_the_tables() -> None:
+    assert set(WITH_PATHS) | WITHOUT_PATHS == set(parsers())
+
+
+@pytest.mark.parametrize("command", WITH_PATHS)
+@pytest.mark.parametrize("path", ["nowhere.FCStd", "no/where", "-", ""])
+def test_a_path_that_is_nowhere_is_bad_input_everywhere(
+    run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str, path: str
+) -> None:
+    """One code for all, before a server is asked; a sentence with the name; nothing on standard output."""
+    monkeypatch.chdir(tmp_path)
+    done = run(*(path if word == "@" else word for word in WITH_PATHS[command].split()))
+    assert (done.code, done.out) == (Exit.BAD_INPUT, ""), done
+    assert (path or "''") in done.err
+
+
+def test_sync_does_nothing_where_one_of_its_files_is_not_there(run: Any, silo: Any, gearbox: Path) -> None:
+    """A typing mistake is found before the first merge, all of them at once."""
+    assert run("register", gearbox, "--yes").code == 0
+    done = run("sync", gearbox, "nowhere.FCStd", "nirgends.FCStd")
+    assert done.code == Exit.BAD_INPUT
+    assert "nowhere" in done.err
+    assert "nirgends" in done.err
+    assert not any(silo.client.get_bom(item.part_number) for item in silo.client.search_items())
+
+
+def test_the_codes_stand_in_one_table() -> None:
+    """docs/headless.md has each code of the enum once, in its order."""
+    page = (DOCS / "headless.md").read_text("utf-8")
+    codes = re.findall(r"^\| (\d+) \|", page, re.MULTILINE)
+    assert codes == [str(int(code)) for code in Exit]
+
+
+def test_diff_says_nothing_of_agreement_where_a_file_is_missing(run: Any, silo: Any, gearbox: Path) -> None:
+    """Nobody knows what the missing file holds: 1, with --check and without, for a file and for a folder."""
+    assert run("register", gearbox, "--yes").code == 0
+    assert run("sync", gearbox, "--recursive").code == 0
+    shutil.move(next(gearbox.parent.rglob("*Cover*.FCStd")), gearbox.parent.parent)
+    for words in ([gearbox], [gearbox.parent], [gearbox, "--check"]):
+        done = run("diff", *words)
+        assert done.code == Exit.UNDONE
+        assert "No differences" not in done.out
+        assert "no differences" not in done.out
+
+
+def test_every_command_that_prints_data_prints_json_by_a_schema() -> None:
+    """The demo alone prints a story for people."""
+    with_json = {name for name, one in parsers().items() if "--json" in one._option_string_actions}
+    assert with_json == set(NAMES)
+    assert set(parsers()) - with_json == {"demo"}
+    for name in NAMES:
+        jsonschema_rs.validator_for(schema_of(name))
+
+
+def test_schemas_are_printed(run: Any) -> None:
+    assert run("schema").out.split() == list(NAMES)
+    assert run("schema", "--json").json() == list(NAMES)
+    assert '"$schema"' in run("schema", "inertia").out
+    assert run("schema", "bmo").code == Exit.BAD_INPUT
+
+
+@pytest.mark.parametrize("command", NAMES)
+def test_a_schema_refuses_what_is_not_documented(command: str) -> None:
+    """A key more is an error, so that no key comes in without its description."""
+    known = schema_of(command)
+    assert not jsonschema_rs.is_valid(known, {"surprise": 1})
+
+
+@pytest.mark.usefixtures("needs_symlinks")
+def test_a_file_named_in_several_ways_is_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first way is the one that is shown."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "v" / "w").mkdir(parents=True)
+    (tmp_path / "v" / "A.FCStd").touch()
+    (tmp_path / "link.FCStd").symlink_to("v/A.FCStd")
+    (tmp_path / "u").symlink_to("v")
+    ways = [
+        "v/A.FCStd",
+        "./v/A.FCStd",
+        "v/w/../A.FCStd",
+        str(tmp_path / "v" / "A.FCStd"),
+        "link.FCStd",
+        "u",
+        "v",
+    ]
+    assert documents_in(ways) == ["v/A.FCStd"]

@@ -1,0 +1,311 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""``silo-mod register``: the questions, the table, whole folders; nothing becomes an item by accident."""
+
+from __future__ import annotations
+
+import csv
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import zipfile
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fcstd_writer import Doc, locals_, part
+
+from silo.bom.errors import InputError
+from silo.bom.model import BomEntry
+from silo.bom.naming import Proposal
+from silo.cli.register_dialog import Dialog
+from silo.registering.offer import Candidate, Offer, Similar, State
+from silo.registering.table import ITEM_TYPES, read_table
+from silo.testing import FakeSilo
+
+CATEGORIES = {"A01": "Assembly", "F01": "Fastener, screw", "M01": "Machined part", "M06": "Machined frame"}
+
+
+def candidate(name: str = "Bracket", **more: Any) -> Candidate:
+    entry = BomEntry(f"/v/{name}.FCStd", object_name="Body", label=name, document_label=name)
+    return Candidate(Proposal(entry, name, "part", "M01"), State.READY, **more)
+
+
+def talk(
+    *candidates: Candidate, answers: Iterable[str], own: bool = False
+) -> tuple[list[Any], list[str], str]:
+    """Orders as (name, type, category, joined), the names left out, and what was asked."""
+    silo = FakeSilo()
+    silo.create_item("kindred-rd", "M01", "Other")
+    queue = iter(answers)
+
+    found = Offer(candidates, CATEGORIES)
+    orders, left = Dialog(candidates, found, silo, "/v", lambda _one: own, lambda _: next(queue, None)).ask()
+    rows = [(o.name, o.item_type, o.category, o.existing and o.existing.part_number) for o in orders]
+    assert next(queue, None) is None, "an answer was not asked for"
+    return rows, [one.proposal.name for one in left]
+
+
+@pytest.mark.parametrize(
+    "slip", ["yse", "?", "F99", "Bracket 2", "cat F99", "type screw", "name", "0", "Y es"]
+)
+def test_a_slip_is_asked_again_and_becomes_nothing(slip: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """What is not understood is never a name, a category or a yes."""
+    rows, left = talk(candidate(), answers=[slip, "n"])
+    assert (rows, left) == ([], ["Bracket"])
+    assert capsys.readouterr().err
+
+
+def test_help_explains_every_answer(capsys: pytest.CaptureFixture[str]) -> None:
+    talk(candidate(), answers=["?", "n"])
+    text = capsys.readouterr().err
+    assert all(
+        f"  {word}" in text for word in ("y, yes", "n, no", "name", "type", "cat", "join", "all", "q, quit")
+    )
+
+
+def test_name_type_and_category_can_be_changed(capsys: pytest.CaptureFixture[str]) -> None:
+    """The category follows the type where nobody chose one; it is listed with what it means."""
+    changes = ["name Motor frame", "cat frame", "cat m06", "y"]
+    assert talk(candidate(), answers=changes)[0] == [("Motor frame", "part", "M06", None)]
+    assert "M06  Machined frame" in capsys.readouterr().err
+    assert talk(candidate(), answers=["type assembly", "y"])[0] == [("Bracket", "assembly", "A01", None)]
+    assert talk(candidate(), answers=["cat F01", "type tool", "y"])[0] == [("Bracket", "tool", "F01", None)]
+    assert set(ITEM_TYPES) == {"part", "assembly", "consumable", "tool"}
+
+
+def test_a_probable_duplicate_is_not_taken_by_enter() -> None:
+    """Enter and "all" take what is without a doubt only."""
+    twin = candidate(similar=(Similar("M01-0001", "u", "Bracket"),))
+    assert talk(twin, answers=["", "n"])[1] == ["Bracket"]
+    assert talk(twin, answers=["y"])[0] == [("Bracket", "part", "M01", None)]
+    assert talk(twin, answers=["join M01-0001", "y"])[0] == [("Bracket", "part", "M01", "M01-0001")]
+    assert talk(twin, answers=["join M99-0001", "n"])[1] == ["Bracket"]
+    assert talk(twin, answers=[""], own=True)[0] == [("Bracket", "part", "M01", None)]
+    rows, left = talk(candidate("A"), twin, candidate("B"), answers=["all", "n"])
+    assert ([row[0] for row in rows], left) == (["A", "B"], ["Bracket"])
+    copies = [candidate(name, sha256="same") for name in ("A", "B")]
+    assert talk(*copies, answers=["all", "n"])[1] == ["B"]
+
+
+@pytest.mark.parametrize("end", ["q", "quit", None])
+def test_quitting_leaves_out_the_rest(end: str | None) -> None:
+    answers = ["y"] if end is None else ["y", end]
+    rows, left = talk(candidate("A"), candidate("B"), candidate("C"), answers=answers)
+    assert ([row[0] for row in rows], left) == (["A"], ["B", "C"])
+
+
+@pytest.mark.usefixtures("needs_signals")
+def test_the_questions_on_a_terminal(silo: Any, gearbox: Path) -> None:
+    """As a person meets them: on a terminal, with standard output elsewhere; Ctrl-C leaves all as it was."""
+    before = gearbox.read_bytes()
+
+    pty = pytest.importorskip("pty")
+    own, other = pty.openpty()
+    words = [sys.executable, "-m", "silo.cli.main", "register", str(gearbox)]
+    with subprocess.Popen(words, stdin=other, stdout=subprocess.PIPE, stderr=other) as job:
+        os.close(other)
+        for answer in (b"F99\n", b""):
+            seen = b""
+            while b"/?] " not in seen:
+                seen += os.read(own, 4096)
+            os.write(own, answer)
+        assert b"'F99' is no answer" in seen
+        job.send_signal(signal.SIGINT)
+        assert job.communicate(timeout=60)[0] == b""
+    os.close(own)
+    assert job.returncode == 130
+    assert gearbox.read_bytes() == before
+    assert silo.client.search_items() == []
+
+
+# --- the table ------------------------------------------------------------------------------------------
+
+
+def planned(run: Any, top: Path, table: Path) -> list[dict[str, str]]:
+    assert run("register", top, "--plan", table).code == 0
+    with table.open(newline="", encoding="utf-8-sig") as file:
+        return list(csv.DictReader(file))
+
+
+def save(table: Path, rows: list[dict[str, str]], **how: Any) -> None:
+    with table.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, rows[0], **how)
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def test_a_table_is_edited_and_applied(run: Any, silo: Any, gearbox: Path, tmp_path: Path) -> None:
+    """As a spreadsheet saves it; repeating it is harmless; what is not in it is reported."""
+    table = tmp_path / "plan.csv"
+    rows = planned(run, gearbox, table)
+    assert len(rows) == 9
+    assert silo.client.search_items() == []
+    assert {row["type"] for row in rows} == {"part", "assembly"}
+    for row in rows:
+        if "Cover" in row["file"] and row["type"] == "part":
+            row |= {"register": "no"}
+        if "Bolt" in row["file"]:
+            row |= {"name": "=Bolt; long", "category": "F01", "type": "consumable"}
+    save(table, rows, delimiter=";")
+    done = run("register", gearbox, "--apply", table, "--json")
+    registered = {row["name"]: row for row in done.json()["registered"]}
+    assert registered["=Bolt; long"]["part_number"].startswith("F01-")
+    count = len(registered)
+    assert len(silo.client.search_items()) == count == sum(row["register"] == "yes" for row in rows)
+    again = run("register", gearbox, "--apply", table)
+    assert (again.code, f"{count} of the table's components had their number" in again.out) == (0, True)
+    assert len(silo.client.search_items()) == count
+    save(table, [row for row in rows if row["register"] == "yes"])
+    fewer = run("register", gearbox, "--apply", table)
+    assert fewer.code == 1
+    assert "unregistered" in fewer.out
+
+
+def test_all_problems_of_a_table_are_reported_at_once(
+    run: Any, silo: Any, gearbox: Path, tmp_path: Path
+) -> None:
+    """With their lines; nothing is registered, not even what is right."""
+    table = tmp_path / "plan.csv"
+    rows = planned(run, gearbox, table)
+    rows[0]["register"] = "yse"
+    rows[1]["category"] = "F99"
+    rows[2]["type"] = "screw"
+    rows[3]["name"] = " "
+    rows[4]["part_number"] = "M01-4711"
+    rows[5]["file"] = "elsewhere.FCStd"
+    rows.append(dict(rows[6]))
+    save(table, rows)
+    changed = gearbox.parent / rows[7]["file"]
+    _touch(changed)
+    done = run("register", gearbox, "--apply", table)
+    assert done.code == 2
+    for line, word in enumerate(
+        ("yse", "F99", "screw", "empty", "M01-4711", "elsewhere", "more than once"), 2
+    ):
+        assert f"line {line}: " in done.err
+        assert word in done.err
+    assert "line 9: " in done.err
+    assert "has changed since" in done.err
+    assert "line 11: " in done.err
+    assert silo.client.search_items() == []
+
+
+def _touch(path: Path) -> None:
+    """Save as FreeCAD does: a new time stamp in the document."""
+    with zipfile.ZipFile(path) as old:
+        members = {info: old.read(info) for info in old.infolist()}
+    with zipfile.ZipFile(path, "w") as new:
+        for info, data in members.items():
+            new.writestr(info, data)
+        new.writestr("added.brp", b"a new shape")
+
+
+@pytest.mark.parametrize(
+    ("data", "word"),
+    [
+        (b"", "no column"),
+        (b"PK\x03\x04\0\0", "CSV"),
+        (b"a,b\n1,2\n", "no column register"),
+        (
+            b"register,file,object,standard,name,type,category,part_number,note,fingerprint\nyes,a,b\n",
+            "line 2",
+        ),
+        (b'register,file\n"never closed', "no column"),
+    ],
+)
+def test_what_is_no_table_is_refused(data: bytes, word: str) -> None:
+    with pytest.raises(InputError) as error:
+        read_table(data, "plan.csv")
+    assert word in " ".join((str(error.value), *error.value.problems))
+
+
+def test_an_interrupted_table_can_be_applied_again(run: Any, silo: Any, tmp_path: Path) -> None:
+    """Two parts of one file: the first has its identity in the file by then, and that is no edit."""
+    kit = Doc(label="kit")
+    for name in ("Lid", "Case"):
+        kit.add("Part::Box", name, Height=10.0)
+    kit.save(tmp_path / "kit.FCStd")
+    top = Doc(label="top").link("LLid", "kit.FCStd", "Lid").link("LCase", "kit.FCStd", "Case")
+    top.add("App::Part", "Top", Group=locals_("LLid", "LCase"), Type="Assembly")
+    path = top.save(tmp_path / "top.FCStd")
+    table = tmp_path / "plan.csv"
+    rows = planned(run, path, table)
+    assert len(rows) == 3
+    first = [row | {"register": "yes" if row["object"] == "Lid" else "no"} for row in rows]
+    save(table, first)
+    assert run("register", path, "--apply", table).code == 0
+    save(table, [row | {"register": "yes"} for row in rows])
+    done = run("register", path, "--apply", table)
+    assert done.code == 0, done.err
+    assert len(silo.client.search_items()) == 3
+
+
+# --- whole folders --------------------------------------------------------------------------------------
+
+
+def test_a_part_registered_alone_is_a_part(run: Any, silo: Any, tmp_path: Path) -> None:
+    """A loop over a vault once gave 226 parts the number of an assembly, for good."""
+    path = part("Bracket", "Body").save(tmp_path / "Bracket.FCStd")
+    (row,) = run("register", path, "--yes", "--json").json()["registered"]
+    assert row["item_type"] == "part"
+    assert not row["category"].startswith("A")
+
+
+def test_a_folder_is_registered_as_a_whole(run: Any, silo: Any, gearbox: Path) -> None:
+    """Backups and ignored files left out; what no assembly uses is for a person; twice gives nothing new."""
+    vault = gearbox.parent
+    shutil.copy(gearbox, vault / "TopAssembly.FCBak")
+    shutil.copy(gearbox, vault / "TopAssembly.FCStd1")
+    (vault / "old").mkdir()
+    shutil.copy(gearbox, vault / "old" / "Top.FCStd")
+    (vault / ".siloignore").write_text("old/\n")
+    part("Spare", "Body").save(vault / "Spare.FCStd")
+    one = run("register", gearbox, "--plan", vault / "one.csv")
+    assert one.code == 0
+    rows = planned(run, vault, vault / "all.csv")
+    alone = planned(run, gearbox, vault / "one.csv")
+    assert {(r["file"], r["name"], r["type"], r["category"]) for r in rows if r["file"] != "Spare.FCStd"} == {
+        (r["file"], r["name"], r["type"], r["category"]) for r in alone
+    }
+    (spare,) = [row for row in rows if row["file"] == "Spare.FCStd"]
+    assert (spare["register"], spare["type"]) == ("no", "part")
+    done = run("register", vault, "--yes", "--json")
+    assert (done.code, len(done.json()["registered"])) == (0, 9)
+    assert "1 file that no assembly uses" in run("register", vault, "--yes").err
+    assert len(silo.client.search_items()) == 9
+
+
+def test_probable_duplicates_are_not_made_in_silence(
+    run: Any, silo: Any, gearbox: Path, tmp_path: Path
+) -> None:
+    """The same files once more, without their identities: each says what it may be."""
+    fresh = tmp_path / "fresh"
+    shutil.copytree(gearbox.parent, fresh)
+    assert run("register", gearbox, "--yes").code == 0
+    done = run("register", fresh / gearbox.name, "--yes")
+    assert done.code == 1
+    assert "Silo has this very file as" in done.out
+    assert "--duplicates join" in done.out
+    assert len(silo.client.search_items()) == 9
+    joined = run("register", fresh / gearbox.name, "--yes", "--duplicates", "join", "--json").json()
+    assert (len(joined["registered"]), len(silo.client.search_items())) == (9, 9)
+
+
+def test_a_lost_identity_comes_back_without_a_question(run: Any, silo: Any, gearbox: Path) -> None:
+    """FreeCAD saved its own copy over the stamped file; its item is its own, no duplicate."""
+    before = gearbox.read_bytes()
+    assert run("register", gearbox, "--yes").code == 0
+    gearbox.write_bytes(before)
+    done = run("register", gearbox, "--yes", "--json").json()
+    assert ([row["found"] for row in done["registered"]], done["unregistered"]) == ([True], [])
+    assert len(silo.client.search_items()) == 9
+
+
+def test_a_category_that_is_not_there_is_bad_input(run: Any, silo: Any, gearbox: Path) -> None:
+    done = run("register", gearbox, "--yes", "--category", "F99")
+    assert done.code == 2
+    assert "F01" in done.err
+    assert silo.client.search_items() == []
