@@ -80,7 +80,7 @@ def add_reading_options(parser: argparse.ArgumentParser, *, jobs: bool = True) -
         "--index",
         metavar="FILE",
         type=a_path,
-        help="where to remember what files hold (else the user's cache)",
+        help="where to remember what files hold (else your cache)",
     )
     group.add_argument("--no-index", action="store_true", help="read every file, and remember nothing")
     if jobs:

@@ -89,9 +89,7 @@ def _add_backup(commands: Commands) -> None:
         "save a server's database and files to a new folder, while it serves",
         "silo-mod backup /backups/silo-2026-02-08 --database postgresql://silo@localhost/silo",
     )
-    backup.add_argument(
-        "target", metavar="TARGET", type=common.a_path, help="a folder that does not exist yet"
-    )
+    backup.add_argument("target", metavar="TARGET", type=common.a_path, help="a folder that is not there yet")
     _add_place(backup)
     backup.set_defaults(run=run_backup)
     restore = common.add_command(
@@ -119,7 +117,7 @@ def _add_place(parser: argparse.ArgumentParser) -> None:
         "--files",
         metavar="FOLDER",
         type=common.a_path,
-        help="the folder of files (else SILO_STORAGE_ROOT_DIR)",
+        help="folder of the files (else SILO_STORAGE_ROOT_DIR)",
     )
     common.add_json_option(parser)
 
