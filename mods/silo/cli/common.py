@@ -95,7 +95,7 @@ def add_reading_options(parser: argparse.ArgumentParser, *, jobs: bool = True) -
 def a_path(text: str) -> Path:
     """An argument that is a path; an empty one would be the current folder."""
     if not text:
-        raise argparse.ArgumentTypeError("it is empty ('')")
+        raise InputError("the name of a file or folder is empty ('')")
     return Path(text)
 
 

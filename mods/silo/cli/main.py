@@ -106,7 +106,8 @@ def _run(argv: Sequence[str] | None) -> int:
 def _refuse_empty(args: argparse.Namespace) -> None:
     """A variable of a script that is not set must not mean the current folder."""
     for name, value in vars(args).items():
-        if value == "" or (isinstance(value, list) and "" in value):
+        empty = value == "" or (isinstance(value, list) and "" in value)
+        if empty and name not in ("server", "token"):  # those have a sentence of their own
             raise InputError(f"the argument {name.upper()} is empty (''); leave it out, or give it a value")
 
 
