@@ -1250,46 +1250,6 @@ They are installed in {folder}.</source>
             <translation type="unfinished" />
         </message>
         <message>
-            <location filename="../../register/registering.py" />
-            <source>its unsaved edits are saved too</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/registering.py" />
-            <source>open in another FreeCAD: close it there first, or saving there undoes this</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/registering.py" />
-            <source>the file is read-only</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/registering.py" />
-            <source>has edits, but is loaded only in part: open the file itself first</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/registering.py" />
-            <source>has changed on disk since you opened it: open it again first</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/registering.py" />
-            <source>the file is missing</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/registering.py" />
-            <source>has no file yet: save it first</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../register/registering.py" />
-            <source>made by a newer FreeCAD: cannot be saved here</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
             <location filename="../../register/rows.py" />
             <source>Components</source>
             <translation type="unfinished" />
@@ -1317,6 +1277,46 @@ They are installed in {folder}.</source>
         <message>
             <location filename="../../register/rows.py" />
             <source>Tool</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>its unsaved edits are saved too</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>open in another FreeCAD: close it there first, or saving there undoes this</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>the file is read-only</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>has edits, but is loaded only in part: open the file itself first</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>has changed on disk since you opened it: open it again first</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>the file is missing</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>has no file yet: save it first</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../register/rows.py" />
+            <source>made by a newer FreeCAD: cannot be saved here</source>
             <translation type="unfinished" />
         </message>
         <message>
