@@ -179,19 +179,6 @@ def test_the_version_of_a_bom(
     assert client.get_bom_version("A") == version
 
 
-def test_the_older_form_of_a_schema_is_asked_for_after_404(
-    server: Any, client: SiloClient, answer: Any
-) -> None:
-    """silo-contract §1.6: /form since February 2026, /properties before."""
-    server.on("GET /api/schemas/kindred-rd/form", answer(404, "404 page not found"))
-    server.on("GET /api/schemas/kindred-rd/properties", {"properties": []})
-    assert client.get_schema_form("kindred-rd", "F01") == {"properties": []}
-    assert server.paths() == [
-        "GET /api/schemas/kindred-rd/form?category=F01",
-        "GET /api/schemas/kindred-rd/properties?category=F01",
-    ]
-
-
 @pytest.mark.parametrize(
     "schema",
     [
@@ -247,11 +234,11 @@ def test_a_part_number_stays_one_segment(server: Any, client: SiloClient) -> Non
 
 def test_a_server_that_is_not_ready_says_why(server: Any, client: SiloClient, answer: Any) -> None:
     """503 with a mode is an answer; without one it is an absent server. Neither address is below /api."""
-    server.on("GET /ready", answer(503, {"status": "not ready", "mode": "degraded"}))
+    html = answer(503, "<html>", {"Content-Type": "text/html"})
+    server.on("GET /ready", answer(503, {"status": "not ready", "mode": "degraded"}), html)
     assert client.ready().mode == "degraded"
-    server.on("GET /health", answer(503, "<html>", {"Content-Type": "text/html"}))
     with pytest.raises(UnreachableError):
-        client.health()
+        client.ready()
 
 
 def test_a_rejected_merge_lists_everything(server: Any, client: SiloClient, answer: Any) -> None:
@@ -271,15 +258,13 @@ FOUND = {"id": "11111111-1111-4111-8111-111111111111", "part_number": "F01-0001"
 
 def test_an_empty_list_may_be_null(server: Any, client: SiloClient) -> None:
     """Go's nil."""
-    for path in ("bom", "bom/expanded", "bom/flat", "bom/where-used", "revisions"):
+    for path in ("bom", "bom/where-used", "revisions"):
         server.on(f"GET /api/items/A01-0001/{path}", "null")
     server.on("GET /api/items/search", "null")
     server.on("POST /api/items/by-uuid", "null")
     number = "A01-0001"
     for empty in (
         client.get_bom(number),
-        client.get_bom_expanded(number),
-        client.get_bom_flat(number),
         client.where_used(number),
         client.revisions(number),
         client.search_items("x"),

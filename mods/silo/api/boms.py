@@ -11,7 +11,7 @@ from silo.api.caller import LISTS, Caller, Params, body
 from silo.api.merging import merge_by_lines, merge_result, read_back, without_manual
 from silo.api.replies import Reply
 from silo.api.transport import Cancel
-from silo.api.wire import Answer, BomLine, FlatLine, MergeRequest, MergeResult, Quantity, WhereUsedLine, Wire
+from silo.api.wire import Answer, BomLine, MergeRequest, MergeResult, Quantity, WhereUsedLine, Wire
 from silo.bom.errors import (
     ConflictError,
     CycleError,
@@ -91,21 +91,6 @@ class BomCalls(Caller):
     def get_bom_version(self, part_number: str, /) -> str | None:
         """The version of the BOM as it is now, for ``if_match``; None where the server keeps none."""
         return self._get(f"the BOM of {part_number}", *_bom(part_number)).version()
-
-    def get_bom_expanded(self, part_number: str, /, depth: int | None = None) -> list[BomLine]:
-        """All lines below an item, ``depth`` levels or as many as the server gives.
-
-        Each line says its own ``depth``. Raises :class:`silo.bom.errors.ConflictError` for a ring.
-        """
-        params: Params = {} if depth is None else {"depth": depth}
-        subject = f"the whole BOM of {part_number}"
-        reply = self._get(subject, *_bom(part_number), "expanded", params=params)
-        return reply.models(BomLine, "expanded_bom", *LISTS)
-
-    def get_bom_flat(self, part_number: str, /) -> list[FlatLine]:
-        """The parts below an item with their total quantities."""
-        reply = self._get(f"the flat BOM of {part_number}", *_bom(part_number), "flat")
-        return reply.models(FlatLine, "flat_bom", *LISTS)
 
     def where_used(self, part_number: str, /) -> list[WhereUsedLine]:
         """The parents that have this item on their BOM; all of them, from however many pages."""

@@ -13,7 +13,7 @@ from contextlib import closing, suppress
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
 import requests
 
@@ -126,7 +126,11 @@ class SiloClient(FileCalls, BomCalls):
 
     def ready(self) -> ServerState:
         """Whether the server takes changes: ``normal``, ``read-only`` or ``degraded``."""
-        return ServerState.model_validate(self._state("ready"))
+        call = Call("GET", f"{self._address.web_root}/ready", "/ready", repeatable=False)
+        with self._transport.opened(call) as response:
+            reply = self._transport.reply(response, call)
+        # A server that is not ready says so with 503, and why in the same form.
+        return ServerState.model_validate(reply.mapping(accept=(503,)))
 
     def modules(self) -> list[str]:
         """The names of the server's modules that are on."""
@@ -135,17 +139,6 @@ class SiloClient(FileCalls, BomCalls):
         if isinstance(found, dict):
             return [name for name, on in found.items() if not isinstance(on, dict) or on.get("enabled", True)]
         return [str(one.get("name", one)) if isinstance(one, dict) else str(one) for one in found or ()]
-
-    def health(self) -> dict[str, Any]:
-        """What the server says of its own health."""
-        return self._state("health")
-
-    def _state(self, name: str) -> dict[str, Any]:
-        call = Call("GET", f"{self._address.web_root}/{name}", f"/{name}", repeatable=False)
-        with self._transport.opened(call) as response:
-            reply = self._transport.reply(response, call)
-        # A server that is not ready says so with 503, and why in the same form.
-        return reply.mapping(accept=(503,))
 
     def open_events(self, last_event_id: str | None = None) -> HttpEventStream:
         """Open the event stream; :class:`silo.api.events.EventListener` keeps one open for good."""

@@ -267,15 +267,6 @@ class ItemCalls(Caller):
         problem = schema.get("category_rules_problem")
         return Categories(categories_of(schema), rules_of(schema), str(problem or ""))
 
-    def get_schema_form(self, name: str = "kindred-rd", category: str | None = None) -> dict[str, Any]:
-        """The form descriptor of a schema; from a server before February 2026 its properties instead."""
-        params = {"category": category} if category else {}
-        try:
-            return self._get(f"the form of {name}", "schemas", name, "form", params=params).mapping()
-        except NotFoundError:
-            reply = self._get(f"the properties of {name}", "schemas", name, "properties", params=params)
-            return reply.mapping()
-
 
 def _written(uuid: str) -> str:
     # CAD files hold identities in capitals, in braces, without dashes; the server answers with its own form.

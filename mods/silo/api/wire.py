@@ -349,17 +349,6 @@ class Revision(Record):
     links: list[LinkedFile] = Field(default_factory=list)
 
 
-class FlatLine(Record):
-    """A line of the flat BOM: a part and how many of it the whole tree holds."""
-
-    part_number: str = Field(validation_alias=AliasChoices("part_number", "child_part_number"))
-    description: str = Field(default="", validation_alias=AliasChoices("description", "child_description"))
-    total_quantity: Number | None = Field(
-        default=None, validation_alias=AliasChoices("total_quantity", "quantity")
-    )
-    unit: str | None = None
-
-
 class WhereUsedLine(Record):
     """A parent that has the item on its BOM."""
 

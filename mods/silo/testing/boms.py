@@ -8,7 +8,6 @@ from typing import Any
 
 from silo.api.wire import (
     BomLine,
-    FlatLine,
     MergeRequest,
 )
 from silo.bom.errors import CycleError, RejectedError
@@ -72,31 +71,3 @@ def _way(bom: Bom, here: str, goal: str, path: tuple[str, ...]) -> tuple[str, ..
         if found is not None:
             return found
     return None
-
-
-def expanded(bom: Bom, part_number: str, depth: int) -> list[BomLine]:
-    """All lines below an item, parents before children, each with its depth and its total quantity."""
-
-    def below(parent: str, level: int, factor: float) -> list[BomLine]:
-        rows: list[BomLine] = []
-        for line in bom(parent) if level <= depth else ():
-            total = factor * (line.quantity or 0.0)
-            rows.append(line.model_copy(update={"depth": level, "total_quantity": total}))
-            rows += below(line.child_part_number, level + 1, total)
-        return rows
-
-    return below(part_number, 1, 1.0)
-
-
-def flat(bom: Bom, part_number: str) -> list[FlatLine]:
-    """The leaves below an item with their total quantities."""
-    totals: dict[str, FlatLine] = {}
-    for line in expanded(bom, part_number, 1000):
-        if bom(line.child_part_number):
-            continue
-        before = totals.get(line.child_part_number)
-        total = (line.total_quantity or 0.0) + (before.total_quantity or 0.0 if before else 0.0)
-        totals[line.child_part_number] = FlatLine(
-            part_number=line.child_part_number, description=line.child_description, total_quantity=total
-        )
-    return list(totals.values())

@@ -25,7 +25,6 @@ from silo.api.sse import MERGE, STATE
 from silo.api.transport import Cancel, stop_if
 from silo.api.wire import (
     BomLine,
-    FlatLine,
     Item,
     LastSync,
     MergeEvent,
@@ -47,8 +46,6 @@ from silo.bom.merge import apply_merge, plan_merge, summary
 from silo.testing.boms import (
     check_cycle,
     entries_of,
-    expanded,
-    flat,
     missing_of,
     with_components,
 )
@@ -80,9 +77,6 @@ class FakeSilo(FakeStore):
     def ready(self) -> ServerState:
         self.before("ready")
         return ServerState(mode=self.mode, status="ready")
-
-    def health(self) -> dict[str, Any]:
-        return {"status": "ok", "mode": self.mode}
 
     def set_mode(self, mode: str) -> None:
         """``normal``, ``read-only`` or ``degraded``; announced as the server does."""
@@ -189,9 +183,6 @@ class FakeSilo(FakeStore):
             raise NotFoundError(f"there is no schema {name}")
         return {"name": name, "separator": "-", "segments": [{"name": "category", "values": CATEGORIES}]}
 
-    def get_schema_form(self, name: str = "kindred-rd", category: str | None = None) -> dict[str, Any]:
-        return {"schema": self.get_schema(name)["name"], "field_groups": []}
-
     def find_schema(self, wanted: str = "kindred-rd") -> str:
         return wanted if wanted == "kindred-rd" or not wanted else str(self.get_schema(wanted)["name"])
 
@@ -214,12 +205,6 @@ class FakeSilo(FakeStore):
 
     def get_bom_version(self, part_number: str, /) -> str | None:
         return str(self._stored(part_number).item.bom_version)
-
-    def get_bom_expanded(self, part_number: str, /, depth: int | None = None) -> list[BomLine]:
-        return expanded(self.get_bom, self.get_item(part_number).part_number, depth or 20)
-
-    def get_bom_flat(self, part_number: str, /) -> list[FlatLine]:
-        return flat(self.get_bom, self.get_item(part_number).part_number)
 
     def where_used(self, part_number: str, /) -> list[WhereUsedLine]:
         number = self.get_item(part_number).part_number
