@@ -43,13 +43,17 @@ from silo.bom.errors import (
     VersionConflictError,
 )
 from silo.bom.merge import apply_merge, plan_merge, summary
-from silo.testing.boms import (
+from silo.testing.store import (
+    CATEGORIES,
+    FakeStore,
+    FakeStream,
+    Stored,
+    check_base,
     check_cycle,
     entries_of,
     missing_of,
     with_components,
 )
-from silo.testing.store import CATEGORIES, FakeStore, FakeStream, Stored, check_base
 
 
 class FakeSilo(FakeStore):
