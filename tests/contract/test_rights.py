@@ -97,6 +97,13 @@ def test_a_token_makes_one_of_its_own_scope_unless_asked_for_less(api: Api) -> N
     api.as_(token(writer, scopes=["read"])["token"]).bad(403, "POST", "/api/items", {"category": "F01"})
 
 
+@pytest.mark.parametrize("misspelt", [{"scope": "read"}, {"days": 1}, {"expires": 1}])
+def test_a_limit_that_is_misspelt_makes_no_token(api: Api, misspelt: dict[str, Any]) -> None:
+    """It would be one without that limit."""
+    api.bad(400, "POST", "/api/auth/tokens", {"name": "limited", **misspelt})
+    assert "limited" not in [one["name"] for one in api.get("/api/auth/tokens")]
+
+
 def test_scopes_that_there_are_not(api: Api) -> None:
     """Refused, and no token is made."""
     for scopes in ([], ["king"], ["read", 1], "read"):

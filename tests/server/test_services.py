@@ -12,28 +12,30 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from sqlalchemy import select
+from sqlalchemy import select, update
 
-from silo.bom.errors import ConflictError, RejectedError
+from silo.bom.errors import AuthError, ConflictError, RejectedError
 from silo.bom.headers import plain_cell, safe_cell
 from silo_server.clock import stamp, utc_now, wire
 from silo_server.db.bulk import insert_rows, one_of, update_rows
 from silo_server.db.engine import Database
 from silo_server.db.tables import bom_syncs, items, users
 from silo_server.json_values import dumps
+from silo_server.services.access.accounts import create_user
 from silo_server.services.access.credentials import (
     Token,
     create_own_token,
     revoke_token,
     secret_of_form,
 )
+from silo_server.services.access.logins import actor_by_session, create_login_link, use_login_link
 from silo_server.services.bom.edits import check_state, edited_state
 from silo_server.services.bom.exports import _item_numbers
 from silo_server.services.bom.lines import state_to_json, stored_state
 from silo_server.services.bom.merge_json import quantity_problem, read_merge_order
 from silo_server.services.bom.rollup import positive_number
 from silo_server.services.items import NewItem, create_item
-from silo_server.values import Actor, LineState, Role, number
+from silo_server.values import SYSTEM, Actor, LineState, Role, number
 
 text = st.text(max_size=20)
 states = st.builds(
@@ -270,6 +272,39 @@ def test_the_secret_of_a_form_is_given_again_for_a_minute(db: Database) -> None:
         revoke_token(tx, fresh.id, user_id)
     with pytest.raises(ConflictError, match="shown once"):
         make(secret)
+
+
+def test_sessions_and_links_end(db: Database) -> None:
+    """By the clock, and with their user: also where the rows are still there."""
+
+    def link(name: str) -> str:
+        with db.write(SYSTEM) as tx:
+            return create_login_link(tx, name)
+
+    def lock_out(active: bool) -> None:
+        with db.write() as tx:
+            tx.conn.execute(update(users).where(users.c.username == "ann").values(active=active))
+
+    with db.write(SYSTEM) as tx:
+        create_user(tx, "ann", Role.EDITOR)
+    session = use_login_link(db, link("ann"), "here")
+    early, late = link("ann"), link("ann")
+    actor = actor_by_session(db, session.secret, "here")
+    assert actor is not None
+    assert (actor.username, actor.by_link) == ("ann", True)
+    lock_out(False)
+    assert actor_by_session(db, session.secret, "here") is None
+    with pytest.raises(AuthError):
+        use_login_link(db, early, "here")
+    lock_out(True)
+    assert actor_by_session(db, session.secret, "here") is not None
+    now = db.clock
+    db.clock = lambda: now() + timedelta(seconds=db.settings.login_link_seconds + 1)
+    with pytest.raises(AuthError):
+        use_login_link(db, late, "here")
+    assert actor_by_session(db, session.secret, "here") is not None
+    db.clock = lambda: now() + timedelta(seconds=db.settings.session_seconds + 1)
+    assert actor_by_session(db, session.secret, "here") is None
 
 
 def test_a_failed_transaction_leaves_nothing(db: Database) -> None:

@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Request
-from pydantic import Field, StrictBool, WithJsonSchema
+from pydantic import ConfigDict, Field, StrictBool, WithJsonSchema
 from starlette.responses import Response
 
 from silo.api.wire import ErrorBody
@@ -54,7 +54,11 @@ class TokenBody(Body):
         null = until revoked; absent = as long as the token that asks (a session: until revoked).
     scopes
         ``read``, ``write``, ``admin``, each with those before it; absent = all that the caller may.
+
+    Unknown keys are refused: a misspelt limit must not make a token without it.
     """
+
+    model_config = ConfigDict(extra="forbid")
 
     name: Annotated[Short, Field(min_length=1), WithJsonSchema(document.text(200, minLength=1))]
     expires_in_days: Annotated[float, Field(gt=0, le=3650, strict=True)] | None = None
