@@ -11,7 +11,7 @@ import pytest
 from desk import Document, Documents, Office
 from other_disk import other_disk
 
-from silo.api.wire import Origin
+from silo.api.files import Origin
 from silo.workbench.commit.flow import CommitFlow
 from silo.workbench.commit.theirs import Choice, of_held
 from silo.workbench.revisions.flow import RevisionFlow
