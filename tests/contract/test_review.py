@@ -112,6 +112,20 @@ def test_undoing_keep_silo_asks_again(api: Api, renamed: bool) -> None:
     assert len(api.merge(parent, {a: 4})["warnings"]) == 1
 
 
+def test_keeping_silo_s_quantity_keeps_the_reason_of_the_line(api: Api) -> None:
+    """Why the line is there stays, unless the decision gives another reason."""
+    parent, a = api.items(2)
+    api.merge(parent, {a: 4})
+    api.merge(parent, {})
+    keep = {"child_part_number": a, "action": "keep", "reason": "a spare"}
+    api.good("POST", bom(parent, "resolve"), {"decisions": [keep]})
+    for quantity, reason, wanted in ((5, None, "a spare"), (6, "two spares", "two spares")):
+        api.merge(parent, {a: quantity})
+        decision = {"child_part_number": a, "action": "keep_silo", "reason": reason}
+        api.good("POST", bom(parent, "resolve"), {"decisions": [decision]})
+        assert api.lines(parent)[a]["reason"] == wanted
+
+
 def test_an_override_that_cad_dropped_can_be_removed_by_taking_cad(api: Api) -> None:
     """CAD has it no more: taking CAD's word removes the line."""
     parent, a = api.items(2)
@@ -137,6 +151,15 @@ def test_decisions_that_do_not_fit_are_told_together_and_change_nothing(api: Api
     assert [problem[:12] for problem in error["problems"]] == ["decisions[1]", "decisions[2]", "decisions[3]"]
     assert api.get(bom(parent)) == before
     api.bad(400, "POST", bom(parent, "resolve"), {"decisions": []})
+    # Two decisions about one line, under its number and its id: neither is the right one.
+    line = api.lines(parent)[b]["id"]
+    twice = [
+        {"child_part_number": b, "action": "keep"},
+        {"child_part_number": b, "line_id": line, "action": "remove"},
+    ]
+    error = api.bad(400, "POST", bom(parent, "resolve"), {"decisions": twice})
+    assert "decided twice" in error["message"]
+    assert b in api.lines(parent)
 
 
 def test_history_tells_who_when_and_what(api: Api) -> None:
