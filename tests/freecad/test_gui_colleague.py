@@ -70,7 +70,7 @@ def environment(alice: Window, role: str) -> dict[str, str]:
 def test_the_pane_says_who_committed_meanwhile(day: Day) -> None:
     """Without being asked, by the server's events."""
     (text,) = day.bob["pane"]
-    assert text.count("since you opened it") == 4
+    assert text.count("since you opened it") == 5
     assert f"{day.alice['numbers']['Left']} Left (revision 2)" in text
 
 
@@ -104,7 +104,8 @@ def test_theirs_is_taken_and_mine_is_kept(day: Day) -> None:
     assert day.bob["linked"] == [True]
     assert len(day.revisions("Taken")) == 2
     kept = list((day.window.folder.parent / "bob").rglob("kept-aside/**/*Taken.FCStd"))
-    assert len(kept) == 1
+    # The other one is of the window *Open from Silo*.
+    assert len(kept) == 2
 
 
 def test_a_copied_folder_knows_what_it_was_made_from(day: Day) -> None:
@@ -124,3 +125,29 @@ def test_the_history_and_an_old_revision_with_all_that_it_links_to(day: Day) -> 
     assert "+ Plate 1" in day.bob["change"]
     assert "- Bolt 4" in day.bob["change"]
     assert day.bob["opened"] == [["Bolts", True], ["Plate", True]]
+
+
+def test_a_held_commit_is_decided_in_the_pane(day: Day) -> None:
+    """With the choices of the dialog; theirs is taken, mine is kept aside, and nothing waits any more."""
+    (reason,) = day.bob["held"]
+    assert "committed revision 2 of" in reason
+    assert {"Open theirs beside mine", "Take theirs", "Commit mine on top"} <= {*day.bob["held_buttons"]}
+    assert day.bob["held_beside"] == day.bob["held_has"] == ["Bolts"]
+    assert len(day.revisions("Held")) == 2
+    # Hers, which his save replaced; what he committed; what he had open.
+    assert len(list((day.window.folder.parent / "bob").rglob("kept-aside/**/*Held.FCStd"))) == 3
+
+
+def test_get_this_revision_fetches_a_copy_with_its_links(day: Day) -> None:
+    """Revision 1, in the folder that was chosen, in a folder of its own."""
+    number = day.alice["numbers"]["OnTop"]
+    assert day.bob["got_in"].split("/")[0] == f"{number}-r1"
+    assert day.bob["got"] == [["Bolts", True], ["Plate", True]]
+
+
+def test_edited_files_are_replaced_by_a_press_of_their_own(day: Day) -> None:
+    """Before that they are left alone and named; a copy of the edit is kept."""
+    assert "Taken.FCStd has edits that are not in Silo; it was left alone." in day.bob["left_alone"]
+    assert day.bob["untouched"]
+    assert day.bob["replaced"] == ["Bolts", "Plate"]
+    assert day.bob["edit_kept"]

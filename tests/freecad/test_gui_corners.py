@@ -81,6 +81,14 @@ def test_a_new_part_has_its_own_identity_then(corners: dict[str, Any]) -> None:
     assert "identity" not in corners["copied_after"]
 
 
+def test_the_same_part_is_counted_at_a_press_in_the_pane(corners: dict[str, Any]) -> None:
+    """Both files count as the one item, now and at the next commit."""
+    asked, counted = corners["same"]
+    assert "2 files carry the same Silo identity" in asked
+    assert "identity" not in counted
+    assert "identity" not in corners["same_again"]
+
+
 @pytest.mark.parametrize("version", WANTED)
 def test_a_forks_commit_is_hooked_and_not_replaced(version: str, tmp_path: Path) -> None:
     """By its QAction, by the save, by its origin; the BOM follows once each time."""

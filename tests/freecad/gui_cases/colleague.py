@@ -2,7 +2,8 @@
 """Inside two FreeCADs at once: Alice and Bob have the same assemblies open; each takes a part out of each.
 
 Alice commits first. Bob then meets her commits: ``Left`` he leaves out, ``OnTop`` he commits on top, for
-``Taken`` he takes hers, ``Copied`` lies in a copy of the project folder and has an edit that was only saved.
+``Taken`` he takes hers, ``Copied`` lies in a copy of the project folder and has an edit that was only saved,
+``Held`` he sends before he knows of hers, and chooses in the pane.
 """
 
 from __future__ import annotations
@@ -16,9 +17,11 @@ from typing import Any
 sys.path.insert(0, os.environ["SILO_TEST_CASES"])
 
 from inside import (
+    FOLDER,
     VAULT,
     App,
     Gui,
+    QtCore,
     QtWidgets,
     addon,
     assembly,
@@ -26,6 +29,7 @@ from inside import (
     dialog,
     labels,
     part,
+    press,
     register,
     run,
     settled,
@@ -34,7 +38,7 @@ from inside import (
 )
 
 SHARED = Path(os.environ["SILO_TEST_SHARED"])
-NAMES = ("Left", "OnTop", "Taken", "Copied")
+NAMES = ("Left", "OnTop", "Taken", "Copied", "Held")
 LONG_S = 120
 
 
@@ -121,7 +125,7 @@ def bob() -> None:
     copied.save()
     say("opened")
     until("committed")
-    wait(lambda: sum(newer.revision == 2 for newer in one.session.shown.newer.values()) == 4)
+    wait(lambda: sum(newer.revision == 2 for newer in one.session.shown.newer.values()) == len(NAMES))
     one.dock.show_and_raise()
     wait(lambda: any("since you opened it" in text for text in labels(one.dock)))
     tell(pane=[text for text in labels(one.dock) if "since you opened it" in text])
@@ -140,6 +144,7 @@ def bob() -> None:
     group = theirs.getObject("Assembly").Group
     tell(beside=[[obj.Name, obj.LinkedObject is not None] for obj in group])
     tell(both=sorted(obj.Name for obj in copied.getObject("Assembly").Group))
+    held(one, docs["Held"])
     # Once more after the answer: mine is what the next commit is made from.
     docs["OnTop"].Comment = "next"
     seen = len(boxes("Committed")) + len(boxes("BOM Updated"))
@@ -148,6 +153,40 @@ def bob() -> None:
     wait(lambda: not one.session.shown.waiting)
     tell(waiting=[str(entry.reason) for entry in one.session.shown.waiting])
     windows(one, docs["OnTop"])
+
+
+def held(one: Any, doc: Any) -> None:
+    """The commit is on its way before anybody has looked at Silo; the pane has the dialog's choices."""
+    from silo.workbench.commit.plan import plan
+
+    path = doc.FileName
+    one.commits.run(plan(doc, one.desk.documents).rows, "mine")
+    wait(lambda: [entry for entry in one.session.shown.waiting if entry.newer] and settled())
+    wait(lambda: "Take theirs" in buttons(one.dock))
+    picture(one.dock, "held")
+    tell(held=[entry.reason for entry in one.session.shown.waiting], held_buttons=buttons(one.dock))
+    press(one.dock, "Open theirs beside mine")
+    beside = wait(lambda: found_open("revisions", "Held"))
+    tell(held_beside=sorted(obj.Name for obj in beside.getObject("Assembly").Group))
+    press(one.dock, "Take theirs")
+    wait(lambda: not one.session.shown.waiting and settled())
+    (taken,) = (doc for doc in App.listDocuments().values() if doc.FileName == path)
+    tell(held_has=sorted(obj.Name for obj in taken.getObject("Assembly").Group))
+
+
+def buttons(widget: Any) -> list[str]:
+    return [b.text() for b in widget.findChildren(QtWidgets.QPushButton) if b.isVisible()]
+
+
+def choose_folder(folder: Path) -> None:
+    """Answer FreeCAD's dialog for a folder, once it is there."""
+    found = QtWidgets.QApplication.activeModalWidget()
+    if not isinstance(found, QtWidgets.QFileDialog):
+        QtCore.QTimer.singleShot(50, lambda: choose_folder(folder))
+        return
+    found.setDirectory(str(folder))
+    found.findChild(QtWidgets.QLineEdit).setText(str(folder))
+    found.accept()
 
 
 def picture(widget: Any, name: str) -> None:
@@ -169,6 +208,17 @@ def windows(one: Any, doc: Any) -> None:
     picture(history, "history")
     rows = [history.revisions.topLevelItem(n) for n in range(4)]
     tell(history=[[row.text(column) for column in (0, 3)] for row in rows], change=history.change.text())
+    history.revisions.setCurrentItem(history.revisions.topLevelItem(3))
+    copies = VAULT.parent / "copies"
+    copies.mkdir()
+    QtCore.QTimer.singleShot(50, lambda: choose_folder(copies))
+    history.get_button.click()
+    first = wait(lambda: found_open("copies", "OnTop"))
+    group = first.getObject("Assembly").Group
+    tell(
+        got=sorted([obj.Name, obj.LinkedObject is not None] for obj in group),
+        got_in=str(Path(first.FileName).relative_to(copies)),
+    )
     history.reject()
     Gui.runCommand("Silo_Open")
     found = one._window
@@ -182,6 +232,22 @@ def windows(one: Any, doc: Any) -> None:
     opened = wait(lambda: found_open("empty", "Taken"))
     group = opened.getObject("Assembly").Group
     tell(opened=sorted([obj.Name, obj.LinkedObject is not None] for obj in group))
+    # An edit of it is left alone until its own button is pressed.
+    path = opened.FileName
+    remove(opened, "Plate")
+    opened.save()
+    App.closeDocument(opened.Name)
+    edited = Path(path).read_bytes()
+    found.open_button.click()
+    wait(lambda: found.replace.isVisible())
+    tell(left_alone=found.news.text(), untouched=Path(path).read_bytes() == edited)
+    wait(lambda: found_open("empty", "Taken"))
+    App.closeDocument(found_open("empty", "Taken").Name)
+    found.replace.click()
+    wait(lambda: found.news.text() == "Opened.")
+    again = wait(lambda: found_open("empty", "Taken"))
+    kept = [file.read_bytes() == edited for file in FOLDER.rglob("kept-aside/**/*Taken.FCStd")]
+    tell(replaced=sorted(obj.Name for obj in again.getObject("Assembly").Group), edit_kept=any(kept))
     found.reject()
 
 

@@ -14,12 +14,17 @@ from inside import (
     VAULT,
     App,
     Gui,
+    QtWidgets,
     addon,
     assembly,
     boxes,
     close_all,
     dialog,
+    labels,
+    link,
+    pane,
     part,
+    press,
     register,
     run,
     settled,
@@ -90,8 +95,10 @@ def copied(one: Any) -> None:
     wait(lambda: boxes("BOM Updated: A01-0002") and settled())
     tell(copied_box=boxes("BOM Updated: A01-0002")[0])
 
-    # "New part": the second file gets an item of its own.
-    Gui.runCommand("Silo_RegisterParts")
+    # The second file gets an item of its own.
+    one.dock.show_and_raise()
+    wait(lambda: "2 files carry the same Silo identity" in "".join(labels(one.dock)))
+    press(one.dock, "New part…")
     window = wait(lambda: next(iter(one.registrations._open.values()), None))
     wait(lambda: window.rows)
     tell(copied_rows=[[row.component(), row.number, row.checked] for row in window.rows])
@@ -111,6 +118,40 @@ def copied(one: Any) -> None:
         )
     )
     tell(copied_after=boxes("Committed: A01-0002")[0])
+    same_part(one, top)
+
+
+def same_part(one: Any, top: Any) -> None:
+    """Another copy, which is the same part on purpose; one press in the pane, and it counts."""
+    shutil.copy(VAULT / "Bracket.FCStd", VAULT / "Bracket3.FCStd")
+    other = App.openDocument(str(VAULT / "Bracket3.FCStd"))
+    link(top, "B3", other.getObject("Box"))
+    App.setActiveDocument(top.Document.Name)
+    Gui.runCommand("Origin_Commit")
+    wait(lambda: "identity" in newest(one) and settled())
+    asked = newest(one)
+    # The box of the first question may still be there, below.
+    wait(lambda: "Bracket3.FCStd" in "".join(labels(one.dock)))
+    min(buttons(one.dock, "Same part"), key=height).click()
+    wait(lambda: newest(one) != asked and settled())
+    tell(same=[asked, newest(one)])
+    Gui.runCommand("Origin_Commit")
+    wait(lambda: newest(one).startswith("Committed") and settled())
+    tell(same_again=newest(one))
+
+
+def newest(one: Any) -> str:
+    """The newest box of the assembly."""
+    return next(text for text in pane() if "A01-0002" in text.splitlines()[0])
+
+
+def buttons(widget: Any, text: str) -> list[Any]:
+    return [b for b in widget.findChildren(QtWidgets.QPushButton) if b.isVisible() and b.text() == text]
+
+
+def height(button: Any) -> int:
+    """From the top of the screen."""
+    return int(button.mapToGlobal(button.rect().topLeft()).y())
 
 
 def story() -> None:
