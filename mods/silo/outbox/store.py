@@ -266,9 +266,17 @@ class Store(Database):
 
     def origin_of(self, sha256: str) -> str:
         """SHA-256 of the committed file that a file with this content was made from, as far as is known here;
-        the content itself where it was never saved over."""
+        the content itself where it was never saved over.
+
+        A file that was saved first and committed then is a committed one itself, also while it waits.
+        """
         with self._open() as db:
-            row = db.execute("SELECT origin FROM derived WHERE sha256 = ?", (sha256,)).fetchone()
+            row = db.execute(
+                "SELECT origin FROM derived WHERE sha256 = :sha256"
+                " AND NOT EXISTS (SELECT 1 FROM known WHERE sha256 = :sha256)"
+                " AND NOT EXISTS (SELECT 1 FROM entry WHERE sha256 = :sha256)",
+                {"sha256": sha256},
+            ).fetchone()
         return str(row[0]) if row else sha256
 
     def derived(self, sha256: str, origin: str) -> None:

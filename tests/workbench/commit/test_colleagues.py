@@ -13,7 +13,8 @@ from desk import Document, Office
 from silo.api.files import Origin
 from silo.bom.changes import ThreeLines
 from silo.bom.model import BomEntry
-from silo.outbox.entry import State
+from silo.outbox.entry import UNKNOWN, Commit, State
+from silo.outbox.send import send_all
 from silo.workbench.commit.desk import Answer, Look
 from silo.workbench.commit.flow import CommitFlow
 from silo.workbench.commit.opened import Opened, stamp_of
@@ -263,6 +264,37 @@ def test_own_saves_keep_the_origin_over_a_restart(tmp_path: Path, busy: bool) ->
     assert opened.of(doc).settle(store) == sha(b"one")
     again = Opened(lambda: store)
     assert again.of(opened_as(again, path)).settle(store) == sha(b"one")
+
+
+@pytest.mark.parametrize("is_sent", [False, True], ids=["it waits", "it is in Silo"])
+def test_saved_first_and_committed_then_nothing_is_asked_after_a_restart(
+    office: Office, is_sent: bool
+) -> None:
+    """Made, saved, committed as it is; opened again, saved, committed: each is made from the one before."""
+    store, client = office.session.outbox, office.silo
+    path = office.folder / "Plate.FCStd"
+    identity = client.create_item("kindred-rd", "M01", "Plate").id
+    for round_, contents in enumerate(((b"one", b"two"), (b"three", b"four"))):
+        opened = Opened(lambda: store)
+        opened.begin(lambda call: call())
+        doc = Doc("Plate")
+        if round_:
+            doc = opened_as(opened, path)
+        else:
+            doc.Objects.append("Box")
+            doc.FileName = str(path)
+            opened.slotChangedDocument(doc, "FileName")
+        for content in contents:
+            save(opened, doc, content)
+        base = opened.of(doc)
+        assert base.settle(store) == (sha(b"two") if round_ else UNKNOWN)
+        commit = Commit(str(path), float(round_), "Plate", identity, file=path, origin=base.settle(store))
+        base.committed(store.add(commit, client.base_url).sha256)
+        if is_sent:
+            send_all(store, client)
+    send_all(store, client)
+    assert store.entries() == ()
+    assert office.files("Plate") == [b"two", b"four"]
 
 
 def test_a_file_that_another_wrote_is_replaced_and_its_origin_stays(tmp_path: Path) -> None:
