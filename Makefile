@@ -1,10 +1,13 @@
 # `make demo` and `make test` do all their own set-up; nothing else is needed but python3 (>= 3.11) with venv.
 PYTHON ?= python3
 VENV ?= .venv
-# How many processes share the tests: a number, 0 for none, or all processors of the machine. Not more than eight,
-# for each takes some 400 MB, and a container may be shown more processors than it has.
-WORKERS ?= logical
-SPREAD = -n $(WORKERS) --maxprocesses 8
+# How many processes share the tests; 0 for none. Half as many again as processors, for tests also wait: for servers,
+# disks and windows. Not more than eight, for each takes some 400 MB, and a container may be shown more processors
+# than it has.
+WORKERS ?= $(shell n=$$(getconf _NPROCESSORS_ONLN || echo 2); n=$$((n + (n + 1) / 2)); echo $$((n < 8 ? n : 8)))
+SPREAD = -n $(WORKERS)
+# Compiled files are kept, whatever the machine's settings; else each process of each run compiles all tests anew.
+export PYTHONDONTWRITEBYTECODE :=
 BIN := $(VENV)/bin
 DEV := $(VENV)/.installed-dev
 SERVER := $(VENV)/.installed-server

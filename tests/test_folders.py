@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from silo.folders import cache_folder, config_folder, data_folder
+import silo.folders
+from silo.folders import cache_folder, config_folder, data_folder, scratch_folder
 from silo_server.settings import settings_from_environment
 
 FOLDERS = [
@@ -67,3 +68,23 @@ def test_one_folder_can_stand_for_all(platform: str) -> None:
     assert found == [Path("/stick/silo/config"), Path("/stick/silo/data"), Path("/stick/silo/cache")]
     usual = config_folder({**env, "SILO_HOME": ""}, platform)
     assert config_folder({**env, "SILO_HOME": "relative"}, platform) == usual
+
+
+def test_a_scratch_folder_is_gone_afterwards(tmp_path: Path) -> None:
+    """With the files in it."""
+    with scratch_folder("silo-test-", tmp_path) as folder:
+        (Path(folder) / "a").touch()
+        assert Path(folder).parent == tmp_path
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_all_temporary_folders_are_scratch_folders() -> None:
+    """Any other fails on Windows where a program, such as a virus scanner, has a file in it open."""
+    place = Path(silo.folders.__file__)
+    makers = [
+        file.name
+        for package in ("silo", "silo_server")
+        for file in (place.parents[1] / package).rglob("*.py")
+        if "TemporaryDirectory(" in file.read_text("utf-8")
+    ]
+    assert makers == [place.name]

@@ -13,12 +13,12 @@ import os
 import shutil
 import subprocess
 import sys
-import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from silo.bom.errors import ConfigError, InputError
 from silo.files import shipped
+from silo.folders import scratch_folder
 from silo.freecadcmd.run import find_freecadcmd
 from silo.freecads import exchange_folder, start
 from silo.platform import child_options, python_beside
@@ -70,7 +70,7 @@ def ask_freecad(freecadcmd: str | None = None, data: Path | None = None) -> Plac
     shared = exchange_folder(command)
     if shared is not None:
         os.makedirs(shared, exist_ok=True)
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True, prefix="silo-ask-", dir=shared) as folder:
+    with scratch_folder("silo-ask-", shared) as folder:
         out = Path(folder) / "answer.json"
         try:
             run = subprocess.run(

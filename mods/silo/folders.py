@@ -10,6 +10,7 @@ all of them, on every platform. Standard library only.
 from __future__ import annotations
 
 import os
+import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -52,3 +53,11 @@ def data_folder(env: Mapping[str, str] = os.environ, platform: str = NAME) -> Pa
 def cache_folder(env: Mapping[str, str] = os.environ, platform: str = NAME) -> Path:
     """Where what can be made again lives."""
     return _folder(env, platform, "XDG_CACHE_HOME", ".cache", "Library/Caches", _LOCAL)
+
+
+def scratch_folder(prefix: str, parent: Path | str | None = None) -> tempfile.TemporaryDirectory[str]:
+    """A temporary folder, as a context manager of its path; below ``parent``, else where the system has them.
+
+    A file in it that another program still has open (Windows) stays, and is no error.
+    """
+    return tempfile.TemporaryDirectory(prefix=prefix, dir=parent, ignore_cleanup_errors=True)

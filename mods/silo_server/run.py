@@ -11,7 +11,6 @@ import multiprocessing.connection
 import os
 import signal
 import socket
-import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -27,6 +26,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from silo.bom.errors import ConfigError
+from silo.folders import scratch_folder
 from silo.platform import WORKERS_CAN_SHARE_A_SOCKET, allow_many_files, own_the_port
 from silo_server.app import create_app, observed
 from silo_server.bootstrap import Welcome, prepare
@@ -194,7 +194,7 @@ def serve(
             _work(settings, sock, lambda: tell(greeting))
         else:
             tell(greeting)
-            with tempfile.TemporaryDirectory(ignore_cleanup_errors=True, prefix="silo-metrics-") as shared:
+            with scratch_folder("silo-metrics-") as shared:
                 os.environ[SHARED] = shared
                 _run_workers(settings, workers, sock)
 

@@ -81,6 +81,7 @@ def test_what_does_not_fit_is_asked_about_and_nothing_is_lost(api: Api, visit: V
     expect(said).to_contain_text("at least 0")
     page.get_by_label("Mass [kg]").fill("0.2")
     page.get_by_role("button", name="Save").click()
+    expect(page.locator(".notice")).to_contain_text("changed")
     now = api.get(f"/api/items/{number}")
     assert (now["name"], now["properties"]["mass_kg"], now["properties"]["currency"]) == (
         "Long spring",
@@ -107,6 +108,7 @@ def test_two_people_edit_one_item(api: Api, visit: Visit) -> None:
     expect(mine.get_by_label("Name", exact=True)).to_have_value("Hand lever")
     assert api.get(f"/api/items/{number}")["properties"] == {"supplier": "Theirs", "mass_kg": 1}
     mine.get_by_role("button", name="Save").click()
+    expect(mine.locator(".notice")).to_contain_text("changed")
     after = api.get(f"/api/items/{number}")
     assert (after["name"], after["properties"]) == ("Hand lever", {"supplier": "Mine", "mass_kg": 2})
     # Another field alone is no clash at all.

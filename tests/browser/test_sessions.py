@@ -35,6 +35,7 @@ def enter(visit: Visit, user: str, path: str, **options: bool) -> Page:
     page = visit(None, **options)
     page.goto(path)
     log_in(page, user)
+    page.locator(".who").wait_for()
     return page
 
 
@@ -83,6 +84,7 @@ def test_a_decision_survives_a_login_by_link(api: Api, visit: Visit) -> None:
     tab = page.context.new_page()
     tab.goto(str(api.good("POST", "/api/users/editor/login-link")["path"]))
     tab.get_by_role("button", name="Log in").click()
+    tab.locator(".who").wait_for()
     page.get_by_role("button", name="I have logged in").click()
     expect(page.locator("main")).to_contain_text("Spare parts")
     page.get_by_role("button", name="Send it now").click()

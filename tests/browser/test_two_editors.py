@@ -149,6 +149,7 @@ def test_a_part_that_is_there_opens_its_line(case: Case, api: Api, visit: Visit)
     expect(form.get_by_label("Quantity")).to_have_value("12")
     expect(form.get_by_label("Notes")).to_have_value("theirs")
     save(form)
+    expect(page.locator(".notice")).to_contain_text(f"{case.one} changed")
     line = api.lines(case.parent)[case.one]
     assert (line["quantity"], line["notes"]) == (12, "theirs")
 
@@ -191,12 +192,14 @@ def test_undo_belongs_to_what_was_just_done(case: Case, api: Api, visit: Visit) 
     form.get_by_label("Quantity").fill("3")
     save(form)
     undo = page.locator(".notice").get_by_role("button", name="Undo")
+    expect(undo).to_be_visible()
     api.good("PUT", bom(case.parent, case.one), {"notes": "another change, by somebody else"})
     undo.click()
     expect(page.locator(".notice")).to_contain_text("Undone")
     assert api.quantities(case.parent) == {case.one: 5, case.other: 2}
     assert api.lines(case.parent)[case.one]["notes"] == "another change, by somebody else"
-    page.locator(".notice").get_by_role("button", name="Do it again").click()
+    with page.expect_navigation():
+        page.locator(".notice").get_by_role("button", name="Do it again").click()
     expect(page.locator(".notice")).to_contain_text("Undone")
     assert api.quantities(case.parent)[case.other] == 3
 

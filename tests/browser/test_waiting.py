@@ -58,7 +58,7 @@ def test_what_waits_is_found_and_decided_for_many(api: Api, visit: Visit, script
     page.goto("/items")
     count = int(page.locator(".dot").inner_text())
     page.get_by_role("link", name="Waiting").click()
-    assert page.locator("tbody tr").count() == count
+    expect(page.locator("tbody tr")).to_have_count(count)
     expect(row(page, quiet[0])).to_have_count(0)
     expect(row(page, second).locator("td.number")).to_have_text(["2", "1", "1", "1", page_time(api, second)])
     page.get_by_label("Project folder").select_option("robot")

@@ -7,7 +7,6 @@ An upload whose answer was lost is not sent again before this is known: it would
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ from typing import TYPE_CHECKING, Protocol
 from silo.api.transport import Cancel
 from silo.api.wire import Revision
 from silo.bom.errors import ConflictError, NewerRevisionError, NotFoundError
+from silo.folders import scratch_folder
 
 if TYPE_CHECKING:
     from silo.api.wire import Revision
@@ -191,7 +191,7 @@ def _same_content(
     repacked = Path(sent.file_name).suffix.lower() in REPACKED
     if revision.file_size is not None and revision.file_size != sent.size and not repacked:
         return False
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True, prefix="silo-") as folder:
+    with scratch_folder("silo-") as folder:
         try:
             stored = client.download_file(
                 part_number, Path(folder) / "file", revision.revision_number, cancelled=cancelled

@@ -12,7 +12,6 @@ import os
 import queue
 import secrets
 import shutil
-import tempfile
 import uuid
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -32,6 +31,7 @@ from silo.cli.common import Commands
 from silo.cli.register import proposals_for, register_all
 from silo.cli.server import need_server_extra
 from silo.files import shipped
+from silo.folders import scratch_folder
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -65,9 +65,7 @@ def run(args: argparse.Namespace) -> int:
     if not (EXAMPLE / TOP).is_file():
         raise InputError(f"the example {EXAMPLE / TOP} is not there; install silo-mod again")
     with ExitStack() as stack:
-        folder = Path(
-            stack.enter_context(tempfile.TemporaryDirectory(ignore_cleanup_errors=True, prefix="silo-demo-"))
-        )
+        folder = Path(stack.enter_context(scratch_folder("silo-demo-")))
         stack.enter_context(_private_data(folder / "data"))
         demo = stack.enter_context(_demo(folder, args.port))
         demo.play()

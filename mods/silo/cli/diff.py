@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import chain
@@ -23,6 +22,7 @@ from silo.bom.report import base_of, diff_json, finding_json, shorten
 from silo.bom_sync import Resolved, assemblies, blocking, names_of, resolve, server_lines
 from silo.cli import common
 from silo.cli.common import Commands
+from silo.folders import scratch_folder
 from silo.vault.folder import FolderBoms, read_folder
 
 
@@ -215,7 +215,7 @@ def _two_folders(args: argparse.Namespace) -> Iterator[tuple[Path, Path, bool]]:
 
     top, below = top_of(args.folders[0] if args.folders else ".")
     chosen = parse_range(top, args.git)
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True, prefix="silo-bom-diff-") as scratch:
+    with scratch_folder("silo-bom-diff-") as scratch:
         old, new = Path(scratch, "old"), Path(scratch, "new")
         for revision, target in ((chosen.old, old), (chosen.new, new)):
             if revision is not None:

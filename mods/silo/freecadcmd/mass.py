@@ -3,11 +3,11 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from silo.folders import scratch_folder
 from silo.freecadcmd.run import FreeCADRun, find_freecadcmd, told_error
 from silo.inertia.geometry import store
 from silo.inertia.geometry.options import Progress, ReadOptions
@@ -35,7 +35,7 @@ def read_in_freecad(
     # FreeCAD is started in a folder of its own.
     top = str(Path(path).absolute())
     freecadcmd = find_freecadcmd(command)
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True, prefix="silo-mass-") as folder:
+    with scratch_folder("silo-mass-") as folder:
         result = Path(folder) / "result.npz"
         content = {**options.content_options(), "root": None}
         job = {"top": top, "result": str(result), "options": content}

@@ -24,6 +24,7 @@ from silo import platform
 from silo.bom.errors import CancelledError, ConfigError, DocumentError, InputError, SiloError
 from silo.bom.model import Extraction
 from silo.bom.snapshot import from_plain
+from silo.folders import scratch_folder
 from silo.freecads import commands, exchange_folder, start
 
 HEADLESS = Path(__file__).resolve().parents[1] / "workbench" / "headless.py"
@@ -169,9 +170,7 @@ class FreeCADRun:
         shared = exchange_folder(self.freecadcmd)
         if shared is not None:
             os.makedirs(shared, exist_ok=True)
-        self._folder = tempfile.TemporaryDirectory(
-            ignore_cleanup_errors=True, prefix="silo-freecad-", dir=shared
-        )
+        self._folder = scratch_folder("silo-freecad-", shared)
 
     @property
     def _results(self) -> Path:

@@ -17,7 +17,6 @@ import os
 import posixpath
 import re
 import shutil
-import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -35,6 +34,7 @@ from silo.fcstd import Library
 from silo.fcstd.linked import identity_in, recorded_paths
 from silo.fcstd.locate import refusal
 from silo.files import content_hash
+from silo.folders import scratch_folder
 from silo.vault.revisions import RevisionsApi, file_revisions
 
 MOST_FILES = 20_000
@@ -295,7 +295,7 @@ def fetched(
     Raises NotFoundError where the item has no such file.
     """
     item = client.get_item(part_number)
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True, prefix="silo-pull-") as scratch:
+    with scratch_folder("silo-pull-") as scratch:
         yield _Fetch(client, Path(scratch), revision is not None, cancelled, progress).tree(item, revision)
 
 

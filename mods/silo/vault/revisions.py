@@ -8,7 +8,6 @@ files: the lines of two revisions, and those of the file at hand, are then named
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -26,6 +25,7 @@ from silo.bom.naming import display_name
 from silo.bom.roots import choose_assembly
 from silo.fcstd import Library
 from silo.fcstd.library import Contents
+from silo.folders import scratch_folder
 
 
 class RevisionsApi(Downloads, Protocol):
@@ -63,11 +63,7 @@ class RevisionBoms:
     _stack: ExitStack = field(default_factory=ExitStack)
 
     def __enter__(self) -> RevisionBoms:
-        self._folder = Path(
-            self._stack.enter_context(
-                tempfile.TemporaryDirectory(ignore_cleanup_errors=True, prefix="silo-revisions-")
-            )
-        )
+        self._folder = Path(self._stack.enter_context(scratch_folder("silo-revisions-")))
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -31,6 +31,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from silo.bom.errors import ConfigError
 from silo.durable import replacing, sync_folder
+from silo.folders import scratch_folder
 from silo_server.clock import stamp, utc_now
 from silo_server.db.bulk import insert_rows
 from silo_server.db.engine import EVENT_CHANNEL, MIGRATION_LOCK, Database, Tx, mode_of, put_state
@@ -140,9 +141,7 @@ def restore(
     report("the backup is whole")
     try:
         settings.storage.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(
-            ignore_cleanup_errors=True, prefix="restore-", dir=settings.storage
-        ) as folder:
+        with scratch_folder("restore-", settings.storage) as folder:
             copy = Path(folder) / "silo.db"
             shutil.copyfile(source / "silo.db", copy)
             with _open(Settings(database_url=f"sqlite:///{copy}")) as old, _open(settings) as db:

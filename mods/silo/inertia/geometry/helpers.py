@@ -26,6 +26,7 @@ from types import TracebackType
 from typing import IO, Any, TypeAlias, TypeVar
 
 from silo import platform
+from silo.folders import scratch_folder
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -86,7 +87,7 @@ class Helpers:
     def folder(self) -> Path:
         """A folder for what goes to and fro; taken away at the end."""
         if self._folder is None:
-            self._folder = tempfile.TemporaryDirectory(prefix="silo-helpers-", ignore_cleanup_errors=True)
+            self._folder = scratch_folder("silo-helpers-")
         return Path(self._folder.name)
 
     def start(self) -> bool:

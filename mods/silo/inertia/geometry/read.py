@@ -3,12 +3,12 @@
 
 from __future__ import annotations
 
-import tempfile
 import time
 from pathlib import Path
 from typing import Any
 
 from silo.bom.errors import CancelledError, DocumentError
+from silo.folders import scratch_folder
 from silo.inertia.geometry import isolate, store
 from silo.inertia.geometry.cache import Cache, changed_since, default_folder, key_of
 from silo.inertia.geometry.detect import Kind, detect
@@ -50,7 +50,7 @@ def read(path: str | Path, *, options: ReadOptions | None = None) -> Assembly:
         if known is not None:
             return known
         begin = time.time_ns()
-        with tempfile.TemporaryDirectory(ignore_cleanup_errors=True, prefix="silo-geometry-") as folder:
+        with scratch_folder("silo-geometry-") as folder:
             result = Path(folder) / "result.npz"
             isolate.run(path, options, result)
             assembly, extra = store.load(result)

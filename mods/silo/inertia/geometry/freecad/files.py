@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import count
@@ -15,6 +14,7 @@ import numpy as np
 
 from silo.bom.errors import DocumentError
 from silo.fcstd import Library
+from silo.folders import scratch_folder
 from silo.inertia.core import is_rigid
 from silo.inertia.geometry.freecad.assembly import assembled
 from silo.inertia.geometry.freecad.facts import StoredFacts
@@ -37,7 +37,7 @@ def read_freecad(path: Path, options: ReadOptions, report: Report, helpers: Help
     try:
         with (
             Library(options.root) as library,
-            tempfile.TemporaryDirectory(ignore_cleanup_errors=True, prefix="silo-freecad-") as folder,
+            scratch_folder("silo-freecad-") as folder,
         ):
             document = library.open(path)
             base = os.path.dirname(document.FileName).replace("\\", "/")

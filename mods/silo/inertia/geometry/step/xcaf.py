@@ -9,7 +9,6 @@ is read instead, and :mod:`siblings` looks for the files by our rules.
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,6 +21,7 @@ from OCP.TDocStd import TDocStd_Document
 from OCP.XCAFDoc import XCAFDoc_Centroid, XCAFDoc_DocumentTool, XCAFDoc_Volume
 
 from silo.bom.errors import DocumentError
+from silo.folders import scratch_folder
 from silo.inertia.geometry.graph import Child, Node
 from silo.inertia.geometry.kernel import occt
 from silo.inertia.geometry.kernel.tessellate import MM, in_metres, trsf_matrix
@@ -93,7 +93,7 @@ def load(
     text
         what :func:`prepare` found, where somebody asked it already.
     """
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True, prefix="silo-step-") as folder:
+    with scratch_folder("silo-step-") as folder:
         text = text or prepare(path, Path(folder), max_instances)
         document, reader = _transferred(text.source, path)
     step = _Walk(path, prefix, document, reader, text.products).run()
