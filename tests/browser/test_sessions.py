@@ -10,6 +10,7 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import Dialog, Page, Route, expect
 from server_testing import Api, bom
+from settled import measured
 
 Visit = Callable[..., Page]
 PASSWORD = "correct horse battery"
@@ -227,8 +228,9 @@ def test_a_second_click_sends_nothing(visit: Visit, user: str) -> None:
 
     page.route("**/account/tokens", late)
     page.get_by_label("Name of a new token").fill("laptop")
-    page.locator("form[action$=tokens]").evaluate(
-        "form => { form.requestSubmit(); setTimeout(() => form.requestSubmit(), 100) }"
+    measured(
+        page.locator("form[action$=tokens]"),
+        "form => { form.requestSubmit(); setTimeout(() => form.requestSubmit(), 100) }",
     )
     expect(page.get_by_label("The token")).to_be_visible()
     assert len(sent) == 1
