@@ -87,7 +87,7 @@ def test_the_view_turns_and_hides_links(opened: Callable[..., Page]) -> None:
 
 
 def test_tables_sort_and_filter_and_names_are_text(opened: Callable[..., Page]) -> None:
-    """Numbers as numbers; without WebGL there is the picture."""
+    """Numbers as numbers; without WebGL there is the picture; dark where wanted, never wider than a phone."""
     page: Any = opened(webgl=False)
     expect(page.locator("#view img")).to_be_visible()
     expect(page.locator("#picked")).to_contain_text("a picture instead")
@@ -104,4 +104,10 @@ def test_tables_sort_and_filter_and_names_are_text(opened: Callable[..., Page]) 
     page.locator("summary", has_text="row unused").click()
     expect(page.locator("#warnings")).to_contain_text("<img src=x onerror=alert(1)></script>")
     assert page.locator("#warnings img").count() == 0
+    colours = "(({color, backgroundColor}) => [color, backgroundColor])(getComputedStyle(document.body))"
+    light = page.evaluate(colours)
+    page.emulate_media(color_scheme="dark")
+    assert page.evaluate(colours) == ["rgb(230, 237, 243)", "rgb(18, 22, 27)"] != light
+    page.set_viewport_size({"width": 390, "height": 800})
+    assert page.evaluate("document.documentElement.scrollWidth") == 390
     assert [word for word in page.said if not word.endswith("r.html")] == []

@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
 
 from silo.bom.errors import DocumentError, InputError
 from silo.folders import cache_folder
@@ -132,6 +134,33 @@ def test_a_file_that_changes_while_it_is_read_is_read_again(box: Any, step: Any,
     save(9.0)
     with pytest.raises(DocumentError, match="changed while it was read"):
         read(path, options=options([4.0, 5.0, 6.0, 7.0]))
+
+
+def test_a_sibling_that_changes_while_it_is_read_is_read_again(box: Any, step: Any, tmp_path: Path) -> None:
+    """Neither the old numbers nor a mix of both are kept; the new file may be an old copy."""
+    document = step()
+    top = document.assembly("top")
+    block = BRepAlgoAPI_Cut(box(4, 4, 4), box(1, 1, 1)).Shape()  # the larger file, so read first
+    for name, shape in (("block", block), ("cube", box(1, 1, 1))):
+        document.place(top, document.part(shape, name), name=name)
+    path = document.write(tmp_path / "top.step", external=True)
+    assert (tmp_path / "block.stp").stat().st_size > (tmp_path / "cube.stp").stat().st_size
+    changed = step()
+    changed.part(box(5, 5, 5), "block")
+    waiting = [changed.write(tmp_path / "saved.tmp")]
+    seen: list[str] = []
+
+    def progress(at: Any) -> None:
+        seen.append(at.stage)
+        if at.stage == "reading cube.stp" and waiting:
+            other = waiting.pop()
+            os.utime(other, (1e9, 1e9))
+            other.replace(tmp_path / "block.stp")
+
+    for _ in range(2):  # read, then from the cache
+        assembly = read(path, options=ReadOptions(cache_dir=tmp_path / "cache", progress=progress))
+        assert sorted(round(p.volume_m3 * 1e9, 6) for p in assembly.prototypes.values()) == [1, 125]
+    assert seen.count("reading block.stp") == 2
 
 
 def test_the_cache_is_bounded(box: Any, step_part: Any, kept: Any, tmp_path: Path) -> None:

@@ -162,11 +162,15 @@ def _holds(extra: Mapping[str, Any], source: Path) -> bool:
 
 
 def changed_since(begin_ns: int, extra: Mapping[str, Any], source: Path) -> bool:
-    """True where a file read beside ``source`` was written after ``begin_ns`` (:func:`time.time_ns`)."""
+    """True where a file read beside ``source`` was written after ``begin_ns`` (:func:`time.time_ns`).
+
+    Or put there: a copy may have an old time of writing, but not an old place in its folder.
+    """
     folder = source.resolve().parent
     for name in extra.get("others", {}):
         try:
-            if (folder / name).stat().st_mtime_ns > begin_ns:
+            found = (folder / name).stat()
+            if max(found.st_mtime_ns, found.st_ctime_ns) > begin_ns:
                 return True
         except OSError:
             return True

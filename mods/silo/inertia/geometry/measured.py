@@ -150,8 +150,8 @@ def drift_note(drift: float) -> Note | None:
     if drift <= STATED:
         return None
     words = (
-        "its faces do not meet at their edges, by the file's own tolerances: its volume differs by "
-        f"{drift:.1g} with the way that it is taken"
+        "its faces do not meet at their edges, by the file's own tolerances: its volume may be off by "
+        f"{drift:.1g} of it"
     )
     return (GeometryCode.NOT_CONVERGENT if drift <= TORN else GeometryCode.OPEN_SHELL, words)
 

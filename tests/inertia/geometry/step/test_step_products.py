@@ -3,13 +3,16 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from OCP.BRep import BRep_Builder
+from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakeWire
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder
 from OCP.BRepTools import BRepTools
 from OCP.gp import gp_Ax2, gp_Dir, gp_Pln, gp_Pnt, gp_Trsf
 from OCP.TopoDS import TopoDS_Compound, TopoDS_Shell, TopoDS_Solid
@@ -283,3 +286,37 @@ def test_a_part_twice_at_one_place_is_told(
     assert codes_of(assembly) == [GeometryCode.COINCIDENT_PARTS]
     assert "1 (two)" in assembly.problems[0].message
     assert len(assembly.instances) == 3
+
+
+def moved_surface(text: str, kind: str, offset: float) -> str:
+    """STEP text whose first plane is moved along its normal, or its first cylinder made wider, edges not."""
+    entities = dict(re.findall(r"#(\d+) = ([^;]*);", text))
+    number, body = next(item for item in entities.items() if item[1].startswith(f"{kind}("))
+    if kind == "CYLINDRICAL_SURFACE":
+        head, _, radius = body[:-1].rpartition(",")
+        return text.replace(f"#{number} = {body};", f"#{number} = {head},{float(radius) + offset!r});")
+    (axes,) = re.findall(r"#(\d+)", body)
+    place, normal = (n for n in re.findall(r"#(\d+)", entities[axes])[:2])
+    at, along = (
+        np.array(entities[n].split("(")[2].rstrip(")").split(","), dtype=float) for n in (place, normal)
+    )
+    moved = ",".join(repr(float(x)) for x in at + offset * along)
+    return text.replace(f"#{place} = {entities[place]};", f"#{place} = CARTESIAN_POINT('',({moved}));")
+
+
+@pytest.mark.parametrize(
+    ("offset", "code"),
+    [(0.0, None), (5e-5, None), (1e-3, GeometryCode.NOT_CONVERGENT), (0.05, GeometryCode.OPEN_SHELL)],
+)
+@pytest.mark.parametrize("kind", ["PLANE", "CYLINDRICAL_SURFACE"])
+def test_a_face_beside_its_own_edges_is_doubted(
+    kind: str, offset: float, code: GeometryCode | None, step_part: Any, box: Any, read_in: Any
+) -> None:
+    """The kernel widens the edges' tolerances until such a face is valid; [mm], in a bored block of 10 mm."""
+    bore = BRepPrimAPI_MakeCylinder(gp_Ax2(gp_Pnt(5, 5, -1), gp_Dir(0, 0, 1)), 4.0, 12.0).Shape()
+    path = step_part(BRepAlgoAPI_Cut(box(10, 10, 10), bore).Shape())
+    text = path.read_text()
+    path.write_text(moved_surface(text, kind, offset))
+    assert path.read_text() != text
+    (part,) = read_in(path).prototypes.values()
+    assert [p.code for p in part.problems] == ([code] if code else [])

@@ -122,6 +122,11 @@ def faces_of(shape: Any) -> list[Any]:
     return [_as_face(face) for face in _explored(shape, TopAbs_FACE)]
 
 
+def edges_of(face: Any) -> list[Any]:
+    """All edges of a face, a seam twice."""
+    return [_as_edge(edge) for edge in _explored(face, TopAbs_EDGE)]
+
+
 def loose_shells_of(shape: Any) -> list[Any]:
     """The shells of a shape that stand in no solid, placed."""
     return _explored(shape, TopAbs_SHELL, TopAbs_SOLID)
@@ -153,8 +158,8 @@ def is_plain(solid: Any) -> bool:
         surface = BRepAdaptor_Surface(face, False).GetType()
         if surface not in _ELEMENTARY:
             return False
-        for edge in _explored(face, TopAbs_EDGE):
-            kind = BRepAdaptor_Curve2d(_as_edge(edge), face).GetType()
+        for edge in edges_of(face):
+            kind = BRepAdaptor_Curve2d(edge, face).GetType()
             if kind != GeomAbs_Line and not (kind == GeomAbs_Circle and surface == GeomAbs_Plane):
                 return False
     return True

@@ -23,7 +23,7 @@ from OCP.TopLoc import TopLoc_Location
 
 from silo.inertia.core import place
 from silo.inertia.geometry.kernel import occt
-from silo.inertia.geometry.kernel.closure import closed_shells, gap_of
+from silo.inertia.geometry.kernel.closure import beside_edges, closed_shells, gap_of
 from silo.inertia.geometry.kernel.common import KernelCommon
 from silo.inertia.geometry.kernel.moments import solid_moments
 from silo.inertia.geometry.kernel.tessellate import (
@@ -42,6 +42,7 @@ from silo.inertia.geometry.measured import (
     Measured,
     Notes,
     cavity_note,
+    drift_note,
     integration_notes,
     mesh_notes,
     open_note,
@@ -140,6 +141,9 @@ def _measured(solid: Any, body: Any, eps: float, picture: _Picture | None) -> _B
     mesh = _checked_mesh(solid, props, picture, notes) if picture is not None else None
     if props is not None and (gap := gap_of(solid)) is not None:
         notes.append(open_note(gap, props.volume_m3))
+    elif props is not None and not any(code is GeometryCode.NOT_CONVERGENT for code, _ in notes):
+        note = drift_note(beside_edges(solid, props.volume_m3 / MM**3))
+        notes += [note] if note is not None else []
     flat = mesh is not None and props is not None and occt.is_flat(solid)
     return _Bare(body, props, mesh, notes, flat)
 
