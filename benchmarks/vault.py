@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """A vault in a night: reading, the index, processes, requests, kills; all ratios in one run.
 
-    python benchmarks/vault.py [--documents 2000] [--kills 50] [--dask] [--keep FOLDER]
+    python benchmarks/vault.py [--documents 2000 10000] [--kills 50]
 
 Data: a generated vault, four parts in five, the rest assemblies in five levels that share parts and
 sub-assemblies. A part is a body with 60 features, some 90 kB of XML: the median of real files.
@@ -9,9 +9,10 @@ sub-assemblies. A part is a body with 60 features, some 90 kB of XML: the median
 null        unpack every Document.xml with zipfile, let expat parse it without a handler; one process
 first       the plan of the whole vault with an empty index
 second      the same again, nothing changed;  five: after five files were changed
+dask        the plan on a LocalCluster of two workers; again, while a worker is killed
 requests    what one sync of the vault asks of a server on loopback, first and second time
-kills       the same sync, killed with SIGKILL at random moments until it has ended, against a server;
-            then every BOM, every revision count and the history against those of an undisturbed sync
+kills       assemblies are changed, and the sync is killed with SIGKILL at random moments, against a server;
+            at the end all lines, versions, revisions and history against those of undisturbed syncs
 
 Times are processor times of the process and its workers, which other work on the machine disturbs least;
 ``wall`` is the clock's.
@@ -25,11 +26,16 @@ import os
 import random
 import shutil
 import signal
+import sqlite3
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import zipfile
+from collections import Counter
+from contextlib import closing
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -94,13 +100,13 @@ def uuid_of(kind: int, number: int) -> str:
     return f"00000000-0000-4000-{kind:04x}-{number:012d}"
 
 
-def build(folder: Path, documents: int, features: int = 60) -> None:
-    """Write the vault."""
+def build(folder: Path, documents: int, features: int = 60, edition: int = 0) -> None:
+    """Write the vault; of another edition the assemblies, of which one in five holds other quantities."""
     chance = random.Random(1)
     parts = documents * 4 // 5
     place = Raw("App::PropertyPlacement", '<PropertyPlacement Px="0.0000000000000000" Q3="1.0"/>')
     names = [f"Box{number}" for number in range(features)]
-    for number in range(parts):
+    for number in range(0 if edition else parts):
         doc = Doc(f"part{number}")
         for name in names:
             doc.add(
@@ -117,8 +123,9 @@ def build(folder: Path, documents: int, features: int = 60) -> None:
             used = [chance.randrange(parts) for _ in range(8)]
             links = [(f"../../parts/{n // 500:03d}/part{n:06d}.FCStd", "Body") for n in dict.fromkeys(used)]
             links += [(path, "Assembly") for path in chance.sample(below, min(4, len(below)))]
+            changed = {"ElementCount": edition + 1} if edition and count % 5 == edition % 5 else {}
             for number, (path, name) in enumerate(links):
-                doc.add("App::Link", f"L{number}", LinkedObject=XLink(path, name))
+                doc.add("App::Link", f"L{number}", LinkedObject=XLink(path, name), **changed)
             members = locals_(*(f"L{number}" for number in range(len(links))))
             doc.add("Assembly::AssemblyObject", "Assembly", Group=members, SiloItemId=uuid_of(0x9000, count))
             name = f"{level}/asm{count:06d}.FCStd"
@@ -175,7 +182,11 @@ def reading(folder: Path, scratch: Path, use_dask: bool) -> None:
 
         with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
             run = plan(folder, scratch / "dask", 1, cluster.scheduler_address)
-        print(f"dask: wall {run['wall']:.2f} s, same answers: {run['digest'] == five['digest']}")
+            print(f"dask: wall {run['wall']:.2f} s, same answers: {run['digest'] == five['digest']}")
+            victim = threading.Timer(run["wall"] / 3, lambda: os.kill(cluster.workers[0].pid, signal.SIGKILL))
+            victim.start()
+            run = plan(folder, scratch / "dask killed", 1, cluster.scheduler_address)
+            print(f"dask, a worker killed: same answers: {run['digest'] == five['digest']}")
 
 
 def rename_a_feature(path: Path) -> None:
@@ -189,28 +200,33 @@ def rename_a_feature(path: Path) -> None:
 
 
 def serve(scratch: Path, documents: int) -> tuple[Any, Any]:
-    """A server with an item for each document."""
+    """A server with an item for each document: two are created, the others are rows like them."""
+    from silo.api.client import SiloClient
     from silo_server.run import running_server
 
     scratch.mkdir(parents=True)
     context = running_server(f"sqlite:///{scratch / 'silo.db'}", token="silo_" + "b" * 40)
     server = context.__enter__()
-    from silo.api.client import SiloClient
-
     parts = documents * 4 // 5
     assemblies = sum(max(1, int((documents - parts) * share)) for share in LEVELS)
     with SiloClient(server.base_url, server.token) as client:
-        for kind, number, category in [
-            *((0x8000, n, "M01") for n in range(parts)),
-            *((0x9000, n, "A01") for n in range(assemblies)),
-        ]:
+        for kind, category, item_type in ((0x8000, "M01", "part"), (0x9000, "A01", "assembly")):
             client.create_item(
-                "kindred-rd",
-                category,
-                f"{kind:x} {number}",
-                item_type="assembly" if kind == 0x9000 else "part",
-                idempotency_key=uuid_of(kind, number),
+                "kindred-rd", category, "first", item_type=item_type, idempotency_key=uuid_of(kind, 0)
             )
+    with closing(sqlite3.connect(scratch / "silo.db")) as database:
+        for kind, category, count in ((0x8000, "M01", parts), (0x9000, "A01", assemblies)):
+            begin = uuid_of(kind, 0)
+            database.execute("CREATE TEMP TABLE one AS SELECT * FROM items WHERE uuid = ?", (begin,))
+            for number in range(1, count):
+                name = f"{category}-{number + 1:05}"
+                database.execute(
+                    "UPDATE one SET id = NULL, uuid = ?, name = ?, part_number = ?, part_number_key = ?",
+                    (uuid_of(kind, number), f"{kind:x} {number}", name, name.lower()),
+                )
+                database.execute("INSERT INTO items SELECT * FROM one")
+            database.execute("DROP TABLE one")
+        database.commit()
     return context, server
 
 
@@ -231,92 +247,83 @@ def environment(server: Any, home: Path) -> dict[str, str]:
     }
 
 
-def state(server: Any) -> dict[str, Any]:
-    """Every BOM, and how often each was changed."""
-    from silo.api.client import SiloClient
+def state(scratch: Path) -> dict[str, Any]:
+    """All that the server's database has of BOMs: lines, versions, revisions, history, news."""
+    questions = {
+        "BOMs": """SELECT p.uuid, c.uuid, l.quantity, l.source FROM bom_lines l
+            JOIN items p ON p.id = l.parent_id JOIN items c ON c.id = l.child_id""",
+        "versions": "SELECT uuid, bom_version, current_revision, version FROM items",
+        "revisions": """SELECT i.uuid, r.revision_number, count(*) FROM revisions r
+            JOIN items i ON i.id = r.item_id GROUP BY 1, 2""",
+        "history": """SELECT p.uuid, h.version, h.kind, c.uuid, l.action, l.before, l.after FROM bom_changes h
+            JOIN items p ON p.id = h.parent_id LEFT JOIN bom_change_lines l ON l.change_id = h.id
+            LEFT JOIN items c ON c.id = l.child_id""",
+        "events": "SELECT name, item_uuid, count(*) FROM events GROUP BY 1, 2",
+        "syncs": "SELECT parent_id, version, count(*) FROM bom_syncs GROUP BY 1, 2",
+    }
+    with closing(sqlite3.connect(scratch / "silo.db")) as database:
+        return {name: sorted(map(repr, database.execute(text))) for name, text in questions.items()}
 
-    with SiloClient(server.base_url, server.token) as client:
-        names, offset = {}, 0
-        while page := client.search_items(limit=500, offset=offset):
-            names.update({item.part_number: item.id for item in page})
-            offset += len(page)
-        boms = client.get_boms(list(names))
-        versions = {names[n]: client.get_bom_version(n) for n, lines in boms.items() if lines}
-        return {
-            "boms": {
-                names[number]: sorted((names[line.child_part_number], line.quantity) for line in lines)
-                for number, lines in boms.items()
-                if lines
-            },
-            "versions": versions,
-        }
+
+def counted(folder: Path, scratch: Path, env: dict[str, str]) -> Counter[str]:
+    """One job, and what it asked of the server."""
+    command = sync_command(folder, scratch / "calm.idx", scratch / "calm.json")[3:]
+    run = subprocess.run(
+        [sys.executable, "-c", COUNTED, *command], env=env, check=True, capture_output=True, text=True
+    )
+    return Counter(json.loads(run.stderr.splitlines()[-1]))
+
+
+def requests(folder: Path, scratch: Path, documents: int) -> None:
+    """Must show 3."""
+    context, server = serve(scratch, documents)
+    env = environment(server, scratch / "home")
+    for name in ("first", "second"):
+        asked = counted(folder, scratch, env)
+        allowed = documents / 1000 + asked["merges"] + 10
+        print(
+            f"{name} sync of {documents} documents: {asked['merges']} merges, "
+            f"{asked['questions']} questions; {asked.total()} requests, at most {allowed:.0f} wanted"
+        )
+    context.__exit__(None, None, None)
 
 
 def kills(folder: Path, scratch: Path, documents: int, count: int, seed: int) -> None:
-    """Must shows 3 and 4."""
+    """Must show 4: rounds of changes, each synced undisturbed, and to another server by killed jobs."""
     chance = random.Random(seed)
-    calm, server = serve(scratch / "calm", documents)
-    env = environment(server, scratch / "calm-home")
-    begin = time.perf_counter()
-    counted = subprocess.run(
-        [
-            sys.executable,
-            "-c",
-            COUNTED,
-            *sync_command(folder, scratch / "calm.idx", scratch / "calm.json")[3:],
-        ],
-        env=env,
-        check=True,
-        capture_output=True,
-        text=True,
-    )
-    whole = time.perf_counter() - begin
-    again = subprocess.run(
-        [
-            sys.executable,
-            "-c",
-            COUNTED,
-            *sync_command(folder, scratch / "calm.idx", scratch / "calm.json")[3:],
-        ],
-        env=env,
-        check=True,
-        capture_output=True,
-        text=True,
-    )
-    print(f"requests, first: {counted.stderr.splitlines()[-1]}; second: {again.stderr.splitlines()[-1]}")
-    wanted = state(server)
-    calm.__exit__(None, None, None)
-
-    wild, server = serve(scratch / "wild", documents)
-    env = environment(server, scratch / "wild-home")
-    killed = ended = 0
+    calm, calm_server = serve(scratch / "calm", documents)
+    wild, wild_server = serve(scratch / "wild", documents)
+    calm_env = environment(calm_server, scratch / "calm-home")
+    env = environment(wild_server, scratch / "wild-home")
+    killed = edition = whole = 0
+    codes = set()
     while killed < count:
-        command = sync_command(folder, scratch / "wild.idx", scratch / "wild.json", 2)
-        process = subprocess.Popen(command, env=env, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        try:
-            process.wait(chance.uniform(0.3, max(1.0, whole * 0.8)))
-            ended += 1
-            # All was done: forget the index, so that the next one has something to do.
-            for path in scratch.glob("wild.idx*"):
-                path.unlink()
-        except subprocess.TimeoutExpired:
-            process.send_signal(signal.SIGKILL)
-            process.wait()
-            killed += 1
-    last = subprocess.run(
-        sync_command(folder, scratch / "wild.idx", scratch / "wild.json", 2), env=env, capture_output=True
-    )
-    found = state(server)
+        if edition:
+            build(folder, documents, edition=edition)
+        edition += 1
+        begin = time.perf_counter()
+        counted(folder, scratch, calm_env)
+        whole = time.perf_counter() - begin
+        for last in (False,) * 5 + (True,):
+            command = sync_command(folder, scratch / "wild.idx", scratch / "wild.json", 2)
+            process = subprocess.Popen(command, env=env, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            try:
+                # From 0.3 of an undisturbed run on: before that, Python has not begun.
+                codes.add(process.wait(None if last else whole * chance.uniform(0.3, 1)))
+            except subprocess.TimeoutExpired:
+                process.send_signal(signal.SIGKILL)
+                process.wait()
+                killed += 1
+    calm.__exit__(None, None, None)
     wild.__exit__(None, None, None)
-    print(
-        f"{killed} kills, {ended} runs that ended, last exit code {last.returncode}; "
-        f"BOMs equal: {found['boms'] == wanted['boms']} ({len(wanted['boms'])}), "
-        f"BOM versions equal: {found['versions'] == wanted['versions']}"
-    )
+    wanted, found = state(scratch / "calm"), state(scratch / "wild")
+    print(f"{killed} kills in {edition} rounds of changes; exit codes of the runs that ended: {codes}")
+    for name in wanted:
+        print(f"  {name}: {len(wanted[name])}, equal to those undisturbed: {found[name] == wanted[name]}")
 
 
 COUNTED = """
-import collections, sys
+import collections, json, sys
 from silo.api import transport
 count = collections.Counter()
 inner = transport.Transport._attempt
@@ -327,7 +334,7 @@ transport.Transport._attempt = attempt
 from silo.cli.main import main
 if __name__ == "__main__":
     code = main(sys.argv[1:])
-    print(dict(count), file=sys.stderr)
+    print(json.dumps(count), file=sys.stderr)
     sys.exit(code)
 """
 
@@ -337,17 +344,20 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--documents", type=int, default=2000)
-    parser.add_argument("--kills", type=int, default=0)
+    parser.add_argument("--documents", type=int, nargs="*", default=[2000, 10000])
+    parser.add_argument("--kills", type=int, default=50)
     parser.add_argument("--kill-documents", type=int, default=300)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--dask", action="store_true")
     args = parser.parse_args()
     scratch = Path(tempfile.mkdtemp(prefix="silo-vault-"))
     try:
+        for documents in args.documents:
+            folder, aside = scratch / f"vault{documents}", scratch / str(documents)
+            aside.mkdir()
+            build(folder, documents)
+            reading(folder, aside, find_spec("distributed") is not None)
         if args.documents:
-            build(scratch / "vault", args.documents)
-            reading(scratch / "vault", scratch, args.dask)
+            requests(folder, aside / "server", documents)
         if args.kills:
             build(scratch / "small", args.kill_documents, features=5)
             kills(scratch / "small", scratch / "servers", args.kill_documents, args.kills, args.seed)
