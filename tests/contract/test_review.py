@@ -112,6 +112,26 @@ def test_undoing_keep_silo_asks_again(api: Api, renamed: bool) -> None:
     assert len(api.merge(parent, {a: 4})["warnings"]) == 1
 
 
+def test_a_decision_about_one_conflict_is_about_no_other(api: Api) -> None:
+    """Neither about the BOM's other lines nor about other BOMs; so is its undo."""
+    first, second, a, b = api.items(4)
+    for parent in (first, second):
+        api.merge(parent, {a: 4, b: 4})
+        for child in (a, b):
+            api.good("PUT", bom(parent, child), {"quantity": 6})
+        api.merge(parent, {a: 4, b: 4})
+
+    def still_open(parent: str) -> set[str]:
+        return {c["child_part_number"] for c in api.get(bom(parent, "review"))["conflicts"]}
+
+    decide(api, first, **{a: "keep_silo"})
+    assert (still_open(first), still_open(second)) == ({b}, {a, b})
+    change = decide(api, first, **{b: "keep_silo"})
+    assert (still_open(first), still_open(second)) == (set(), {a, b})
+    api.good("POST", bom(first, "undo"), {"change_id": change["change_id"]})
+    assert (still_open(first), still_open(second)) == ({b}, {a, b})
+
+
 def test_keeping_silo_s_quantity_keeps_the_reason_of_the_line(api: Api) -> None:
     """Why the line is there stays, unless the decision gives another reason."""
     parent, a = api.items(2)

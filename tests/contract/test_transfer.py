@@ -193,6 +193,19 @@ def test_import_is_validated_row_by_row_before_anything_is_written(api: Api) -> 
     assert (change["kind"], change["document"]["file"]) == ("import", "bom.csv")
 
 
+def test_an_archived_part_is_not_imported_but_its_line_can_be_changed(api: Api) -> None:
+    """As for a merge: what is archived is added to no BOM, and stays where it is."""
+    parent, old, new = api.items(3)
+    api.good("POST", bom(parent), {"child_part_number": old, "quantity": 2})
+    for one in (old, new):
+        api.good("DELETE", f"/api/items/{one}")
+    error = api.bad(400, "POST", bom(parent, "import"), body=f"PN,Qty\n{old},3\n{new},1\n".encode())
+    assert [problem.partition(": ")[0] for problem in error["problems"]] == ["row 3"]
+    assert "is archived" in error["problems"][0]
+    api.good("POST", bom(parent, "import"), body=f"PN,Qty\n{old},3\n".encode())
+    assert api.quantities(parent) == {old: 3}
+
+
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "cp1252"])
 def test_files_of_other_spreadsheets(api: Api, encoding: str) -> None:
     """Semicolons with decimal commas, byte-order marks, title lines, cp1252."""
