@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from silo.durable import replacing
+from silo.durable import private_file, private_folder, replacing
 
 
 @pytest.mark.parametrize("before", [None, b"old"])
@@ -61,3 +61,20 @@ def test_a_name_of_any_length_can_be_replaced(tmp_path: Path) -> None:
     with replacing(path) as file:
         file.write(b"x")
     assert path.read_bytes() == b"x"
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows keeps rights in lists, not in modes")
+def test_what_is_private_is_closed_also_where_it_was_open(tmp_path: Path) -> None:
+    """New or there already; what is in the file stays."""
+    for folder in (tmp_path / "new", tmp_path / "old"):
+        for file in (folder / "new.db", folder / "old.db"):
+            if "old" in folder.name:
+                folder.mkdir(mode=0o755, exist_ok=True)
+                folder.chmod(0o755)
+                if "old" in file.name:
+                    file.write_text("kept")
+                    file.chmod(0o644)
+            private_folder(folder)
+            private_file(file)
+            assert (folder.stat().st_mode & 0o777, file.stat().st_mode & 0o777) == (0o700, 0o600)
+    assert (tmp_path / "old" / "old.db").read_text() == "kept"

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Files that are replaced whole or not at all, and stay replaced after a power cut. Standard library only."""
+"""Files that are replaced whole or not at all, or are for their owner only. Standard library only."""
 
 from __future__ import annotations
 
 import os
+import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -12,7 +13,14 @@ from typing import BinaryIO
 
 from silo.platform import patiently, sync_folder
 
-__all__ = ["remove_patiently", "replace_patiently", "replacing", "sync_folder"]
+__all__ = [
+    "private_file",
+    "private_folder",
+    "remove_patiently",
+    "replace_patiently",
+    "replacing",
+    "sync_folder",
+]
 
 
 @contextmanager
@@ -48,3 +56,22 @@ def replace_patiently(source: Path | str, target: Path | str) -> None:
 def remove_patiently(path: Path | str) -> None:
     """Delete a file, which on Windows waits for a program that has it open; none there is fine. OSError."""
     patiently(lambda: Path(path).unlink(missing_ok=True))
+
+
+def private_folder(path: Path | str) -> None:
+    """Make a folder for its owner only, and close one that is there to others. Raises OSError."""
+    os.makedirs(path, mode=0o700, exist_ok=True)
+    _close_to_others(path)
+
+
+def private_file(path: Path | str) -> None:
+    """Make a file for its owner only, or close the one that is there to others. Raises OSError."""
+    os.close(os.open(path, os.O_RDWR | os.O_CREAT, 0o600))
+    _close_to_others(path)
+
+
+def _close_to_others(path: Path | str) -> None:
+    mode = stat.S_IMODE(os.stat(path).st_mode)
+    if mode & 0o077:
+        with suppress(OSError):  # another user's, who has opened it to us
+            os.chmod(path, mode & ~0o077)

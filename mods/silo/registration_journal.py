@@ -9,7 +9,6 @@ must be found again then.
 from __future__ import annotations
 
 import json
-import os
 import sqlite3
 import time
 import uuid
@@ -19,6 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from silo.bom.errors import InputError
+from silo.durable import private_file, private_folder
 from silo.folders import data_folder
 
 _TABLE = """
@@ -159,9 +159,8 @@ class Journal:
             db.execute("COMMIT")
 
     def _connect(self, path: Path, timeout: float) -> sqlite3.Connection:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        # For its owner only, before SQLite opens it.
-        os.close(os.open(path, os.O_RDWR | os.O_CREAT, 0o600))
+        private_folder(path.parent)
+        private_file(path)  # before SQLite opens it
         return sqlite3.connect(path, timeout=timeout, isolation_level=None)
 
     def _take_over(self, db: sqlite3.Connection) -> None:

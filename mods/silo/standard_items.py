@@ -17,7 +17,7 @@ from silo.bom.errors import SiloError
 from silo.bom.identity import walk_entries
 from silo.bom.model import BomEntry
 from silo.bom.naming import Proposal
-from silo.durable import replacing
+from silo.durable import private_folder, replacing
 from silo.folders import data_folder
 from silo.registration import Registration, RegistrationApi
 
@@ -42,7 +42,7 @@ class Memory:
         if found.items() <= before.items():
             return
         servers[server] = {**before, **found}
-        self.path.parent.mkdir(parents=True, exist_ok=True)
+        private_folder(self.path.parent)
         with replacing(self.path) as file:
             file.write(json.dumps(servers, indent=1, sort_keys=True).encode())
 

@@ -112,7 +112,7 @@ class FileStore:
     def state(self, wanted: int) -> str:
         """``ok``; ``unwritable``; ``full`` where fewer than ``wanted`` bytes are free."""
         try:
-            self.root.mkdir(parents=True, exist_ok=True)
+            self.root.mkdir(mode=0o700, parents=True, exist_ok=True)
             free = shutil.disk_usage(self.root).free
         except OSError:
             return "unwritable"
@@ -132,7 +132,7 @@ class FileStore:
 
     def _write(self, chunks: Iterable[bytes], wanted: str | None = None) -> tuple[str, int]:
         """(hash, size); a content whose hash is not the one ``wanted`` is not kept."""
-        self.root.mkdir(parents=True, exist_ok=True)
+        self.root.mkdir(mode=0o700, parents=True, exist_ok=True)
         digest, size = hashlib.sha256(), 0
         handle, name = tempfile.mkstemp(dir=self.root, prefix="upload-")
         temporary = Path(name)

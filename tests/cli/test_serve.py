@@ -148,3 +148,17 @@ def test_a_port_that_is_taken_is_one_sentence(tmp_path: Path, capsys: pytest.Cap
         assert main(["serve", "--port", port, "--database", f"sqlite:///{tmp_path / 'silo.db'}"]) == 2
     assert "--port 0" in capsys.readouterr().err
     assert not (tmp_path / "silo.db").exists()  # nor a user or a token that nobody has seen
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows keeps rights in lists, not in modes")
+def test_the_database_is_its_owners(tmp_path: Path) -> None:
+    """It has password hashes in it; one that an older release left open to others is closed."""
+    database = tmp_path / "silo.db"
+    database.touch(mode=0o644)
+    database.chmod(0o644)
+    with serving(database) as server:
+        assert isinstance(server, Served)
+        open_to_others = [
+            path.name for path in [database, *tmp_path.rglob("*")] if path.stat().st_mode & 0o077
+        ]
+        assert open_to_others == []

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The files under ``deploy/``: what they name exists, and nginx, where there is one, works with them."""
+"""The files under ``deploy/`` and ``examples/night/``: what they name exists; nginx works with them."""
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -21,6 +22,7 @@ from silo_server.run import running_server
 from silo_server.settings import _ENVIRONMENT, Settings
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
+NIGHT = DEPLOY.parent / "examples" / "night"
 TOKEN = "silo_deploy"
 OTHER = {"SILO_API_TOKEN", "SILO_DB_PASSWORD"}
 
@@ -34,21 +36,32 @@ def test_every_variable_is_one_of_ours() -> None:
     assert {"SILO_DATABASE_URL", "SILO_STORAGE_ROOT_DIR"} <= named
 
 
-@pytest.mark.parametrize("unit", ["silo.service", "silo-backup.service"])
-def test_the_units_call_commands_that_there_are(unit: str) -> None:
+@pytest.mark.parametrize(
+    "unit", [DEPLOY / "silo.service", DEPLOY / "silo-backup.service", NIGHT / "silo-sync.service"], ids=str
+)
+def test_the_units_call_commands_that_there_are(unit: Path) -> None:
     """With options that the command line takes."""
-    line = re.search(r"silo-mod ([^'\n]+)", (DEPLOY / unit).read_text("utf-8"))
+    line = re.search(r"silo-mod ([^'\n]+)", unit.read_text("utf-8").split("ExecStart=")[1])
     assert line is not None
     args = build_parser().parse_args(re.sub(r"\$\$\(.*?\)", "", line[1]).replace('"', "").split())
-    assert args.command in ("serve", "backup")
+    assert args.command in ("serve", "backup", "sync")
+
+
+def test_the_container_of_the_night_job_runs_a_command_that_there_is() -> None:
+    """Its words, and the files that it copies, are there."""
+    text = (NIGHT / "Containerfile").read_text("utf-8")
+    (words,) = re.findall(r"^CMD (\[.*\])$", text, re.MULTILINE)
+    assert build_parser().parse_args(json.loads(words)).command == "sync"
+    assert "SILO_HOME" in text
+    assert {"SILO_API_URL", "SILO_API_TOKEN"} <= set(re.findall(r"SILO_[A-Z_]+", text))
 
 
 @pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="systemd is not on this machine")
-@pytest.mark.parametrize("unit", ["silo.service", "silo-backup.service", "silo-backup.timer"])
-def test_systemd_understands_the_units(unit: str) -> None:
+@pytest.mark.parametrize("unit", sorted([*DEPLOY.glob("*.[st]*er*"), *NIGHT.glob("*.[st]*er*")]), ids=str)
+def test_systemd_understands_the_units(unit: Path) -> None:
     """Only that the program is not installed may be found wrong."""
-    done = subprocess.run(["systemd-analyze", "verify", str(DEPLOY / unit)], capture_output=True, text=True)
-    said = [line for line in done.stderr.splitlines() if unit in line and "not executable" not in line]
+    done = subprocess.run(["systemd-analyze", "verify", str(unit)], capture_output=True, text=True)
+    said = [line for line in done.stderr.splitlines() if unit.name in line and "not executable" not in line]
     assert said == []
 
 

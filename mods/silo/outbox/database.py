@@ -7,7 +7,6 @@ process may call them. Standard library only.
 
 from __future__ import annotations
 
-import os
 import sqlite3
 import threading
 from collections.abc import Iterator
@@ -16,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from silo.bom.errors import InputError
-from silo.durable import sync_folder
+from silo.durable import private_file, sync_folder
 
 VERSION = 3
 
@@ -155,7 +154,7 @@ class Database:
             self.copies.mkdir(mode=0o700, parents=True, exist_ok=True)
             # Made for its owner only before SQLite opens it; the -wal and -shm files take over its mode.
             for path in (self.path, self.path.with_suffix(".lock")):
-                os.close(os.open(path, os.O_RDWR | os.O_CREAT, 0o600))
+                private_file(path)
             sync_folder(self.path.parent)
         except OSError as error:
             raise InputError(

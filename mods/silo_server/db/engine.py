@@ -18,14 +18,17 @@ become visible in their order, which replay by id relies on). They are always ta
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import datetime
+from pathlib import Path
 from typing import Any
 
 from sqlalchemy import Connection, Engine, create_engine, event, func, insert, select, update
 
 from silo.bom.errors import ReadOnlyError
+from silo.durable import private_file, private_folder
+from silo.folders import data_folder
 from silo_server.clock import Clock, stamp, utc_now
 from silo_server.db.tables import events, server_state
 from silo_server.settings import Settings
@@ -217,7 +220,9 @@ def _postgres_engine(settings: Settings, connections: int, seconds: float | None
 def _sqlite_engine(settings: Settings) -> Engine:
     path = settings.sqlite_path
     assert path is not None  # the caller asked
-    path.parent.mkdir(parents=True, exist_ok=True)
+    path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    with suppress(OSError):  # what is wrong with the place, SQLite says
+        _keep_private(path)
     engine = create_engine(
         settings.sqlalchemy_url,
         connect_args={"timeout": WAIT_SECONDS, "check_same_thread": False},
@@ -228,6 +233,16 @@ def _sqlite_engine(settings: Settings) -> Engine:
     event.listen(engine, "connect", _prepare_sqlite)
     event.listen(engine, "begin", _begin_sqlite)
     return engine
+
+
+def _keep_private(path: Path) -> None:
+    """The database has password hashes in it. SQLite gives the files beside it the rights that it has."""
+    if path.parent == data_folder():
+        private_folder(path.parent)
+    private_file(path)
+    for beside in (path.with_name(path.name + end) for end in ("-wal", "-shm")):
+        if beside.exists():
+            private_file(beside)
 
 
 def _prepare_sqlite(connection: Any, _record: Any) -> None:

@@ -140,7 +140,7 @@ def restore(
     made = verify(source)
     report("the backup is whole")
     try:
-        settings.storage.mkdir(parents=True, exist_ok=True)
+        settings.storage.mkdir(mode=0o700, parents=True, exist_ok=True)
         with scratch_folder("restore-", settings.storage) as folder:
             copy = Path(folder) / "silo.db"
             shutil.copyfile(source / "silo.db", copy)

@@ -61,7 +61,7 @@ class Decisions:
 
     def _write(self, known: dict[str, list[str]]) -> None:
         try:
-            self._path.parent.mkdir(parents=True, exist_ok=True)
+            self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
             with replacing(self._path) as file:
                 file.write(json.dumps(known, indent=1).encode())
         except OSError:

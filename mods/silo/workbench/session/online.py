@@ -188,7 +188,7 @@ class LastIds:
         """Remember an event. A lost write costs a repeated event, so nothing is synced here."""
         self._known[url] = event_id
         try:
-            self._path.parent.mkdir(parents=True, exist_ok=True)
+            self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
             part = self._path.with_suffix(".new")
             part.write_text(json.dumps(self._known), encoding="utf-8")
             part.replace(self._path)
