@@ -41,7 +41,7 @@ def test_freecad_is_asked_for_its_folder_and_its_python(tmp_path: Path) -> None:
     assert ask_freecad(command, Path("/other")).data == Path("/other")
 
 
-def test_a_freecad_that_fails_is_told_in_a_sentence(tmp_path: Path) -> None:
+def test_a_freecad_that_fails_is_reported_in_a_sentence(tmp_path: Path) -> None:
     """Its own last words are part of it."""
     command = program(tmp_path / "freecadcmd", "#!/bin/sh\necho 'no libraries' >&2\nexit 1\n")
     with pytest.raises(ConfigError, match="no libraries"):
@@ -98,7 +98,7 @@ def test_where_no_links_can_be_made_the_addon_is_copied(tmp_path: Path) -> None:
 
 
 def test_packages_are_installed_by_freecads_own_python(tmp_path: Path) -> None:
-    """It knows its processor and version; any other Python would have to be told."""
+    """It knows its processor and version; any other Python would have to be named."""
     log = tmp_path / "log"
     own = program(tmp_path / "python3", f'#!/bin/sh\necho "$*" >> {log}\n')
     found = Place(tmp_path / "data", (1, 1), (3, 11), (str(tmp_path / "none"), own))

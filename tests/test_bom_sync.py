@@ -169,7 +169,7 @@ def test_an_assembly_without_a_number_is_not_synced_but_its_sub_assemblies_are()
     assert [o.status for o in outcomes] == [Status.MERGED, Status.UNREGISTERED]
 
 
-def test_unregistered_components_are_left_out_and_told() -> None:
+def test_unregistered_components_are_left_out_and_reported() -> None:
     """Not silently dropped: they stay visible as unregistered (spec §2)."""
     silo = silo_of("top", "bolt")
     extraction = Extraction(assembly("top"), (part("bolt", 2), part("mount", uuid=None)))

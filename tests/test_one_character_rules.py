@@ -36,7 +36,7 @@ def test_quantities_differ_by_a_thousandth() -> None:
 
 
 @pytest.mark.parametrize(("heard", "told"), [(None, True), (4, False), (4.001, True)])
-def test_a_conflict_is_told_until_the_server_heard_of_it(heard: float | None, told: bool) -> None:
+def test_a_conflict_is_reported_until_the_server_heard_of_it(heard: float | None, told: bool) -> None:
     """``assembly_quantity`` None is "heard of no quantity", not "heard of this one"."""
     line = {"child_part_number": "A", "quantity": 7, "source": "manual", "assembly_told": True}
     plan = plan_merge([{"child_part_number": "A", "quantity": 4}], [{**line, "assembly_quantity": heard}])

@@ -58,7 +58,7 @@ def test_an_item_registered_from_this_very_file_is_found(tmp_path: Path) -> None
     assert [s.part_number for s in offered(silo, tmp_path, candidate)["Copy"].similar] == [known.part_number]
 
 
-def test_an_item_with_the_same_name_is_told_and_stays_a_suggestion(tmp_path: Path) -> None:
+def test_an_item_with_the_same_name_is_reported_and_stays_a_suggestion(tmp_path: Path) -> None:
     """One that only begins so is another part."""
     silo = FakeSilo()
     same = silo.create_item("kindred-rd", "M01", "base part")
@@ -105,7 +105,7 @@ def test_a_guessed_category_is_not_checked(tmp_path: Path) -> None:
     assert not row.guesses
 
 
-def test_two_files_of_one_content_are_told_of_each_other(tmp_path: Path) -> None:
+def test_two_files_of_one_content_are_reported_together(tmp_path: Path) -> None:
     """Nobody wants two numbers for one part by accident."""
     found = offered(FakeSilo(), tmp_path, part(tmp_path, "A", b"x"), part(tmp_path, "B", b"x"))
     assert (found["A"].twins, found["B"].twins) == (("B",), ("A",))

@@ -145,7 +145,7 @@ def test_a_repeat_after_a_crash_creates_no_second_item(journal: Journal, own_ids
     assert journal.pending() == {}
 
 
-def test_a_read_only_file_is_told_and_its_item_is_used_later(journal: Journal) -> None:
+def test_a_read_only_file_is_reported_and_its_item_is_used_later(journal: Journal) -> None:
     """The item is not lost: once the file can be written, the same item goes into it."""
     api, files = Items(), Files()
     files.locked = True

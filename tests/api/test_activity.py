@@ -46,7 +46,7 @@ def test_the_box_of_the_spec() -> None:
     ],
 )
 def test_what_is_zero_is_left_out(lists: dict[str, Any], words: str) -> None:
-    """Only what happened is told."""
+    """Only what happened is reported."""
     assert counts_text(MergeDiff.model_validate(lists)) == words
 
 

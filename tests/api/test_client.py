@@ -105,7 +105,9 @@ def test_a_failed_look_up_is_an_error_not_an_unknown_item(
 
 
 @pytest.mark.parametrize("body", ["404 page not found\n", {"detail": "Not Found"}])
-def test_a_server_without_identities_is_told(server: Any, client: SiloClient, answer: Any, body: Any) -> None:
+def test_a_server_without_identities_is_reported(
+    server: Any, client: SiloClient, answer: Any, body: Any
+) -> None:
     """A missing route must not read as "not registered" either."""
     server.on("*", answer(404, body, {"Content-Type": "text/plain"} if isinstance(body, str) else {}))
     with pytest.raises(RouteMissingError):

@@ -116,7 +116,7 @@ def test_the_rest_of_the_file_stays(path: Path) -> None:
         ("\udcff", "cannot be read"),
     ],
 )
-def test_a_broken_file_is_told_with_its_name(path: Path, text: str, told: str) -> None:
+def test_a_broken_file_is_reported_with_its_name(path: Path, text: str, told: str) -> None:
     """Which file, what is wrong."""
     path.parent.mkdir()
     path.write_bytes(text.encode("utf-8", "surrogateescape"))

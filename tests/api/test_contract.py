@@ -128,7 +128,7 @@ def test_identities_are_found_in_any_spelling_under_the_spelling_given(silo: Sil
     }
 
 
-def test_a_part_number_is_found_in_any_case_and_a_missing_one_is_told(silo: Silo) -> None:
+def test_a_part_number_is_found_in_any_case_and_a_missing_one_is_reported(silo: Silo) -> None:
     """kindred-rd: numbers compare case-insensitively."""
     number = make(silo, "Shaft")
     assert silo.get_item(number.lower()).part_number == number
@@ -177,7 +177,7 @@ def test_an_item_keeps_its_identity_under_a_new_number(silo: Silo) -> None:
 
 
 def test_the_schema_names_its_categories(silo: Silo) -> None:
-    """Code and text, whatever form the schema has; an unknown schema is told."""
+    """Code and text, whatever form the schema has; an unknown schema is reported."""
     assert silo.categories()["F01"] == "Screws and bolts"
     assert silo.get_schema("kindred-rd")["name"] == "kindred-rd"
     with pytest.raises(NotFoundError):
@@ -215,7 +215,7 @@ def test_what_the_server_has_diffs_as_the_core_does(silo: Silo) -> None:
 
 
 def test_a_manual_line_is_never_touched_and_a_difference_is_a_conflict(silo: Silo) -> None:
-    """What people wrote stays; the assembly's other quantity is told."""
+    """What people wrote stays; the assembly's other quantity is reported."""
     top, glue = make(silo, "Top", "A01"), make(silo, "Glue", "C01")
     silo.add_bom_line(top, glue, quantity=2, notes="one drop each")
     result = merge(silo, top, **{key(glue): 5})
@@ -244,7 +244,7 @@ def test_a_dry_run_answers_and_changes_nothing(silo: Silo) -> None:
     assert silo.get_bom(top) == []
 
 
-def test_all_unknown_children_are_told_at_once_and_nothing_changes(silo: Silo) -> None:
+def test_all_unknown_children_are_reported_at_once_and_nothing_changes(silo: Silo) -> None:
     """One 400 with every bad entry, by its index."""
     top, part = make(silo, "Top", "A01"), make(silo, "Part")
     with pytest.raises(RejectedError) as caught:
@@ -255,7 +255,7 @@ def test_all_unknown_children_are_told_at_once_and_nothing_changes(silo: Silo) -
     assert silo.get_bom(top) == []
 
 
-def test_an_unknown_assembly_is_told_as_such(silo: Silo) -> None:
+def test_an_unknown_assembly_is_reported_as_such(silo: Silo) -> None:
     """404 for the parent."""
     part = make(silo, "Part")
     with pytest.raises(NotFoundError, match="Z98-0001"):

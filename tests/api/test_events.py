@@ -78,7 +78,7 @@ def stream(server: Any, answer: Any) -> Callable[..., Any]:
     return make
 
 
-def test_events_come_and_the_connection_is_told(
+def test_events_come_and_the_connection_is_reported(
     server: Any, client: SiloClient, stream: Callable[..., Any]
 ) -> None:
     """Connecting, online, events; heartbeats are not passed on."""
@@ -159,7 +159,7 @@ def test_a_mark_without_an_event_counts(server: Any, client: SiloClient, stream:
 def test_a_mark_that_the_server_refuses_is_given_up(
     server: Any, client: SiloClient, stream: Callable[..., Any], answer: Any
 ) -> None:
-    """Another server's id; the gap is told."""
+    """Another server's id; the gap is reported."""
     server.on(EVENTS, answer(400, {"error": "no number"}), stream(frame(1), stay=True))
     with Watch(client, last_event_id="abc") as watch:
         assert [watch.event().type, watch.event().id] == ["reset", "1"]
@@ -221,7 +221,7 @@ def test_a_stream_that_falls_silent_is_dead(server: Any, stream: Callable[..., A
         assert "silent for 0.5 s" in watch.state(Connection.OFFLINE).message
 
 
-def test_modes_are_told_on_connecting_and_when_they_change(
+def test_modes_are_reported_on_connecting_and_when_they_change(
     server: Any, client: SiloClient, stream: Callable[..., Any]
 ) -> None:
     """/ready first, server.state then."""

@@ -79,7 +79,7 @@ def test_a_wrapper_tells_its_reason() -> None:
     assert "nothing answers at silo.example.com" in str(translate(outside, WHERE))
 
 
-def test_an_unknown_host_is_told_as_such() -> None:
+def test_an_unknown_host_is_reported_as_such() -> None:
     """DNS."""
     told = translate(socket.gaierror(-2, "Name or service not known"), WHERE)
     assert isinstance(told, UnreachableError)

@@ -108,7 +108,9 @@ def test_a_file_that_is_not_there_is_no_request(server: Any, client: SiloClient,
     assert server.seen == []
 
 
-def test_a_file_that_shrinks_while_it_is_sent_is_told(server: Any, client: SiloClient, source: Path) -> None:
+def test_a_file_that_shrinks_while_it_is_sent_is_reported(
+    server: Any, client: SiloClient, source: Path
+) -> None:
     """Somebody saved it again under our hands."""
     server.on(UPLOAD, {"revision_number": 1})
 
@@ -213,7 +215,7 @@ def test_a_storage_elsewhere_gets_no_token(
     assert other_server.seen[0].headers["Authorization"] is None
 
 
-def test_a_place_that_cannot_be_written_is_told(
+def test_a_place_that_cannot_be_written_is_reported(
     server: Any, client: SiloClient, tmp_path: Path, answer: Any
 ) -> None:
     """And so is a file that the server does not have."""

@@ -56,7 +56,7 @@ def test_the_token_is_sent_and_never_shown(
     assert not [text for text in shown if "silo_secret" in text]
 
 
-def test_a_token_that_cannot_be_sent_is_told_without_it() -> None:
+def test_a_token_that_cannot_be_sent_is_reported_without_it() -> None:
     """The library's own error would quote the header."""
     for bad in ("silo_a\nb", "silo ä", "two words"):
         with pytest.raises(ConfigError) as caught:
@@ -153,7 +153,9 @@ def test_the_merge_request_is_the_one_of_the_spec(server: Any, client: SiloClien
     assert server.seen[0].headers["Content-Type"] == "application/json"
 
 
-def test_read_only_is_told_at_once(server: Any, client: SiloClient, answer: Any, pauses: list[float]) -> None:
+def test_read_only_is_reported_at_once(
+    server: Any, client: SiloClient, answer: Any, pauses: list[float]
+) -> None:
     """A person made it so; pausing here would help nobody."""
     server.on(MERGE, answer(503, {"error": "read_only", "message": "maintenance"}, {"Retry-After": "5"}))
     with pytest.raises(ReadOnlyError, match="maintenance"):
@@ -517,7 +519,7 @@ def test_nothing_follows_from_https_to_http(
     assert server.seen == []
 
 
-def test_http_spoken_on_an_https_address_is_told(server: Any) -> None:
+def test_http_spoken_on_an_https_address_is_reported(server: Any) -> None:
     """A wrong scheme in the settings."""
     with (
         SiloClient(server.url.replace("http:", "https:"), retries=Retries(tries=1)) as client,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The core is pure: the standard library and itself, nothing read, nothing kept; its exports are told."""
+"""The core is pure: the standard library and itself, nothing read, nothing kept; its exports are reported."""
 
 from __future__ import annotations
 

@@ -110,7 +110,7 @@ def test_a_group_that_links_to_itself_ends_with_a_finding(top: Doc, bolt: Any) -
 
 
 def test_an_endless_row_of_groups_is_cut(top: Doc, bolt: Any) -> None:
-    """Hundreds of groups that each link to the next are an attack; they are told, and nothing crashes."""
+    """Hundreds of groups that each link to the next are an attack; they are reported, and nothing crashes."""
     group = top.link_group("G", top.link("L", bolt))
     for number in range(500):
         group = top.link_group(f"G{number}", top.link(f"L{number}", group))
@@ -219,7 +219,7 @@ def test_an_assembly_whose_links_are_all_broken_still_is_one(top: Doc) -> None:
 # --- suppressed, excluded, mirrored, variants ---------------------------------------------------------------
 
 
-def test_suppressed_components_do_not_count_and_are_told(top: Doc, bolt: Any) -> None:
+def test_suppressed_components_do_not_count_and_are_reported(top: Doc, bolt: Any) -> None:
     """FreeCAD >= 1.1: suppressed means not there."""
     found = extract(
         top.assembly(top.link("L1", bolt, Suppressed=True), top.link("L2", bolt, Suppressed=False))
@@ -236,7 +236,9 @@ def test_suppressed_joints_are_not_worth_a_word(top: Doc, bolt: Any) -> None:
 
 
 @pytest.mark.parametrize("marked", ["link", "target", "hop"])
-def test_excluded_components_do_not_count_and_are_told(top: Doc, bolt: Any, plate: Any, marked: str) -> None:
+def test_excluded_components_do_not_count_and_are_reported(
+    top: Doc, bolt: Any, plate: Any, marked: str
+) -> None:
     """``SiloBomExclude`` on the link, on its target, or on a link between the two."""
     hop = Doc("/v/mid.FCStd").link("Hop", bolt, SiloBomExclude=marked == "hop")
     edit(bolt, SiloBomExclude=marked == "target")
@@ -298,7 +300,7 @@ def test_a_link_to_an_excluded_group_brings_nothing(top: Doc, bolt: Any) -> None
         ({"ElementCount": 2, "ScaleList": [(1.0, 1.0, 1.0), (1.0, 1.0, 1.0)]}, False),
     ],
 )
-def test_mirrored_components_count_under_their_source_and_are_told(
+def test_mirrored_components_count_under_their_source_and_are_reported(
     top: Doc, bolt: Any, scale: dict[str, Any], mirrored: bool
 ) -> None:
     """An odd number of negative axes makes the other hand of a part."""
@@ -314,7 +316,7 @@ def test_mirrored_twice_is_not_mirrored(top: Doc, bolt: Any) -> None:
     assert not found.findings_of(FindingCode.MIRRORED)
 
 
-def test_a_mirrored_bundle_is_told(top: Doc, bolt: Any) -> None:
+def test_a_mirrored_bundle_is_reported(top: Doc, bolt: Any) -> None:
     """A mirrored link to a link group mirrors all that is in it."""
     bundle = top.link_group("Bundle", top.link("L1", bolt))
     found = extract(top.assembly(bundle, top.link("Other", bundle, ScaleVector=(-1.0, 1.0, 1.0))))
@@ -322,7 +324,7 @@ def test_a_mirrored_bundle_is_told(top: Doc, bolt: Any) -> None:
     assert only(found, FindingCode.MIRRORED).where[0].obj == "Other"
 
 
-def test_a_variant_counts_under_its_source_and_is_told(top: Doc, bolt: Any) -> None:
+def test_a_variant_counts_under_its_source_and_is_reported(top: Doc, bolt: Any) -> None:
     """A copy-on-change link shows a local copy; the part is the source."""
     copy = top.body("BoltCopy")
     hidden = top.link_group("CopyOnChangeGroup", copy)
@@ -392,7 +394,7 @@ def test_draft_arrays_of_draft_arrays_multiply(top: Doc, bolt: Any) -> None:
 
 
 def test_draft_arrays_in_a_ring_end(top: Doc) -> None:
-    """Two arrays of each other hold nothing, and are told."""
+    """Two arrays of each other hold nothing, and are reported."""
     one, two = draft(top, "One", None, 2), draft(top, "Two", None, 2)
     edit(one, Base=two)
     edit(two, Base=one)
@@ -474,7 +476,7 @@ def test_links_in_groups_of_joints_and_views_do_not_count(top: Doc, bolt: Any) -
 def test_links_to_helpers_of_other_files_are_no_components(
     top: Doc, bolt: Any, type_id: str, words: str
 ) -> None:
-    """FreeCAD lets a link point at a sheet or a sketch of another file; that is no part, and is told."""
+    """FreeCAD lets a link point at a sheet or a sketch of another file; that is no part, and is reported."""
     helper = Doc("/v/master.FCStd").add(type_id, "Helper")
     found = extract(top.assembly(top.link("L1", helper), top.link("L2", bolt)))
     assert counts(found) == {BOLT: 1}
@@ -504,7 +506,7 @@ def test_a_reference_to_a_face_is_no_component(top: Doc, bolt: Any) -> None:
 
 
 def test_local_geometry_is_one_finding_for_an_assembly(top: Doc, bolt: Any) -> None:
-    """What is modelled in the assembly's file is told once, with its number."""
+    """What is modelled in the assembly's file is reported once, with its number."""
     cut = [top.add("Part::Box", "Base"), top.add("Part::Box", "Tool"), top.add("Part::Cut", "Cut")]
     found = extract(top.assembly(*cut, top.link("L1", bolt)))
     finding = only(found, FindingCode.LOCAL_GEOMETRY)
@@ -513,13 +515,13 @@ def test_local_geometry_is_one_finding_for_an_assembly(top: Doc, bolt: Any) -> N
     assert "Base, Cut, Tool" in finding.message
 
 
-def test_local_geometry_of_parts_is_not_told(top: Doc) -> None:
+def test_local_geometry_of_parts_is_not_reported(top: Doc) -> None:
     """That a part consists of a body is what a part is."""
     doc = Doc("/v/part.FCStd")
     assert extract(top.assembly(top.link("L1", doc.part("Part", doc.body())))).findings == ()
 
 
-def test_a_part_of_another_add_on_without_a_link_is_told(top: Doc, bolt: Any) -> None:
+def test_a_part_of_another_add_on_without_a_link_is_reported(top: Doc, bolt: Any) -> None:
     """A2plus embeds shapes; it cannot be counted, and is not passed over in silence."""
     part = top.add("Part::FeaturePython", "b_Bolt_001", sourceFile="./bolt.FCStd", a2p_Version="0.4")
     found = extract(top.assembly(part, top.link("L1", bolt)))

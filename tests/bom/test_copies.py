@@ -98,7 +98,7 @@ def test_new_bodies_need_no_word(scene: Scene) -> None:
     assert scene.stale([copy for copy in scene.copies() if copy.LinkedObject is not scene.body]) == ()
 
 
-def test_copies_of_equal_names_in_other_files_are_told_apart(scene: Scene) -> None:
+def test_copies_of_equal_names_in_other_files_are_kept_apart(scene: Scene) -> None:
     """A name alone is no identity: the copy shows the bolt of another file."""
     other = Doc("/v/other.FCStd")
     copies = scene.copies()

@@ -60,7 +60,7 @@ def test_what_is_no_number_is_a_change_not_a_crash(told: Any) -> None:
 
 
 def test_counts_read_as_counts() -> None:
-    """12.0 from a database is told as 12."""
+    """12.0 from a database is reported as 12."""
     (change,) = diff_bom(local(P=3), [line("P", 12.0)]).quantity_changed
     assert (repr(change.local_quantity), repr(change.remote_quantity)) == ("3", "12")
 
@@ -133,7 +133,7 @@ def test_other_relations_belong_to_people(rel_type: str) -> None:
 
 @pytest.mark.parametrize("rel_type", ["component", "", None])
 def test_components_are_components(rel_type: str | None) -> None:
-    """The relation may be told or not."""
+    """The relation may be reported or not."""
     assert diff_bom([], [line("P", 1, rel_type=rel_type)]).removed
 
 
@@ -143,7 +143,7 @@ def test_local_lines_with_one_number_are_summed() -> None:
 
 
 def test_entries_without_a_number_are_not_compared() -> None:
-    """Unregistered components are told elsewhere."""
+    """Unregistered components are reported elsewhere."""
     assert diff_bom([BomEntry("/v/new.FCStd")], []) == BomDiff()
 
 
@@ -174,7 +174,7 @@ def test_unknown_equals_only_unknown() -> None:
     assert not same_quantity(None, 0)
 
 
-def test_what_a_person_has_to_decide_is_told() -> None:
+def test_what_a_person_has_to_decide_is_reported() -> None:
     """The spec's sentence for unreferenced lines, and each conflict with both quantities."""
     parent = BomEntry("/v/top.FCStd", object_name="Assembly")
     remote = [line("A", 1), line("B", 1), line("P", 6.5, "manual"), line("Q", None, "manual")]
@@ -196,7 +196,7 @@ def test_one_unreferenced_item_is_one_item() -> None:
     assert finding.message.startswith("1 item in the Silo BOM is not referenced")
 
 
-def test_nothing_to_decide_is_not_told() -> None:
+def test_nothing_to_decide_is_not_reported() -> None:
     """Additions and changes need nobody."""
     assert diff_findings(diff_bom(local(P=4, Q=1), [line("P", 1), line("M", 1, "manual")])) == ()
 

@@ -38,7 +38,7 @@ def test_every_error_has_a_sentence_a_status_and_a_code(cls: type[SiloError]) ->
     assert re.fullmatch(r"[a-z_]+", cls.code)
 
 
-def test_codes_are_told_apart() -> None:
+def test_codes_are_kept_apart() -> None:
     """No two errors have one name; a class may go by its parent's."""
     codes = [cls.code for cls in CLASSES if "code" in vars(cls)]
     assert len(codes) == len(set(codes))

@@ -209,7 +209,7 @@ def test_there_is_a_scene_for_every_code() -> None:
 
 
 @pytest.mark.parametrize("code", FindingCode)
-def test_every_code_is_met_and_told_in_plain_words(code: FindingCode) -> None:
+def test_every_code_is_met_and_reported_in_plain_words(code: FindingCode) -> None:
     """One sentence or two, with an end, a place, and none of Python's own words."""
     finding = meet(code)
     assert finding.where

@@ -59,7 +59,7 @@ def test_entries_come_in_the_order_of_the_group() -> None:
 
 
 def test_a_link_into_its_own_file_is_construction_geometry() -> None:
-    """In-document links are no components (spec §1), and are told."""
+    """In-document links are no components (spec §1), and are reported."""
     top = Doc("/v/top.FCStd")
     found = extract(top.assembly(top.link("L1", top.body("Layout")), top.link("L2", bolt_in())))
     assert counts(found.entries) == {("/v/bolt.FCStd", "Body"): 1}
@@ -284,7 +284,7 @@ def test_a_broken_link_as_the_assembly_is_no_empty_bom() -> None:
         assert not found.findings_of(FindingCode.EMPTY_BOM)
 
 
-def test_an_empty_assembly_is_told() -> None:
+def test_an_empty_assembly_is_reported() -> None:
     """Nothing found is worth a word: perhaps the wrong object was chosen."""
     found = extract(Doc("/v/top.FCStd").assembly())
     assert found.entries == ()
@@ -350,7 +350,7 @@ def test_an_assembly_that_contains_itself_is_a_cycle_and_its_parts_still_count()
 
 
 def test_one_ring_is_one_finding_wherever_it_is_entered() -> None:
-    """A ring below two sub-assemblies is told once, with each link that closes it."""
+    """A ring below two sub-assemblies is reported once, with each link that closes it."""
     b, c = ring("b", "c")
     top = Doc("/v/top.FCStd")
     found = extract(top.assembly(top.link("L1", b), top.link("L2", c)))
@@ -439,7 +439,7 @@ def test_two_nameless_parts_of_one_file_stay_apart() -> None:
 
 
 def test_a_bare_broken_link_blocks_the_assembly_it_lies_in() -> None:
-    """A link that knows nothing, not even its document, still is told where it is missing."""
+    """A link that knows nothing, not even its document, still is reported where it is missing."""
     found = extract(BareAssembly(BareDocument("/v/top.FCStd"), BareLink(None)))
     (finding,) = found.findings_of(FindingCode.BROKEN_LINK)
     assert found.blocked

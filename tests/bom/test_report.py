@@ -97,7 +97,7 @@ def test_flat_quantities_are_multiplied_down_the_tree() -> None:
         ("/p/a.FCStd", "", "/p/a.FCStd"),
     ],
 )
-def test_paths_are_told_relative_to_the_top_file(path: str, base: str, told: str) -> None:
+def test_paths_are_reported_relative_to_the_top_file(path: str, base: str, told: str) -> None:
     """With ``/``; unsaved documents have no path."""
     assert relative(path, base) == told
 

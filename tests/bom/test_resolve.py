@@ -92,7 +92,7 @@ def test_an_item_without_a_number_is_no_registration(item: dict[str, Any]) -> No
     assert [e.doc_path for e in unresolved] == ["/v/a.FCStd", "/v/b.FCStd"]
 
 
-def test_children_are_resolved_and_the_unresolved_of_all_levels_are_told_once() -> None:
+def test_children_are_resolved_and_the_unresolved_of_all_levels_are_reported_once() -> None:
     """Resolved entries keep resolved children only; the rest is listed flat, each component once."""
     new, bolt = entry("new", uuid=None), entry("bolt")
     sub = entry("sub", bolt, new)
@@ -102,7 +102,7 @@ def test_children_are_resolved_and_the_unresolved_of_all_levels_are_told_once() 
 
 
 def test_an_unresolved_sub_assembly_keeps_its_resolved_children() -> None:
-    """It has no number, but its own BOM can be synced once it has; its unregistered parts are told too."""
+    """It has no number; its own BOM can be synced once it has one; its unregistered parts are reported."""
     sub = entry("sub", entry("bolt"), entry("new", uuid=None), uuid=None)
     resolved, unresolved = resolve_part_numbers([sub], Silo(bolt="B-1"))
     assert resolved == []
@@ -200,7 +200,7 @@ def test_without_a_number_the_label_names_the_component() -> None:
     assert consolidation_message(entry("plate", individual_links=2)).startswith("[Silo BOM] plate has 2")
 
 
-def test_only_marked_entries_are_told() -> None:
+def test_only_marked_entries_are_reported() -> None:
     """One link, or one array, needs no advice."""
     marked = entry("bolt", consolidation_warning=True, individual_links=3, link_objects=3)
     (finding,) = consolidation_findings([entry("plate"), marked])
@@ -225,14 +225,14 @@ def test_the_advice_is_given_per_assembly() -> None:
     assert [place.doc_path for place in found[1].where] == ["/v/bolt.FCStd", "/v/sub.FCStd"]
 
 
-def test_unregistered_components_are_told() -> None:
+def test_unregistered_components_are_reported() -> None:
     """Left out of the BOM, never in silence."""
     (finding,) = unregistered_findings([entry("new", uuid=None)])
     assert (finding.code, finding.severity) == (FindingCode.UNREGISTERED, Severity.WARNING)
     assert "new has no Silo part number" in finding.message
 
 
-def test_an_identity_is_told_by_the_number_that_people_know() -> None:
+def test_an_identity_is_reported_by_the_number_that_people_know() -> None:
     """A UUID says nothing to anybody who has to decide between two files."""
     finding = Finding(
         FindingCode.COPIED_IDENTITY,

@@ -80,7 +80,7 @@ def test_copies_of_an_assembly_link_are_no_roots_and_no_loose_links(doc: Doc, bo
     assert extract(asm).findings == ()
 
 
-def test_several_assemblies_are_ambiguous_and_told(doc: Doc, bolt: Any) -> None:
+def test_several_assemblies_are_ambiguous_and_reported(doc: Doc, bolt: Any) -> None:
     """Nobody guesses; the message names them and says what to do."""
     for name in ("Left", "Right"):
         doc.assembly(doc.link(f"In{name}", bolt), name=name, Label=f"{name} arm")
@@ -160,7 +160,7 @@ def test_loose_draft_arrays_and_changed_copies(doc: Doc, bolt: Any) -> None:
 
 
 def test_a_document_with_nothing_is_an_empty_bom(doc: Doc) -> None:
-    """The empty document is told, and is no error."""
+    """The empty document is reported, and is no error."""
     found = extract(choose_assembly(doc))
     assert found.entries == ()
     assert FindingCode.EMPTY_BOM in [finding.code for finding in found.findings]
@@ -178,7 +178,7 @@ def test_a_bare_document_is_an_empty_root() -> None:
     assert (found.entries, found.assembly.object_name) == ((), "")
 
 
-def test_links_beside_the_assembly_are_told(doc: Doc, bolt: Any) -> None:
+def test_links_beside_the_assembly_are_reported(doc: Doc, bolt: Any) -> None:
     """A component that was dragged out of the assembly still shows, but does not count: a warning."""
     asm = doc.assembly(doc.link("L1", bolt))
     doc.link("Dragged", bolt)

@@ -170,7 +170,7 @@ def test_an_empty_sub_name_is_the_object_itself(top: Doc, bolt: Any, sub: Any) -
     assert (target.obj, target.element) == (bolt, "")
 
 
-def test_a_missing_sub_object_is_told_with_its_file(top: Doc, lib: Doc) -> None:
+def test_a_missing_sub_object_is_reported_with_its_file(top: Doc, lib: Doc) -> None:
     """What is missing, in which file, and what uses it."""
     found = extract(top.assembly(top.link("L", (lib.part("Part"), "Gone."))))
     (finding,) = found.findings_of(FindingCode.MISSING_OBJECT)
@@ -179,7 +179,7 @@ def test_a_missing_sub_object_is_told_with_its_file(top: Doc, lib: Doc) -> None:
 
 
 def test_a_sub_object_behind_a_broken_link_is_the_links_fault(top: Doc, lib: Doc) -> None:
-    """The file behind a step is missing: that is what is told, not a missing object."""
+    """The file behind a step is missing: that is what is reported, not a missing object."""
     step = lib.link("S", None, LinkProblem=LinkProblem(FindingCode.MISSING_FILE, "sub/sub.FCStd", "Sub"))
     found = extract(top.assembly(top.link("L", (lib.part("Part", step), "S.B."))))
     (finding,) = found.findings_of(FindingCode.MISSING_FILE)
@@ -388,14 +388,14 @@ def test_a_damaged_live_assembly_is_not_read(top: Doc, bolt: Any) -> None:
 
 
 def test_a_link_that_was_never_set_does_not_block(top: Doc, bolt: Any) -> None:
-    """Nothing is missing where there never was anything; it is told all the same."""
+    """Nothing is missing where there never was anything; it is reported all the same."""
     found = extract(top.assembly(broken(top, "New", FindingCode.UNSET_LINK), top.link("L", bolt)))
     (finding,) = found.findings
     assert (finding.code, finding.severity) == (FindingCode.UNSET_LINK, Severity.WARNING)
     assert "New" in finding.message
 
 
-def test_the_reason_is_told(top: Doc) -> None:
+def test_the_reason_is_reported(top: Doc) -> None:
     """What the reader found out stands in the message."""
     link = broken(top, "L", FindingCode.UNREADABLE_FILE, "b.FCStd", "Box", "it is not a zip file")
     (finding,) = extract(top.assembly(link)).findings

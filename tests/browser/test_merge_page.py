@@ -146,7 +146,7 @@ def test_a_merge_arrives_live(case: Case, api: Api, visit: Visit) -> None:
 
 
 def test_what_happens_before_the_stream_stands_is_not_missed(case: Case, api: Api, visit: Visit) -> None:
-    """A merge between the page and its event stream is told: the page says up to where it knows."""
+    """A merge between the page and its event stream is reported: the page says up to where it knows."""
     page = visit("viewer")
     held: list[Route] = []
     page.route("**/api/events*", lambda route: held.append(route))
@@ -171,7 +171,7 @@ def test_other_items_are_no_news(case: Case, api: Api, visit: Visit) -> None:
 def test_a_hidden_tab_gives_its_connection_back(
     case: Case, api: Api, visit: Visit, server: RunningServer
 ) -> None:
-    """Hidden: no stream. Visible again: a new one, and what happened meanwhile is told."""
+    """Hidden: no stream. Visible again: a new one, and what happened meanwhile is reported."""
     hub = server.app.state.server.hub
     wait_until(lambda: hub.listeners == 0, "the end of earlier streams")
     page = visit("viewer")

@@ -39,7 +39,7 @@ def bolt_of(silo: Any, top: str) -> str:
     return next(line.child_part_number for line in silo.client.get_bom(top) if line.quantity == 12)
 
 
-def test_a_conflict_alone_is_told_once(run: Any, silo: Any, gearbox: Path, top: str) -> None:
+def test_a_conflict_alone_is_reported_once(run: Any, silo: Any, gearbox: Path, top: str) -> None:
     """A person sets 14, CAD says 12: the server learns of it, and the same again sends nothing."""
     bolt = bolt_of(silo, top)
     silo.client.update_bom_line(top, bolt, quantity=14)
@@ -66,7 +66,7 @@ def test_what_a_person_kept_stays_quiet_until_cad_says_something_else(
 
 
 def test_a_conflict_that_cad_settles_is_over(run: Any, silo: Any, gearbox: Path, top: str) -> None:
-    """CAD comes to the person's number: the server is told, and asks no more."""
+    """CAD comes to the person's number: the server hears of it, and asks no more."""
     bolt = bolt_of(silo, top)
     silo.client.update_bom_line(top, bolt, quantity=14)
     status(run, gearbox)
@@ -76,7 +76,7 @@ def test_a_conflict_that_cad_settles_is_over(run: Any, silo: Any, gearbox: Path,
     assert status(run, gearbox) == "unchanged"
 
 
-def test_an_override_whose_component_goes_is_told(run: Any, silo: Any, gearbox: Path, top: str) -> None:
+def test_an_override_whose_component_goes_is_reported(run: Any, silo: Any, gearbox: Path, top: str) -> None:
     """A person set a quantity, then CAD drops the part: that is a question too, asked once."""
     lines = {line.child_name or line.child_description: line for line in silo.client.get_bom(top)}
     silo.client.update_bom_line(top, lines["Cover"].child_part_number, quantity=3)

@@ -148,7 +148,7 @@ def test_a_report_that_cannot_be_written_is_one_sentence(run: Any, silo: Any, ge
 def test_paths_are_those_of_the_caller(
     run: Any, gearbox: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Relative, from another folder, through a symlink: the same BOM, told relative to the top file."""
+    """Relative, from another folder, through a symlink: the same BOM, reported relative to the top file."""
     told = run("bom", gearbox, "--json").out
     monkeypatch.chdir(tmp_path)
     assert run("bom", gearbox.relative_to(tmp_path), "--json").out == told

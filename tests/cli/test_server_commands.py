@@ -80,7 +80,7 @@ def test_diff_recursive_compares_each_assembly_with_its_own_lines(run: Any, silo
     assert run("diff", gearbox, "--recursive", "--check").code == 0
 
 
-def test_files_given_twice_and_copied_are_synced_once_or_told(
+def test_files_given_twice_and_copied_are_synced_once_or_reported(
     run: Any, silo: Any, gearbox: Path, tmp_path: Path
 ) -> None:
     """The same file twice is one; a copy has the same identity and changes nothing."""
@@ -93,7 +93,7 @@ def test_files_given_twice_and_copied_are_synced_once_or_told(
 
 
 @pytest.mark.parametrize("words", [["diff"], ["sync"], ["register", "--yes"], ["bom", "--resolve"]])
-def test_a_server_that_is_not_there_is_told_before_anything_else(
+def test_a_server_that_is_not_there_is_reported_before_anything_else(
     run: Any, gearbox: Path, words: list[str]
 ) -> None:
     """Also where no component has an identity yet, so that there is nothing to look up."""
@@ -103,7 +103,7 @@ def test_a_server_that_is_not_there_is_told_before_anything_else(
 
 
 @pytest.mark.parametrize("words", [["diff"], ["sync"], ["register", "--yes"]])
-def test_a_wrong_token_is_told(run: Any, silo: Any, gearbox: Path, words: list[str]) -> None:
+def test_a_wrong_token_is_reported(run: Any, silo: Any, gearbox: Path, words: list[str]) -> None:
     """Not as components without a number."""
     ran = run(words[0], gearbox, *words[1:], "--token", "wrong")
     assert ran.code == 3

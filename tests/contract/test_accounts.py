@@ -220,7 +220,7 @@ def test_logins_are_rate_limited(strict: RunningServer) -> None:
         assert api.get("/api/auth/me")["username"] == "chief"
 
 
-def test_an_unknown_name_is_told_the_same(api: Api, user: str) -> None:
+def test_an_unknown_name_is_reported_the_same(api: Api, user: str) -> None:
     """Nobody learns which names there are."""
     known, unknown = log_in(api, user, "wrong password"), log_in(api, "nobody-here", "wrong password")
     assert (known.status, known.body) == (unknown.status, unknown.body)
@@ -241,7 +241,7 @@ def test_the_audit_list_tells_and_has_no_secrets(api: Api, user: str) -> None:
 
 
 def test_read_only_mode(strict: RunningServer) -> None:
-    """503 for every change, reading goes on, the mode is told and announced; then all is as before."""
+    """503 for every change, reading goes on, the mode is reported and announced; then all is as before."""
     with Api(strict.base_url, "silo_strict") as api:
         parent, child = api.items(2)
         api.merge(parent, {child: 1})

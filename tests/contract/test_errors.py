@@ -37,14 +37,14 @@ def test_every_error_has_the_one_shape(api: Api, method: str, path: str, status:
         assert inside not in error.message
 
 
-def test_a_missing_route_is_told_from_a_missing_item(api: Api) -> None:
+def test_a_missing_route_is_kept_apart_from_a_missing_item(api: Api) -> None:
     """A client must not take "no such route" for "not registered"."""
     assert api.bad(404, "GET", "/api/nothing")["error"] == "no_route"
     assert api.bad(405, "POST", "/api/events")["error"] == "no_route"
     assert api.bad(404, "GET", "/api/items/NO-SUCH")["error"] == "not_found"
 
 
-def test_a_bad_body_is_told_field_by_field(api: Api) -> None:
+def test_a_bad_body_is_reported_field_by_field(api: Api) -> None:
     """400 with every problem, each with its place."""
     error = api.bad(400, "POST", bom(api.item()), {"quantity": "x", "reference_designators": 5})
     places = {problem.split(":")[0] for problem in error["problems"]}
@@ -102,7 +102,7 @@ def test_limits_are_413_and_say_what_they_are(small: RunningServer) -> None:
         assert "depth=" in api.bad(413, "GET", bom(parent, "expanded"))["message"]
 
 
-def test_a_body_without_a_told_length_is_counted(small: RunningServer) -> None:
+def test_a_body_without_a_declared_length_is_counted(small: RunningServer) -> None:
     """Chunked bodies have no Content-Length; they are stopped where they pass the limit."""
     import http.client
     from urllib.parse import urlsplit

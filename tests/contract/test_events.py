@@ -25,7 +25,7 @@ def quick(kind: str, databases: Databases, tmp_path: Path) -> Iterator[RunningSe
 
 
 def test_the_stream_is_an_event_stream_that_nothing_buffers(api: Api) -> None:
-    """Type, no caching, and nginx is told to pass everything on."""
+    """Type, no caching, and nginx has to pass everything on."""
     with api.events() as events:
         headers = {name.lower(): value for name, value in events.response.getheaders()}
     assert headers["content-type"].startswith("text/event-stream")
@@ -131,7 +131,7 @@ def test_a_filter_by_item(api: Api) -> None:
         assert [events.next().data["part_number"] for _ in range(2)] == [b, a]
 
 
-def test_who_was_away_for_too_long_is_told_to_read_again(quick: RunningServer) -> None:
+def test_who_was_away_for_too_long_has_to_read_again(quick: RunningServer) -> None:
     """Behind the log's end: ``reset``, then live; within it: replay. The trimming is what restarts do."""
     with Api(quick.base_url, "silo_quick") as api:
         with api.events() as events:
@@ -150,7 +150,7 @@ def test_who_was_away_for_too_long_is_told_to_read_again(quick: RunningServer) -
 
 
 def test_an_id_from_the_future_is_another_server_s(api: Api) -> None:
-    """After a database was replaced ids go backwards: the client is told to read again."""
+    """After a database was replaced ids go backwards: the client has to read again."""
     with api.events("", 10**12) as events:
         assert events.next().name == "reset"
 

@@ -160,7 +160,7 @@ def test_a_moment_at_the_end_of_the_calendar(api: Api, moment: str) -> None:
 
 @pytest.mark.parametrize("revision", ["²", "5" * 5000, "-1", "1.0", "٣", "1e3"])
 def test_a_revision_in_a_csv_that_is_no_number(api: Api, revision: str) -> None:
-    """Told with its row."""
+    """Reported with its row."""
     parent, child = api.items(2)
     text = f"Part number,Quantity,Revision\r\n{child},1,{revision}\r\n"
     headers = {"Content-Type": "text/csv"}

@@ -95,7 +95,7 @@ def test_a_repeat_with_sync_id_is_answered_even_where_if_match_is_old_by_now(api
     assert (again.status, again.body) == (200, first.body)
 
 
-def test_all_bad_entries_are_told_at_once_with_their_index(api: Api) -> None:
+def test_all_bad_entries_are_reported_at_once_with_their_index(api: Api) -> None:
     """One 400 lists unknown children and bad quantities together; nothing is merged."""
     parent, good = api.items(2)
     entries: list[Any] = [

@@ -86,7 +86,7 @@ def test_unchanged(api: Api) -> None:
 
 
 def own_words(lines: dict[str, Any]) -> dict[str, Any]:
-    """The lines without what the server was told that the assembly says of them."""
+    """The lines without what the server knows that the assembly says of them."""
     told = ("assembly_told", "assembly_quantity")
     return {child: {k: v for k, v in line.items() if k not in told} for child, line in lines.items()}
 
@@ -186,8 +186,8 @@ def test_giving_the_assembly_s_quantity_back_ends_the_override(api: Api) -> None
     assert (back["source"], back["override"], back["cad_quantity"]) == ("assembly", False, None)
 
 
-def test_an_override_that_left_the_assembly_is_told(api: Api) -> None:
-    """A person changed the quantity, then CAD dropped the part: the line stays, and is told."""
+def test_an_override_that_left_the_assembly_is_reported(api: Api) -> None:
+    """A person changed the quantity, then CAD dropped the part: the line stays, and is reported."""
     parent, a = api.items(2)
     api.merge(parent, {a: 4})
     api.good("PUT", bom(parent, a), {"quantity": 6})

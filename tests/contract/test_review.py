@@ -156,7 +156,9 @@ def test_an_override_that_cad_dropped_can_be_removed_by_taking_cad(api: Api) -> 
     assert api.get(bom(parent)) == []
 
 
-def test_decisions_that_do_not_fit_are_told_together_and_change_nothing(api: Api, unreferenced: Any) -> None:
+def test_decisions_that_do_not_fit_are_reported_together_and_change_nothing(
+    api: Api, unreferenced: Any
+) -> None:
     """All or nothing, all problems at once, each with its index."""
     parent, a, b = unreferenced
     api.merge(parent, {a: 1})

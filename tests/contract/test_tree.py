@@ -141,7 +141,7 @@ def test_mass(api: Api, gearbox: dict[str, str]) -> None:
     assert answer["stated_mass_kg"] is None
 
 
-def test_a_newer_revision_is_told(api: Api) -> None:
+def test_a_newer_revision_is_reported(api: Api) -> None:
     """A line pinned to a revision says so when there is a newer one."""
     top, a = api.items(2)
     for n in range(3):

@@ -46,7 +46,7 @@ def test_an_empty_file_is_refused(tmp_path: Path) -> None:
 
 
 def test_any_other_file_is_refused(tmp_path: Path) -> None:
-    """A text file with a document's name is told from a cut one."""
+    """A text file with a document's name is distinguished from a cut one."""
     path = tmp_path / "text.FCStd"
     path.write_text("hello" * 100)
     assert "no FreeCAD document" in refused(path)
@@ -67,7 +67,7 @@ def test_a_named_pipe_does_not_hang(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("needs_symlinks")
 def test_a_symlink_loop_is_an_error(tmp_path: Path) -> None:
-    """Symlinks in a circle end in an error of the system, told in its words."""
+    """Symlinks in a circle end in an error of the system, reported in its words."""
     (tmp_path / "a.FCStd").symlink_to("b.FCStd")
     (tmp_path / "b.FCStd").symlink_to("a.FCStd")
     assert "cannot be opened" in refused(tmp_path / "a.FCStd")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Damage behind a sound beginning: each damaged place is told, the rest is counted, the BOM is blocked."""
+"""Damage behind a sound beginning: each place is reported, the rest is counted, the BOM is blocked."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def the_only(found: Extraction) -> Finding:
     return finding
 
 
-def test_a_damaged_link_of_a_subassembly_is_told_and_the_rest_goes_on(tmp_path: Path) -> None:
+def test_a_damaged_link_of_a_subassembly_is_reported_and_the_rest_is_read(tmp_path: Path) -> None:
     """The other links of the sub-assembly are counted, and all of the top."""
     xml = damaged(sub_assembly().xml(), "L2", "LinkedObject")
     found = walk(tmp_path, xml)
@@ -111,7 +111,7 @@ def test_a_damaged_label_of_a_link_does_not_hide_what_is_wrong_with_it(tmp_path:
     assert "L4" in missing.message
 
 
-def test_what_is_sound_xml_but_no_document_is_told_with_its_object(tmp_path: Path) -> None:
+def test_what_is_sound_xml_but_no_document_is_reported_with_its_object(tmp_path: Path) -> None:
     """A property twice is well-formed; the message names the object, for there is no line to point at."""
     xml = sub_assembly().xml()
     begin = xml.index('<Property name="ElementCount"', xml.index('<Object name="L2">'))

@@ -81,7 +81,7 @@ def test_a_link_that_works_has_no_problem(tmp_path: Path) -> None:
     ],
 )
 def test_a_file_that_cannot_be_read(tmp_path: Path, content: bytes, code: FindingCode, words: str) -> None:
-    """Why not is told in the link's problem; the assembly itself is still read."""
+    """Why not is reported in the link's problem; the assembly itself is still read."""
     (tmp_path / "part.FCStd").write_bytes(content)
     found = problem(tmp_path, "part.FCStd")
     assert (found.code, found.file, found.obj) == (code, "part.FCStd", "Box")
@@ -212,7 +212,7 @@ def test_links_within_the_root(tmp_path: Path, inside: str) -> None:
 )
 @pytest.mark.usefixtures("needs_symlinks")
 def test_links_that_leave_the_root(tmp_path: Path, way: str) -> None:
-    """By name or by symlink; whether there is a file out there is not told either."""
+    """By name or by symlink; whether there is a file out there is not reported either."""
     secret = part().save(tmp_path / "secret.FCStd")
     project = tmp_path / "project"
     project.mkdir()
@@ -238,7 +238,7 @@ def test_a_root_is_no_prefix_of_a_name(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("needs_case")
 def test_a_name_in_other_case(tmp_path: Path) -> None:
-    """Written on Windows, read on Linux: taken and told, where only one file fits."""
+    """Written on Windows, read on Linux: taken and reported, where only one file fits."""
     part().save(tmp_path / "Parts" / "bolt.FCStd")
     path = Doc().link("L", "parts/Bolt.fcstd", "Box").save(tmp_path / "top.FCStd")
     with Library() as library:

@@ -170,7 +170,7 @@ def test_a_document_without_meta_has_an_empty_one(tmp_path: Path) -> None:
     assert open_document(Doc(meta=None).save(tmp_path / "old.FCStd")).Meta == {}
 
 
-def test_hidden_elements_are_told_from_shown_ones(tmp_path: Path) -> None:
+def test_hidden_elements_are_kept_apart_from_shown_ones(tmp_path: Path) -> None:
     """``VisibilityList`` is written last element first (facts §3.2)."""
     bits = Raw("App::PropertyBoolList", '<BoolList value="1101"/>')
     doc = Doc().link("L", "", "L", ElementCount=4, VisibilityList=bits)

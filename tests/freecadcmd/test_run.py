@@ -137,7 +137,7 @@ def test_errors_of_files_come_back_as_they_were(tmp_path: Path, freecadcmd: str)
     assert str(second) == "which assembly?"
 
 
-def test_a_freecad_that_does_not_start_is_told_once(tmp_path: Path, freecadcmd: str) -> None:
+def test_a_freecad_that_does_not_start_is_reported_once(tmp_path: Path, freecadcmd: str) -> None:
     """Not one error per file, but one that says what FreeCAD said."""
     with pytest.raises(ConfigError, match=r"did not work \(exit code 4\).*Cannot load library"):
         list(run_freecad(tops(tmp_path, "never starts", "good"), command=freecadcmd))

@@ -86,7 +86,7 @@ def test_compute_link_inertials_sums_up_to_the_whole() -> None:
 
 
 def test_compute_link_inertials_without_a_bom() -> None:
-    """Default density throughout, which is told; the density can be given."""
+    """Default density throughout, which is reported; the density can be given."""
     light = compute_link_inertials(ARM / "arm.step", density=500.0)
     heavy = compute_link_inertials(ARM / "arm.step", read_options=ReadOptions(cache=False))
     assert light.total is not None

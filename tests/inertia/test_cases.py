@@ -85,7 +85,7 @@ CASES: dict[int, Case] = {
     10: Case(
         "invalid, integration not convergent", "stand-in for Thor Art1GearMotor and Art2MotorGear",
         (STAND_IN + "test_case_10_an_invalid_gear_is_never_taken_in_silence",
-         STAND_IN + "test_case_10_an_integration_that_does_not_settle_is_told",
+         STAND_IN + "test_case_10_an_integration_that_does_not_settle_is_reported",
          PRODUCTS + "test_an_open_solid_is_invalid_and_its_mesh_disagrees"),
     ),
     11: Case(
@@ -107,7 +107,7 @@ CASES: dict[int, Case] = {
     14: Case(
         "mirrored and scaled placements", "made",
         (PRODUCTS + "test_mirrored_and_scaled_placements_are_exact_or_refused_aloud",
-         PRODUCTS + "test_stretches_that_the_kernel_drops_are_told",
+         PRODUCTS + "test_stretches_that_the_kernel_drops_are_reported",
          "test_core.py::test_mirror_is_rigid_and_turns_products"),
     ),
     15: Case(
@@ -131,7 +131,7 @@ CASES: dict[int, Case] = {
          ANALYTIC + "test_the_file_s_unit_does_not_change_the_part"),
     ),
     19: Case("link without mass", "made",
-             (OUTPUT + "test_case_19_a_link_without_mass_is_left_out_and_told",)),
+             (OUTPUT + "test_case_19_a_link_without_mass_is_left_out_and_reported",)),
     20: Case(
         "10 000 instances of 20 parts", "made",
         ("cases/test_full_size.py::test_case_20_ten_thousand_instances_of_twenty_parts",),
@@ -142,9 +142,9 @@ CASES: dict[int, Case] = {
     ),
     22: Case("the 15 file shapes", "made", ("bom/test_parser.py::test_the_15_shapes",)),
     23: Case("duplicates, distinct quantities", "made",
-             (MATCHING + "test_case_23_duplicates_told_apart_by_quantity",)),
+             (MATCHING + "test_case_23_duplicates_kept_apart_by_quantity",)),
     24: Case("duplicates, masses and materials decide", "made",
-             (MATCHING + "test_case_24_duplicates_told_apart_by_mass",)),
+             (MATCHING + "test_case_24_duplicates_kept_apart_by_mass",)),
     25: Case("duplicates that nothing decides", "made",
              (MATCHING + "test_case_25_undecidable_duplicates_are_ambiguous",)),
     26: Case("1.1.2 with sub-assembly masses", "made",
@@ -155,7 +155,8 @@ CASES: dict[int, Case] = {
     29: Case("part absent from the BOM", "made", (MATCHING + "test_case_29_part_absent_from_the_bom",)),
     30: Case(
         "0 kg, and nothing in its many forms", "made",
-        (MATCHING + "test_case_30_no_value_is_zero_with_a_warning", MATCHING + "test_case_30_zero_kg_is_told",
+        (MATCHING + "test_case_30_no_value_is_zero_with_a_warning",
+         MATCHING + "test_case_30_zero_kg_is_reported",
          "bom/test_masses.py::test_localised_empty_forms"),
     ),
     31: Case("mass and material disagree", "made",

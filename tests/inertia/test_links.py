@@ -128,7 +128,7 @@ def test_without_sub_assemblies_all_is_one_link(assemble: Fixture) -> None:
 def test_unclaimed_parts_are_in_no_link_but_in_the_total(
     assemble: Fixture, compute: Fixture, codes: Fixture
 ) -> None:
-    """Their mass is told, with one warning per product."""
+    """Their mass is reported, with one warning per product."""
     asm = assemble(("base/a", PART), ("plate", PART))
     links = link_map({"links": {"base": ["base"]}})
     report = compute(asm, "Name,Material,Mass\np,steel,\n", links=links)
@@ -149,7 +149,7 @@ def test_loose_parts_can_be_given_a_link(assemble: Fixture, compute: Fixture, co
 
 
 def test_map_claims_in_order_and_tells_overlaps(assemble: Fixture, compute: Fixture, codes: Fixture) -> None:
-    """The first link has it; the second is told; a pattern without effect as well."""
+    """The first link has it; the second is reported; a pattern without effect as well."""
     asm = assemble(("base/a", PART), ("arm/b", PART))
     links = link_map({"links": {"base": ["base", "arm/b"], "arm": ["arm/**", "wrist"], "empty": ["nothing"]}})
     report = compute(asm, "Name,Material,Mass\np,steel,\n", links=links)
@@ -165,7 +165,7 @@ def test_map_claims_in_order_and_tells_overlaps(assemble: Fixture, compute: Fixt
     }
 
 
-def test_an_overlap_of_many_parts_is_told_once(assemble: Fixture, compute: Fixture) -> None:
+def test_an_overlap_of_many_parts_is_reported_once(assemble: Fixture, compute: Fixture) -> None:
     """A thousand bolts that two links want are one warning, not a thousand."""
     asm = assemble(*((f"arm/b{i}", PART) for i in range(1000)))
     report = compute(

@@ -26,7 +26,7 @@ def masses(report: Any) -> dict[str, float]:
     return {f"{part.volume * 1e6:.3g}": pytest.approx(part.mass) for _, part in report.parts()}
 
 
-def test_case_23_duplicates_told_apart_by_quantity(
+def test_case_23_duplicates_kept_apart_by_quantity(
     assemble: Fixture, compute: Fixture, codes: Fixture
 ) -> None:
     """Two "Part 1", one placed twice, one three times: the quantities decide, and nothing is doubtful."""
@@ -39,7 +39,7 @@ def test_case_23_duplicates_told_apart_by_quantity(
     assert codes(report) == ["bom_duplicate_name"]
 
 
-def test_case_24_duplicates_told_apart_by_mass(assemble: Fixture, compute: Fixture, codes: Fixture) -> None:
+def test_case_24_duplicates_kept_apart_by_mass(assemble: Fixture, compute: Fixture, codes: Fixture) -> None:
     """Equal quantities: the row whose material times this volume gives its mass is the right one."""
     a, b = cube("Part 1", 0.01, key="a"), cube("Part 1", 0.02, key="b")
     asm = assemble(("l/a", a), ("l/b", b))
@@ -72,7 +72,7 @@ def test_the_real_duplicate_case_of_onshape(assemble: Fixture, compute: Fixture)
     assert report.total.mass == pytest.approx(sum(c * m for c, m in zip(counts, each, strict=True)))
 
 
-def test_duplicates_told_apart_by_parent(assemble: Fixture, compute: Fixture, codes: Fixture) -> None:
+def test_duplicates_kept_apart_by_parent(assemble: Fixture, compute: Fixture, codes: Fixture) -> None:
     """In a structured BOM the row's parent is the sub-assembly around the part."""
     a, b = cube("Part 1", 0.01, key="a"), cube("Part 1", 0.02, key="b")
     asm = assemble(("arm/p", a), ("leg/p", b))
@@ -125,7 +125,7 @@ def test_case_26_structured_bom_never_adds_a_mass_twice(
 def test_sub_assembly_mass_is_spread_where_its_parts_have_none(
     assemble: Fixture, compute: Fixture, part: Fixture, codes: Fixture
 ) -> None:
-    """A bought motor: one row with a mass, two parts in the geometry. By volume, and told."""
+    """A bought motor: one row with a mass, two parts in the geometry. By volume, and reported."""
     rotor, stator = cube("rotor", 0.01), cube("stator", 0.02)
     asm = assemble(("arm/motor/rotor", rotor), ("arm/motor/stator", stator))
     report = compute(asm, HEAD + "1,1,,,9.00 g,motor\n")
@@ -168,7 +168,7 @@ def test_sub_assembly_material_stands_for_parts_that_the_bom_lacks(
 
 
 def test_case_27_quantity_differs_from_count(assemble: Fixture, compute: Fixture, codes: Fixture) -> None:
-    """The geometry's pieces are counted, and the difference is told with both numbers."""
+    """The geometry's pieces are counted, and the difference is reported with both numbers."""
     asm = assemble(*((f"l/b{i}", cube("bolt")) for i in range(3)))
     report = compute(asm, HEAD + "1,4,,steel,,bolt\n")
     assert report.total.mass == pytest.approx(3 * 7850 * V)
@@ -178,7 +178,7 @@ def test_case_27_quantity_differs_from_count(assemble: Fixture, compute: Fixture
     assert "3" in warning.message
 
 
-def test_a_row_too_many_of_a_name_is_told_as_such(
+def test_a_row_too_many_of_a_name_is_reported_as_such(
     assemble: Fixture, compute: Fixture, codes: Fixture
 ) -> None:
     """Two rows "Part 1", one part: the other row's warning does not say that there is no such part."""
@@ -227,7 +227,9 @@ def test_case_30_no_value_is_zero_with_a_warning(
     assert codes(report) == ["no_mass_no_material"]
 
 
-def test_case_30_zero_kg_is_told(assemble: Fixture, compute: Fixture, part: Fixture, codes: Fixture) -> None:
+def test_case_30_zero_kg_is_reported(
+    assemble: Fixture, compute: Fixture, part: Fixture, codes: Fixture
+) -> None:
     """ "0 kg" is a mass by the rule where no material says more."""
     report = compute(
         assemble(("l/a", cube("a")), ("l/b", cube("b"))), HEAD + "1,1,,,0 kg,a\n2,1,,,0.125 kg,b\n"
@@ -286,7 +288,7 @@ def test_case_31_mass_and_material_that_disagree(assemble: Fixture, compute: Fix
 def test_mass_and_material_that_agree_within_the_quantum(
     assemble: Fixture, compute: Fixture, codes: Fixture
 ) -> None:
-    """0.008 kg ± 0.0005 fits 0.00785 kg of steel; only the rounding is told."""
+    """0.008 kg ± 0.0005 fits 0.00785 kg of steel; only the rounding is reported."""
     report = compute(assemble(("l/a", cube("a"))), HEAD + "1,1,,steel,0.008 kg,a\n")
     assert codes(report) == ["mass_rounded"]
 

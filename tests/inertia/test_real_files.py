@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Public STEP files end to end: BOMs made for them give exactly their sums, and gaps are told."""
+"""Public STEP files end to end: BOMs made for them give exactly their sums, and gaps are reported."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_a_complete_bom_gives_exactly_its_sum(
 
 @pytest.mark.parametrize("name", FILES)
 def test_by_material_the_volume_counts(read: Callable[[str], Assembly], compute: Fixture, name: str) -> None:
-    """All steel: the mass is 7850 times the volume; what has no solid is told."""
+    """All steel: the mass is 7850 times the volume; what has no solid is reported."""
     assembly = read(name)
     text, _ = bom_of(assembly, lambda number: 0.0)
     report = compute(assembly, text.replace("- None -,0.000000 kg", "Steel,No value"))

@@ -56,7 +56,7 @@ def test_a_sub_assembly_that_nothing_can_weigh(assemble: Fixture, compute: Fixtu
 def test_a_mass_without_a_solid_has_no_density_to_doubt(
     assemble: Fixture, compute: Fixture, codes: Fixture
 ) -> None:
-    """A point mass is told as such, and as nothing else."""
+    """A point mass is reported as such, and as nothing else."""
     report = compute(
         assemble(("l/a", cube("a")), ("l/b", shape_only("b"))), HEAD + "1,steel,,a\n1,,5.0 kg,b\n"
     )
@@ -164,7 +164,7 @@ def test_quantities_that_are_sums_already(assemble: Fixture, compute: Fixture, c
     assert not {"ambiguous", "count_differs"} & set(codes(report))
 
 
-def test_a_wrong_quantity_is_told_although_another_reading_would_fit(
+def test_a_wrong_quantity_is_reported_although_another_reading_would_fit(
     assemble: Fixture, compute: Fixture, codes: Fixture
 ) -> None:
     """The bolts prove "per parent", so that a row of 6 in a module of three means 18 and not 6."""

@@ -121,7 +121,7 @@ def test_reader_problems_reach_the_report(assemble: Fixture, compute: Fixture) -
     ]
 
 
-def test_scaled_placement_is_exact_and_told(assemble: Fixture, compute: Fixture, codes: Fixture) -> None:
+def test_scaled_placement_is_exact_and_reported(assemble: Fixture, compute: Fixture, codes: Fixture) -> None:
     """Case 14: by material the scaled volume counts; a mirror needs no word."""
     asm = assemble(("l/x", cube("x"), np.diag([2.0, 2, 2, 1])), ("l/y", cube("y"), np.diag([-1.0, 1, 1, 1])))
     report = compute(asm, HEAD + "1,1,,steel,,x\n2,1,,steel,,y\n")
@@ -140,7 +140,7 @@ def test_a_row_without_children_stands_for_what_is_listed_nowhere(
     assert codes(report, "rotor") == ["sub_assembly_mass_shared"]
 
 
-def test_a_mass_without_any_solid_is_spread_evenly_and_told(
+def test_a_mass_without_any_solid_is_spread_evenly_and_reported(
     assemble: Fixture, compute: Fixture, part: Fixture, at: Fixture
 ) -> None:
     """A bought unit of which the file has no solid at all."""
@@ -162,7 +162,7 @@ def test_the_order_of_sub_assemblies_does_not_matter(assemble: Fixture, compute:
 def test_a_sub_assemblys_material_on_a_part_without_a_solid(
     assemble: Fixture, compute: Fixture, part: Fixture, codes: Fixture
 ) -> None:
-    """The row around it has a material, the part no volume: zero, and told."""
+    """The row around it has a material, the part no volume: zero, and reported."""
     asm = assemble(("arm/print/a", cube("a")), ("arm/print/wires", shape_only("wires")))
     report = compute(asm, HEAD + "1,1,,PLA,,print\n")
     assert part(report, "wires").mass == 0

@@ -132,7 +132,7 @@ def test_a_broken_link_with_consent_is_synced(vault: Vault) -> None:
     assert flagged == {"F01-0001": False, "M01-0001": True}
 
 
-def test_components_without_a_number_are_left_out_and_told(vault: Vault) -> None:
+def test_components_without_a_number_are_left_out_and_reported(vault: Vault) -> None:
     """The rest is synced."""
     stranger = vault.part("Stranger", identity="7f9fd73b-50c9-41d8-b7b2-575a030c1eeb")
     vault.commit(vault.snapshot(vault.part("Bolt", 4), stranger))

@@ -129,7 +129,7 @@ for hold in (True, False):
 
 @pytest.mark.parametrize("trouble", ["disk full", "folder read-only"])
 @pytest.mark.usefixtures("needs_modes", "needs_limits")
-def test_a_disk_that_takes_nothing_is_told_and_loses_nothing(
+def test_a_disk_that_takes_nothing_is_reported_and_loses_nothing(
     proxy: Proxy, client: SiloClient, trouble: str
 ) -> None:
     """What was said to be kept is sent once there is room; what was not, was said not to be."""

@@ -155,7 +155,7 @@ def test_a_commit_is_kept_as_it_was(outbox: Outbox, model: Path, clock: Clock) -
     assert MergeRequest.model_validate_json(outbox.bom(entry.id)[1]) == bom(4)
 
 
-def test_a_file_that_cannot_be_read_is_told_and_nothing_is_kept(outbox: Outbox, tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_read_is_reported_and_nothing_is_kept(outbox: Outbox, tmp_path: Path) -> None:
     """The commit says so now, not the sending later."""
     with pytest.raises(DocumentError, match=r"gone\.FCStd.*nothing was kept"):
         outbox.put("http://s", TOP, file=tmp_path / "gone.FCStd", bom=bom())
@@ -192,7 +192,7 @@ def test_a_newer_outbox_is_not_touched(outbox: Outbox) -> None:
         Outbox(outbox.path).entries()
 
 
-def test_what_is_no_outbox_is_told(tmp_path: Path) -> None:
+def test_what_is_no_outbox_is_reported(tmp_path: Path) -> None:
     """Plain words, and the file stays as it is."""
     path = tmp_path / "outbox.sqlite3"
     path.write_bytes(b"no database at all, but long enough to be looked at" * 20)
@@ -325,7 +325,7 @@ def test_what_is_rejected_stays_visible_and_holds_up_nobody(
         outbox.discard(left.id)
 
 
-def test_a_half_that_went_alone_is_told(outbox: Outbox, silo: FakeSilo, model: Path) -> None:
+def test_a_half_that_went_alone_is_reported(outbox: Outbox, silo: FakeSilo, model: Path) -> None:
     """A refused file does not keep its BOM, nor the other way round; the entry says which one went."""
     fail(silo, "upload_file", ConflictError("held by a colleague"))
     outbox.put(silo.base_url, TOP, file=model, bom=bom(2))
@@ -464,7 +464,7 @@ def test_what_is_added_while_sending_is_sent_too(outbox: Outbox, silo: FakeSilo)
 
 
 def test_only_one_sends_at_a_time(outbox: Outbox, silo: FakeSilo) -> None:
-    """Another process or thread is told, and leaves it alone."""
+    """Another process or thread finds it busy, and leaves it alone."""
     outbox.put(silo.base_url, TOP, bom=bom(1))
     others = []
     outbox.send(silo, on_sent=lambda d: others.append(Outbox(outbox.path).send(silo)))

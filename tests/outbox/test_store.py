@@ -153,7 +153,7 @@ def test_a_disk_that_does_not_answer_is_no_damage(tmp_path: Path, document: Path
     assert (store.entries(), silo.revisions("A01-0001")[0].file_name) == ((), "Top.FCStd")
 
 
-def test_without_a_second_name_the_disk_is_told_at_once(tmp_path: Path, document: Path) -> None:
+def test_without_a_second_name_the_disk_is_synced_at_once(tmp_path: Path, document: Path) -> None:
     """Nothing is kept half, and the person still has the document open."""
     store = Moody(tmp_path / "outbox.sqlite3")
     store.error = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
@@ -225,7 +225,7 @@ def test_a_path_in_a_commit_leads_nowhere_else(store: Store, document: Path, tmp
     assert outside.read_bytes() == b"mine"
 
 
-def test_a_folder_that_does_not_take_it_is_told(tmp_path: Path, document: Path) -> None:
+def test_a_folder_that_does_not_take_it_is_reported(tmp_path: Path, document: Path) -> None:
     """With what to do, and nothing half done."""
     blocked = tmp_path / "file"
     blocked.write_text("in the way")

@@ -199,7 +199,7 @@ def test_what_cannot_be_parsed_is_held_with_its_file(tmp_path: Path, text: str) 
     assert len(store.entries()) == 1
 
 
-def test_what_cannot_be_read_now_stays_and_is_told(tmp_path: Path) -> None:
+def test_what_cannot_be_read_now_stays_and_is_reported(tmp_path: Path) -> None:
     """A disk that does not answer is no damage."""
     place = old_commit(tmp_path, "one", identity="x")
     text = (place / "commit.json").read_text()

@@ -342,7 +342,7 @@ def tangles(draw: st.DrawFn) -> Any:
 @settings(max_examples=200)
 @given(tangles(), st.randoms(use_true_random=False))
 def test_also_tangles_are_order_free_and_end(asm: Any, random: Any) -> None:
-    """Rings are cut at the same place, and told in the same words, whatever the order."""
+    """Rings are cut at the same place, and reported in the same words, whatever the order."""
     before = extract(asm)
     shuffled(asm, random, set())
     after = extract(asm)

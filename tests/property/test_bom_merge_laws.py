@@ -61,7 +61,7 @@ def bom_lines(
 
 
 def belongs_to_people(line: dict[str, Any]) -> bool:
-    """The rule, told a second time: an assembly owns what is a component and says assembly or nothing."""
+    """The rule, written a second time: an assembly owns what is a component and says assembly or nothing."""
     return line.get("rel_type") in ("alternate", "reference") or line.get("source") in ("manual", "erp")
 
 
@@ -155,7 +155,9 @@ def test_comparing_is_order_free(
 
 
 @given(requests, bom_lines())
-def test_every_line_of_either_side_is_told(wanted: list[dict[str, Any]], lines: list[dict[str, Any]]) -> None:
+def test_every_line_of_either_side_is_reported(
+    wanted: list[dict[str, Any]], lines: list[dict[str, Any]]
+) -> None:
     """A number that either side has stands somewhere, and one of ours in one place only."""
     diff = diff_bom(wanted, lines)
     kinds = [diff.added, diff.removed, diff.quantity_changed, diff.unchanged, diff.manual, diff.conflicts]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""A fault of ours is told in one sentence; what is wrong goes to the log only."""
+"""A fault of ours is reported in one sentence; what is wrong goes to the log only."""
 
 from __future__ import annotations
 

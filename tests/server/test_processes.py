@@ -159,7 +159,7 @@ def test_what_cannot_be_served_is_one_plain_sentence(
 
 
 def test_the_greeting_has_no_password(url: str) -> None:
-    """The database is told without its password."""
+    """The database is named without its password."""
     from silo_server.run import _without_password
 
     settings = Settings(database_url="postgresql://silo:hunter2@db/silo")

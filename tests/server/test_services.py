@@ -93,7 +93,7 @@ def test_a_source_that_is_given_wins(state: LineState) -> None:
     assert (theirs.source, theirs.unreferenced_since) == ("manual", None)
 
 
-def test_all_that_is_wrong_with_a_line_is_told_at_once() -> None:
+def test_all_that_is_wrong_with_a_line_is_reported_at_once() -> None:
     """Quantity, relation, source and lengths together."""
     bad = LineState(-1.0, "dream", "friend", unit="x" * 40)
     with pytest.raises(RejectedError) as caught:
@@ -191,7 +191,7 @@ def test_roles_include_the_lower_ones() -> None:
 
 
 def test_times_sort_as_they_read() -> None:
-    """Stored with microseconds, told in the spec's seconds."""
+    """Stored with microseconds, reported in the spec's seconds."""
     first, second = stamp(utc_now()), stamp(utc_now())
     assert first <= second
     assert len(first) == len("2026-02-08T22:15:00.000000Z")

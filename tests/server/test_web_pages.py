@@ -351,7 +351,7 @@ def test_activity_gives_only_what_is_new(visitors: dict[str, Visitor], api: Api)
 
 
 def test_a_file_too_large_is_a_page(tmp_path: Path) -> None:
-    """What the server does not take is told in a page to a browser, and as JSON to a program."""
+    """What the server does not take is reported in a page to a browser, and as JSON to a program."""
     url = f"sqlite:///{tmp_path / 'small.db'}"
     small = Settings(database_url=url, max_body_bytes=10_000)
     with running_server(url, token=TOKEN, settings=small) as server, Api(server.base_url, TOKEN) as api:

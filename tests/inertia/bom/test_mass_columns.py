@@ -29,14 +29,14 @@ def test_a_total_is_divided_where_the_row_has_no_mass_of_one_piece(bom: Bom) -> 
     assert codes(table) == []
 
 
-def test_a_total_without_a_quantity_is_told(bom: Bom) -> None:
+def test_a_total_without_a_quantity_is_reported(bom: Bom) -> None:
     """Nothing to divide by: the mass is not used, and the line is named."""
     table = bom("Name,Material,Mass,Total mass\nplate,,0.5 kg,0.5 kg\nbolt,,,0.4 kg\n")
     assert table["bolt"].mass_kg is None
     assert [(w.code, w.line) for w in table.warnings] == [(BomCode.UNREADABLE_MASS, 3)]
 
 
-def test_a_total_that_is_not_quantity_times_mass_is_told(bom: Bom) -> None:
+def test_a_total_that_is_not_quantity_times_mass_is_reported(bom: Bom) -> None:
     """0.500 kg each, four of them, and 0.5 kg in total: one of the two columns is not what it says."""
     table = bom(
         "Name,Quantity,Material,Mass,Total mass\nplate,4,,0.500 kg,0.500 kg\nlid,2,,0.200 kg,0.400 kg\n"
@@ -53,7 +53,7 @@ def test_rounding_of_a_total_is_no_contradiction(bom: Bom) -> None:
     assert codes(table) == []
 
 
-def test_a_second_column_that_means_the_same_is_told_where_it_says_otherwise(bom: Bom) -> None:
+def test_a_second_column_that_means_the_same_is_reported_where_it_says_otherwise(bom: Bom) -> None:
     """ "Mass" is taken, and "Weight" is not dropped without a word where it holds something else."""
     same = bom("Name,Material,Mass,Weight\nplate,,0.5 kg,0.5 kg\n")
     assert codes(same) == []
@@ -68,7 +68,7 @@ def test_a_second_column_that_means_the_same_is_told_where_it_says_otherwise(bom
 
 
 @pytest.mark.parametrize("header", ["Material,Werkstoff", "Matériau,Material"])
-def test_a_second_material_column_is_told(bom: Bom, header: str) -> None:
+def test_a_second_material_column_is_reported(bom: Bom, header: str) -> None:
     """The same for materials: another text in the other column is no silent loss."""
     table = bom(f"Name,Mass,{header}\nlid,,brass,steel\n")
     assert BomCode.FILE in codes(table)
@@ -76,7 +76,7 @@ def test_a_second_material_column_is_told(bom: Bom, header: str) -> None:
 
 @pytest.mark.parametrize(("mark", "told"), [("\t", True), ("|", True), (";", True), (",", False)])
 def test_a_lone_point_before_three_digits(bom: Bom, mark: str, told: bool) -> None:
-    """ "1.234 kg" is told where the delimiter does not tell the country: 1.2 kg here is 1.2 t there."""
+    """ "1.234 kg" is reported where the delimiter does not tell the country: 1.2 kg here is 1.2 t there."""
     table = bom(mark.join(["Name", "Material", "Mass"]) + "\n" + mark.join(["lid", "", "1.234 kg"]) + "\n")
     assert (BomCode.AMBIGUOUS_MASS in codes(table)) is told
 
@@ -125,7 +125,7 @@ def test_a_header_that_says_each_is_that_of_one(bom: Bom, header: str) -> None:
 
 
 @pytest.mark.parametrize("mass", ["1e300 kg", "1e13 kg", "99999999999999 kg"])
-def test_a_mass_beyond_all_parts_is_told(bom: Bom, mass: str) -> None:
+def test_a_mass_beyond_all_parts_is_reported(bom: Bom, mass: str) -> None:
     """Sums of it would not be finite; no part weighs a million million kilograms."""
     table = bom(f"Name,Material,Mass\nplate,,{mass}\n")
     assert table["plate"].mass_kg is None

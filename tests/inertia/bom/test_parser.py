@@ -80,7 +80,7 @@ def test_the_15_shapes(shape: str) -> None:
         ("Item,Quantity,Mass,Name", "1,1,0.2 kg,bracket"),
     ],
 )
-def test_missing_columns_are_told(bom: Callable[..., BomTable], header: str, rows: str) -> None:
+def test_missing_columns_are_reported(bom: Callable[..., BomTable], header: str, rows: str) -> None:
     """Without a mass or a material column the file is read, and a warning names what it has instead."""
     table = bom(f"{header}\n{rows}\n")
     assert "bracket" in table
@@ -125,7 +125,7 @@ def test_renamed_columns_by_the_users_word(bom: Callable[..., BomTable]) -> None
     assert table["bracket"].material == "steel"
 
 
-def test_a_given_column_that_is_not_there_is_told(bom: Callable[..., BomTable]) -> None:
+def test_a_given_column_that_is_not_there_is_reported(bom: Callable[..., BomTable]) -> None:
     """A wrong --column is no silent fall-back."""
     table = bom("Name,Mass\nbracket,1 kg\n", columns={"material": "Stoff"})
     assert any("no column “Stoff”" in w.message for w in table.warnings)
@@ -162,7 +162,7 @@ def test_masses_take_their_unit_from_the_header(bom: Callable[..., BomTable]) ->
         assert table.warnings == ()
 
 
-def test_a_mass_without_any_unit_is_kg_and_told_once(bom: Callable[..., BomTable]) -> None:
+def test_a_mass_without_any_unit_is_kg_and_reported_once(bom: Callable[..., BomTable]) -> None:
     """A guess is never silent."""
     table = bom("Name,Material,Mass\na,steel,0.3\nb,steel,0.4\n")
     assert [w.code for w in table.warnings] == [BomCode.MASS_WITHOUT_UNIT]
@@ -170,7 +170,7 @@ def test_a_mass_without_any_unit_is_kg_and_told_once(bom: Callable[..., BomTable
 
 
 def test_unreadable_masses_are_warnings_with_their_line(bom: Callable[..., BomTable]) -> None:
-    """The row stays, without a mass; line, name and text are told."""
+    """The row stays, without a mass; line, name and text are reported."""
     table = bom("Name,Material,Mass\na,steel,0.3 kg\nb,steel,heavy\n")
     (warning,) = table.warnings
     assert (warning.code, warning.line, warning.name) == (BomCode.UNREADABLE_MASS, 3, "b")
@@ -281,7 +281,7 @@ def test_names_with_commas_quotes_and_newlines(bom: Callable[..., BomTable]) -> 
     assert table.warnings[0].line == 5
 
 
-def test_rows_that_do_not_fit_the_header_are_told(bom: Callable[..., BomTable]) -> None:
+def test_rows_that_do_not_fit_the_header_are_reported(bom: Callable[..., BomTable]) -> None:
     """A comma without quotes shifts cells; a cut row lacks some."""
     table = bom("Name,Material,Mass\nBolt, long,steel,0.1 kg\nnut,steel\n")
     assert [(w.code, w.line) for w in table.warnings if w.code is BomCode.ROW_LENGTH] == [
@@ -290,13 +290,13 @@ def test_rows_that_do_not_fit_the_header_are_told(bom: Callable[..., BomTable]) 
     ]
 
 
-def test_a_quote_that_is_never_closed_is_told(bom: Callable[..., BomTable]) -> None:
+def test_a_quote_that_is_never_closed_is_reported(bom: Callable[..., BomTable]) -> None:
     """It swallows the rows below it; that must not look like a short BOM."""
     table = bom('Name,Material,Mass\nnut,steel,1 kg\n"bolt,steel,1 kg\npin,steel,1 kg\n')
     assert any("quotes do not match" in w.message and "line 3" in w.message for w in table.warnings)
 
 
-def test_rows_without_name_are_told(bom: Callable[..., BomTable]) -> None:
+def test_rows_without_name_are_reported(bom: Callable[..., BomTable]) -> None:
     """A total at the bottom is no part, and is not dropped in silence."""
     table = bom("Name,Material,Mass\nnut,steel,1 kg\n,,7 kg\n")
     assert [(w.code, w.line) for w in table.warnings] == [(BomCode.NO_NAME, 3)]

@@ -70,7 +70,7 @@ def test_case_20_ten_thousand_instances_of_twenty_parts(
 @pytest.mark.parametrize(
     ("stated", "size"), [("SI_UNIT(.KILO.,.METRE.)", "1e+04 m"), ("SI_UNIT(.MICRO.,.METRE.)", "1e-05 m")]
 )
-def test_case_18_a_unit_that_cannot_be_meant_is_told(
+def test_case_18_a_unit_that_cannot_be_meant_is_reported(
     step: Fixture, tmp_path: Path, pipeline: Fixture, codes: Fixture, stated: str, size: str
 ) -> None:
     """A bracket of 10 mm in a file that says kilometres weighs a mountain: asked, and the size is named."""
@@ -85,7 +85,7 @@ def test_case_18_a_unit_that_cannot_be_meant_is_told(
     assert f"measures {size}: was another unit meant?" in report.warnings[0].message
 
 
-def test_case_18_a_file_without_a_unit_is_told(
+def test_case_18_a_file_without_a_unit_is_reported(
     step: Fixture, tmp_path: Path, pipeline: Fixture, codes: Fixture
 ) -> None:
     """The kernel takes it for mm in silence."""

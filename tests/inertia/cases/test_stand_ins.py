@@ -135,7 +135,7 @@ def test_case_09_a_part_that_is_inside_out(
 ) -> None:
     """Stand-in for the negative part of the quadruped: a solid whose faces all look inwards.
 
-    The kernel's volume is negative, and every peer takes a negative mass. Here it is turned, and told.
+    The kernel's volume is negative, and every peer takes a negative mass. Here it is turned, and reported.
     """
     path = tmp_path / "perna.brep"
     assert BRepTools.Write_s(box(10, 20, 30).Reversed(), str(path))
@@ -198,7 +198,7 @@ def test_case_10_an_invalid_gear_is_never_taken_in_silence(
     assert doubts & set(codes(weighed, "Art1GearMotor"))
 
 
-def test_case_10_an_integration_that_does_not_settle_is_told(
+def test_case_10_an_integration_that_does_not_settle_is_reported(
     tmp_path: Path, pipeline: Fixture, codes: Fixture
 ) -> None:
     """Stand-in for Thor's other gear: free-form faces so wild that the kernel's integration gives up."""

@@ -124,7 +124,7 @@ def test_frames(run: Run, arm: Path) -> None:
     assert "URDF" in found["urdf"]["frame"]["description"]
 
 
-def test_a_frame_that_is_not_the_urdfs_is_told(run: Run, arm: Path) -> None:
+def test_a_frame_that_is_not_the_urdfs_is_reported(run: Run, arm: Path) -> None:
     """A link map's frame wins; where the URDF's joints put the link elsewhere, its numbers would be wrong."""
     frames = {}
     for text in ("0.42", "0.12"):
@@ -140,7 +140,7 @@ def test_a_frame_that_is_not_the_urdfs_is_told(run: Run, arm: Path) -> None:
     assert "300 mm and 0° away" in frames["0.12"][0]
 
 
-def test_numbers_of_the_assembly_in_a_urdf_are_told(run: Run, arm: Path) -> None:
+def test_numbers_of_the_assembly_in_a_urdf_are_reported(run: Run, arm: Path) -> None:
     """``--frame assembly`` with ``--urdf`` is right for the root link only; the others are named."""
     command = ["inertia", arm / "arm.step", "--bom", arm / "bom.csv", "--urdf", arm / "arm.urdf", "--json"]
     data = run(*command, "--urdf-out", arm / "out.urdf", "--frame", "assembly").json()
@@ -261,7 +261,7 @@ def test_bom_and_material_options_reach_the_calculation(run: Run, arm: Path) -> 
 def test_mistakes_are_one_plain_sentence(
     run: Run, arm: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], message: str
 ) -> None:
-    """Told before the geometry is read, exit code 2, no trace."""
+    """Reported before the geometry is read, exit code 2, no trace."""
     monkeypatch.chdir(arm)
     ran = run("inertia", "arm.step", *words)
     assert ran.code == 2

@@ -111,7 +111,7 @@ def _silo(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[SiloClien
             yield client
 
 
-def test_a_document_without_parts_is_told(run: Run, tmp_path: Path) -> None:
+def test_a_document_without_parts_is_reported(run: Run, tmp_path: Path) -> None:
     """Sketches and sheets only: no mass, said in plain words and not as a pattern of a link map."""
     (tmp_path / "Document.xml").write_text(
         '<Document SchemaVersion="4" ProgramVersion="1.0" FileVersion="1"><Properties Count="0"/>'

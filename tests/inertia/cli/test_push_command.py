@@ -125,7 +125,7 @@ def test_dry_run_asks_no_server(run: Run, arm: Path) -> None:
     assert "Not written: Cable duct" in ran.err
 
 
-def test_unknown_items_are_told(run: Run, arm: Path, client: SiloClient) -> None:
+def test_unknown_items_are_reported(run: Run, arm: Path, client: SiloClient) -> None:
     """Exit 1, with their numbers."""
     ran = run("inertia", arm / "arm.step", "--bom", arm / "bom.csv", "--push", "--json")
     assert ran.code == 1

@@ -6,7 +6,7 @@ A small seeded sample runs everywhere. The hunt:
 ``SILO_HUNT_SEED`` starts another one.
 
 Mutants by hand that tests kill: every shell or mesh taken as closed, no two bodies near each other, the sign
-of a body or of a mesh ignored, cavities and bodies not told apart, ``count_differs`` never said, the centre
+of a body or of a mesh ignored, cavities and bodies not kept apart, ``count_differs`` never said, the centre
 of a sub-assembly compared to 1e-2 m, ``MAX_SPLITS`` 3.
 """
 

@@ -70,7 +70,7 @@ def test_a_truncated_file_is_refused_not_read_in_part(box: Any, step_part: Any) 
         read(path, options=options())
 
 
-def test_missing_files_and_folders_are_told_apart(tmp_path: Path) -> None:
+def test_missing_files_and_folders_are_kept_apart(tmp_path: Path) -> None:
     """No such file, a folder, a format that nobody reads here."""
     with pytest.raises(DocumentError, match="cannot be opened"):
         read(tmp_path / "nowhere.step")
@@ -194,7 +194,7 @@ def test_the_memory_limit_is_an_error_message(box: Any, step_part: Any) -> None:
         read(step_part(box(1, 2, 3)), options=options(memory_mb=300))
 
 
-def test_a_wrong_mesh_unit_is_told_before_anything_is_read(tmp_path: Path) -> None:
+def test_a_wrong_mesh_unit_is_reported_before_anything_is_read(tmp_path: Path) -> None:
     """A configuration error crosses the process border as what it is."""
     path = tmp_path / "part.stl"
     corners = "vertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"

@@ -257,7 +257,7 @@ def test_tiny_parts_keep_their_digits() -> None:
     assert read["x"].inertia[0, 0] == pytest.approx(5.123456789012e-9, rel=1e-14)
 
 
-def test_case_19_a_link_without_mass_is_left_out_and_told(report: Any, codes: Fixture) -> None:
+def test_case_19_a_link_without_mass_is_left_out_and_reported(report: Any, codes: Fixture) -> None:
     """No simulator takes a moving link of no mass; it gets no <inertial>, and a warning."""
     assert "pad" not in real_links(report)
     assert [w.code for w in report.warnings if w.link_name == "pad" and not w.part_name] == ["zero_mass_link"]

@@ -69,13 +69,13 @@ def two_assemblies() -> tuple[Doc, Any]:
     return doc, second
 
 
-def test_several_assemblies_and_no_hint_is_told_not_guessed() -> None:
+def test_several_assemblies_and_no_hint_is_reported_not_guessed() -> None:
     """The file can be committed; its BOM needs a choice."""
     taken = take(two_assemblies()[0])
     assert not taken.is_assembly
     assert taken.identity == "two-id"
     assert "2 assemblies" in taken.problem
-    # What to do is told in the words of the window, not of the command line.
+    # What to do is reported in the words of the window, not of the command line.
     assert "--assembly" not in taken.problem
     assert taken.problem.endswith("Make the one that is meant active: double-click it in the tree.")
 

@@ -141,7 +141,7 @@ def test_action_save_and_origin_are_one_commit(fork: Fork) -> None:
     assert fork.run() == ["Top"]
 
 
-def test_an_origin_is_told_of_and_not_changed(fork: Fork) -> None:
+def test_an_origin_is_reported_and_not_changed(fork: Fork) -> None:
     """It gets what it was asked, its answer is given back, and it is wrapped once."""
     fork.origin = origin = Origin(answer="done")
     fork.hook.connect()

@@ -29,14 +29,14 @@ def keys(activity: Activity) -> list[str]:
     return [one.key for one in activity.entries]
 
 
-def test_newest_first_also_when_told_late() -> None:
+def test_newest_first_also_when_reported_late() -> None:
     """An event that arrives late is put where its time belongs."""
     activity = Activity().extend([entry("a", 1), entry("c", 3), entry("b", 2)])
     assert keys(activity) == ["c", "b", "a"]
 
 
-def test_of_equal_time_the_later_told_stands_first() -> None:
-    """What was told last is what a person looks for."""
+def test_of_equal_time_the_later_one_stands_first() -> None:
+    """What was reported last is what a person looks for."""
     assert keys(Activity().extend([entry("a", 1), entry("b", 1)])) == ["b", "a"]
 
 

@@ -52,7 +52,7 @@ def test_without_a_server_the_settings_are_offered() -> None:
     assert [action.do for action in told.actions] == [Do.SETTINGS]
 
 
-def test_why_there_is_no_connection_is_told_and_harmless() -> None:
+def test_why_there_is_no_connection_is_reported_and_harmless() -> None:
     """The reason comes from outside."""
     told = banner(Shown(server=SERVER, connection="offline", reason="\x1b[31mno\nroute " + "x" * 1000))
     reason = told.text.split("\n", 1)[1]

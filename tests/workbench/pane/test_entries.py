@@ -96,7 +96,7 @@ def test_a_broken_link_can_be_shown_in_the_model(vault: Vault) -> None:
 
 
 def test_the_report_view_is_not_flooded(vault: Vault) -> None:
-    """The consolidation warnings of a large assembly are told up to a number, then how many more."""
+    """The consolidation warnings of a large assembly are reported up to a number, then how many more."""
     vault.commit(vault.snapshot(vault.part("Bolt", 4)))
     vault.send()
     (sent,) = vault.told
@@ -112,7 +112,7 @@ def test_the_report_view_is_not_flooded(vault: Vault) -> None:
     assert few == tuple(f"[Silo BOM] P{n} has 2 individual links." for n in range(3))
 
 
-def test_a_merge_line_by_line_is_told(vault: Vault) -> None:
+def test_a_merge_line_by_line_is_reported(vault: Vault) -> None:
     """A server without the merge route took single calls: not one step, and people know it."""
     vault.commit(vault.snapshot(vault.part("Bolt", 4)))
     vault.send()
@@ -136,7 +136,7 @@ def test_a_page_of_another_server_is_not_offered() -> None:
     assert made.actions == ()
 
 
-def test_a_gap_is_told_once() -> None:
+def test_a_gap_is_reported_once() -> None:
     """A server that counts anew has forgotten what happened; the pane does not pretend to know."""
     gaps = [of_event(ServerEvent(str(n), "reset", {"reason": "counts anew"}), page, now=n) for n in range(3)]
     activity = Activity().extend(gap for gap in gaps if gap is not None)

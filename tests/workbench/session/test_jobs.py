@@ -64,7 +64,7 @@ def test_jobs_are_done_in_order_and_in_one_other_thread(worker: Worker, gui: Gui
     assert done == [(number, "test") for number in range(20)]
 
 
-def test_a_failure_is_told_and_the_next_job_goes_on(worker: Worker, gui: Gui) -> None:
+def test_a_failure_is_reported_and_the_next_job_runs(worker: Worker, gui: Gui) -> None:
     """One bad job does not end the thread for all others."""
     told: list[Any] = []
 
@@ -78,7 +78,7 @@ def test_a_failure_is_told_and_the_next_job_goes_on(worker: Worker, gui: Gui) ->
     assert told[1] == "fine"
 
 
-def test_a_bug_is_told_in_one_plain_sentence(worker: Worker, gui: Gui, bugs: list[BaseException]) -> None:
+def test_a_bug_is_reported_in_one_plain_sentence(worker: Worker, gui: Gui, bugs: list[BaseException]) -> None:
     """The exception goes to those who look for causes, the sentence to the person."""
     told: list[SiloError] = []
 
@@ -91,7 +91,7 @@ def test_a_bug_is_told_in_one_plain_sentence(worker: Worker, gui: Gui, bugs: lis
     assert isinstance(bugs[0], KeyError)
 
 
-def test_progress_is_told(worker: Worker, gui: Gui, busy: list[Busy | None]) -> None:
+def test_progress_is_reported(worker: Worker, gui: Gui, busy: list[Busy | None]) -> None:
     """Title, detail and fraction while it runs, None when nothing is left."""
     worker.submit(Job("Sending", lambda control: control.progress("a.FCStd", 0.5)))
     gui.run_until(lambda: bool(busy) and busy[-1] is None)

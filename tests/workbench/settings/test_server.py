@@ -168,7 +168,7 @@ def test_the_configuration_file_comes_last() -> None:
     assert (chosen.url, chosen.token) == (OTHER, "")
 
 
-def test_a_certificate_setting_nobody_understands_is_told() -> None:
+def test_a_certificate_setting_nobody_understands_is_reported() -> None:
     """Neither yes nor no must not mean "do not check"."""
     with pytest.raises(ConfigError, match="SILO_SSL_VERIFY: wanted true or false, got 'maybe'"):
         choose_server(Known(HOME), EMPTY, {"SILO_SSL_VERIFY": "maybe"})

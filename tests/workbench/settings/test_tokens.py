@@ -83,7 +83,7 @@ def test_a_keyring_that_does_not_work_keeps_nothing(module: Module) -> None:
         keyring.set(URL, "silo_1")
 
 
-def test_a_keyring_that_refuses_is_told() -> None:
+def test_a_keyring_that_refuses_is_reported() -> None:
     """A locked keyring's own words reach the person."""
 
     class Locked(Module):

@@ -299,7 +299,7 @@ def test_a_turned_curve_is_asked_at_three_angles() -> None:
     assert len(questions) < 1000
 
 
-def test_what_does_not_converge_is_told() -> None:
+def test_what_does_not_converge_is_reported() -> None:
     """An edge like a saw: the result has an error estimate that says so."""
 
     def saw(t: np.ndarray) -> np.ndarray:

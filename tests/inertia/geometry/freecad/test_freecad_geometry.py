@@ -200,7 +200,7 @@ def test_densities_come_from_installed_material_cards(
     assert (part.step_material, part.step_density) == ("Fine steel", 7850.0)
 
 
-def test_a_material_that_is_not_installed_is_told(
+def test_a_material_that_is_not_installed_is_reported(
     body: Any, tmp_path: Path, read_in: Any, codes_of: Any
 ) -> None:
     """An id of somebody's own library: no density, and where to put the cards."""
@@ -215,7 +215,7 @@ def test_a_material_that_is_not_installed_is_told(
 def test_a_linked_material_object_gives_name_and_density(
     text: str, density: float | None, body: Any, tmp_path: Path, read_in: Any
 ) -> None:
-    """As FreeCAD 0.20 does it; what is no density is told, not used."""
+    """As FreeCAD 0.20 does it; what is no density is reported, not used."""
     doc = Doc("part").add("App::MaterialObjectPython", "Mat", Material={"Name": "Steel", "Density": text})
     body(doc, Material=Raw("App::PropertyLink", '<Link value="Mat"/>'))
     (part,) = read_in(doc.save(tmp_path / "part.FCStd")).prototypes.values()
@@ -256,7 +256,7 @@ def test_a_file_that_appears_is_read_and_not_taken_from_the_cache(body: Any, tmp
     assert volume() == pytest.approx(1)
 
 
-def test_suppressed_excluded_and_meshes_are_told(body: Any, tmp_path: Path, read_in: Any) -> None:
+def test_suppressed_excluded_and_meshes_are_reported(body: Any, tmp_path: Path, read_in: Any) -> None:
     """None of them has a mass here; each is named."""
     doc = body(Doc("top"), "Kept")
     doc.link("Gone", "bolt.FCStd", "Box", Suppressed=True)

@@ -53,7 +53,7 @@ def only(assembly: Assembly) -> Prototype:
 def test_a_closed_mesh_is_exact_in_mm_and_says_that_it_guessed_the_unit(
     suffix: str, tmp_path: Path, read_in: Any, codes_of: Any
 ) -> None:
-    """A box of 10 x 20 x 30: volume, centre, tensor of the box in mm; the unit is told as assumed."""
+    """A box of 10 x 20 x 30: volume, centre, tensor of the box in mm; the unit is reported as assumed."""
     path = tmp_path / f"part.{suffix}"
     brick(at=(5, 10, 15)).export(path)
     assembly = read_in(path)
@@ -91,7 +91,7 @@ def test_an_implausible_size_asks_for_the_unit(tmp_path: Path, read_in: Any, cod
     assert "was another unit meant" in assembly.problems[1].message
 
 
-def test_an_open_mesh_is_told(tmp_path: Path, read_in: Any, codes_of: Any) -> None:
+def test_an_open_mesh_is_reported(tmp_path: Path, read_in: Any, codes_of: Any) -> None:
     """Two triangles missing: the number looks like any other, so it is marked."""
     body = brick()
     body.update_faces(np.arange(len(body.faces)) > 1)
@@ -102,7 +102,7 @@ def test_an_open_mesh_is_told(tmp_path: Path, read_in: Any, codes_of: Any) -> No
     assert "4 free or shared edges" in part.problems[0].message
 
 
-def test_triangles_that_disagree_are_told(tmp_path: Path, read_in: Any, codes_of: Any) -> None:
+def test_triangles_that_disagree_are_reported(tmp_path: Path, read_in: Any, codes_of: Any) -> None:
     """One triangle turned: closed, and its volume still not to be trusted."""
     body = brick()
     body.faces[0] = body.faces[0][::-1]

@@ -51,7 +51,7 @@ def test_what_no_program_wrote(name: str, tmp_path: Path) -> None:
 def test_references_that_lead_elsewhere(seed: int, box: Any, step_part: Any, tmp_path: Path) -> None:
     """Every twentieth reference to a wrong entity: a crash of the kernel is a sentence, and no silent mass.
 
-    Where the file can still be read, what is not as it was is told.
+    Where the file can still be read, what is not as it was is reported.
     """
     path = step_part(box(10, 20, 30))
     content = path.read_bytes()

@@ -124,7 +124,7 @@ def test_stated_volume_and_centroid_that_agree_are_quiet(
     assert codes_of(part) == []
 
 
-def test_stated_volume_and_centroid_that_differ_are_told(
+def test_stated_volume_and_centroid_that_differ_are_reported(
     box: Any, step_part: Any, read_in: Any, codes_of: Any
 ) -> None:
     """A file that says 6600 mm3 of a box of 6000, with the centre elsewhere, was damaged on the way."""

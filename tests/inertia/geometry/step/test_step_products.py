@@ -192,7 +192,7 @@ def test_mirrored_and_scaled_placements_are_exact_or_refused_aloud(
     assert np.linalg.det(assembly.instances[0].transform[:3, :3]) == pytest.approx(-1)
 
 
-def test_stretches_that_the_kernel_drops_are_told() -> None:
+def test_stretches_that_the_kernel_drops_are_reported() -> None:
     """Kernels before version 8 read a mirror as a turn and a scale as nothing; the text gives it away."""
     plain = {"top": Node("top", "top", (Child("part", "part"),)), "part": Node("part", "part", (), True)}
     (problem,) = lost_stretches(StepFile(Path("x.step"), stretched=2, nodes=plain))
@@ -274,7 +274,7 @@ def test_a_product_that_contains_itself_is_refused(tmp_path: Path, read_in: Any)
         read_in(path)
 
 
-def test_a_part_twice_at_one_place_is_told(
+def test_a_part_twice_at_one_place_is_reported(
     step: Any, box: Any, trsf: Any, tmp_path: Path, read_in: Any, codes_of: Any
 ) -> None:
     """An accident of copying; both are counted, since the BOM counts both."""
