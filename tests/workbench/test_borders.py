@@ -27,7 +27,6 @@ WORKERS = (
     "preview/flow",
     "preview/rows",
     "register/flow",
-    "register/registering",
     "register/rows",
     "session/jobs",
     "session/online",
