@@ -15,6 +15,7 @@ import subprocess
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from silo.bom.errors import ConfigError, InputError
 from silo.files import shipped
@@ -73,23 +74,12 @@ def ask_freecad(freecadcmd: str | None = None, data: Path | None = None) -> Plac
     with scratch_folder("silo-ask-", shared) as folder:
         out = Path(folder) / "answer.json"
         try:
-            run = subprocess.run(
-                [*start(command), "-c", _ASK],
-                env={**os.environ, "SILO_ASK_OUT": str(out)},
-                stdin=subprocess.DEVNULL,
-                capture_output=True,
-                encoding="utf-8",
-                errors="replace",
-                timeout=_ASK_SECONDS,
-                cwd=folder,
-                check=False,
-                **child_options(),
-            )
+            env = {**os.environ, "SILO_ASK_OUT": str(out)}
+            run = _run([*start(command), "-c", _ASK], _ASK_SECONDS, env=env, cwd=folder)
         except (OSError, subprocess.TimeoutExpired) as error:
             raise ConfigError(f"{command} does not answer: {error}") from error
         if not out.is_file():
-            last = (run.stderr or run.stdout).strip().splitlines()[-1:] or ["it said nothing"]
-            raise ConfigError(f"{command} did not report where its folders are: {last[0]}")
+            raise ConfigError(f"{command} did not report where its folders are: {_last_words(run)}")
         told = json.loads(out.read_text(encoding="utf-8"))
     major, minor = (int(part) for part in told["freecad"])
     pythons = (*python_beside(told["prefix"]), *python_beside(os.path.dirname(os.path.realpath(command))))
@@ -97,7 +87,11 @@ def ask_freecad(freecadcmd: str | None = None, data: Path | None = None) -> Plac
     return Place(data or Path(told["data"]), (major, minor), python, pythons, tuple(told["missing"]))
 
 
-def _run(command: list[str], seconds: float) -> subprocess.CompletedProcess[str]:
+def _last_words(run: subprocess.CompletedProcess[str]) -> str:
+    return next(iter((run.stderr or run.stdout).strip().splitlines()[-1:]), "it said nothing")
+
+
+def _run(command: list[str], seconds: float, **more: Any) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         command,
         stdin=subprocess.DEVNULL,
@@ -107,6 +101,7 @@ def _run(command: list[str], seconds: float) -> subprocess.CompletedProcess[str]
         timeout=seconds,
         check=False,
         **child_options(),
+        **more,
     )
 
 
@@ -182,6 +177,6 @@ def install_packages(place: Place) -> str:
         command += ["--python-version", version, "--only-binary=:all:"]
     run = _run(command, _PIP_SECONDS)
     if run.returncode:
-        last = (run.stderr or run.stdout).strip().splitlines()[-1:] or ["it said nothing"]
-        raise ConfigError(f"pip could not install {', '.join(PACKAGES)} for Python {version}: {last[0]}")
+        names = ", ".join(PACKAGES)
+        raise ConfigError(f"pip could not install {names} for Python {version}: {_last_words(run)}")
     return str(place.packages)

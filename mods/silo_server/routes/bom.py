@@ -43,7 +43,7 @@ from silo_server.services.bom.merge import MergeOutcome, merge_bom, preview_merg
 from silo_server.services.bom.merge_json import MergeOrder, read_merge_order
 from silo_server.services.bom.review import told_quantities
 from silo_server.services.items import get_by_numbers, get_item
-from silo_server.values import Actor, Item, LineState, number
+from silo_server.values import Actor, Item, LineState, number, to_wire
 
 router = APIRouter(prefix="/api/items/{part_number}/bom", tags=["bom"])
 several = APIRouter(prefix="/api", tags=["bom"])
@@ -291,11 +291,8 @@ def get_where_used(
             "parent_name": usage.parent.name,
             "parent_description": usage.parent.description,
             "parent_archived": usage.parent.archived_at is not None,
+            **to_wire(usage, "parent"),
             "quantity": number(usage.quantity),
-            "unit": usage.unit,
-            "rel_type": usage.rel_type,
-            "source": usage.source,
-            "depth": usage.depth,
         }
         for usage in found
     ]

@@ -106,15 +106,8 @@ def create_item(server: ServerDep, caller: Editor, body: NewItemBody) -> Respons
     """Make an item; 200 with the item where its ``id`` is known already."""
     new = service.NewItem(
         schema=body.schema_name,
-        category=body.category,
-        part_number=body.part_number,
         uuid=body.id,
-        name=body.name or "",
-        description=body.description or "",
-        item_type=body.item_type,
-        sourcing_type=body.sourcing_type,
-        long_description=body.long_description,
-        properties=body.properties or {},
+        **body.model_dump(exclude={"schema_name", "id"}, exclude_none=True),
     )
     with server.db.write(caller) as tx:
         item, made = service.create_item(tx, new)

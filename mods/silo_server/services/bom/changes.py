@@ -24,7 +24,7 @@ from silo_server.json_values import dumps
 from silo_server.services import events
 from silo_server.services.bom.lines import state_columns, state_to_json
 from silo_server.services.items import get_item
-from silo_server.values import Item, LineState
+from silo_server.values import Item, LineState, names_of
 
 
 class ChangeKind(StrEnum):
@@ -111,17 +111,13 @@ def apply_changes(tx: Tx, parent: Item, changes: Sequence[LineChange], note: Cha
         .values(
             parent_id=parent.id,
             version=version,
-            kind=note.kind.value,
             at=tx.stamp,
             username=tx.actor.username,
-            summary=note.summary,
-            reason=note.reason,
-            document_file=note.document_file,
-            document_sha256=note.document_sha256,
-            document_revision=note.document_revision,
-            sync_id=note.sync_id,
-            refers_to=note.refers_to,
-            decisions=dumps([dict(d) for d in note.decisions]) if note.decisions else None,
+            **{name: getattr(note, name) for name in names_of(ChangeNote)}
+            | {
+                "kind": note.kind.value,
+                "decisions": dumps([dict(d) for d in note.decisions]) if note.decisions else None,
+            },
         )
         .returning(bom_changes.c.id)
     ).scalar_one()
