@@ -33,12 +33,11 @@ from silo_server.routes.models import (
     Text,
     UuidsBody,
 )
-from silo_server.routes.render import item_to_wire
 from silo_server.schema.catalog import describe, describe_form, find_schema, schemas
 from silo_server.services import items as service
 from silo_server.services.bom.last_sync import NEVER, LastSync, last_sync, last_syncs
 from silo_server.services.numbering import preview_number
-from silo_server.values import Item
+from silo_server.values import Item, to_wire
 
 router = APIRouter(prefix="/api", tags=["items"])
 
@@ -219,6 +218,12 @@ def get_schema(caller: Viewer, name: str) -> dict[str, Any]:
 def get_schema_form(caller: Viewer, name: str) -> dict[str, Any]:
     """The form descriptor for new items."""
     return describe_form(find_schema(name))
+
+
+def item_to_wire(item: Item, last_sync: LastSync | None = None) -> dict[str, Any]:
+    """An item, under the contract's names; ``last_sync`` where it was looked up."""
+    told = {} if last_sync is None else {"last_sync": last_sync.to_wire()}
+    return told | {"id": item.uuid} | to_wire(item, "id", "uuid", "created_as")
 
 
 def _answer(item: Item, status: int = 200, last: LastSync | None = None) -> Response:
