@@ -32,7 +32,6 @@ class Welcome:
     username: str | None
     token: str | None
     login_secret: str | None
-    first_start: bool
 
 
 def prepare(db: Database, token: str | None = None, *, reset_admin: str | None = None) -> Welcome:
@@ -46,8 +45,7 @@ def prepare(db: Database, token: str | None = None, *, reset_admin: str | None =
     """
     upgrade(db)
     with db.write(even_when_read_only=True) as tx:
-        first = (tx.conn.scalar(select(func.count()).select_from(users)) or 0) == 0
-        if first:
+        if tx.conn.scalar(select(func.count()).select_from(users)) == 0:
             settings = tx.settings
             accounts.create_user(tx, settings.admin_username, Role.ADMIN, password=settings.admin_password)
         if reset_admin is not None:
@@ -57,7 +55,7 @@ def prepare(db: Database, token: str | None = None, *, reset_admin: str | None =
         link = logins.create_login_link(tx, admin.username) if admin else None
         search.ensure_index(tx)
     tidy(db, FileStore(db.settings.storage))
-    return Welcome(admin.username if admin else None, secret, link, first)
+    return Welcome(admin.username if admin else None, secret, link)
 
 
 def _first_admin(tx: Tx) -> accounts.User | None:

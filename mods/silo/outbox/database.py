@@ -7,17 +7,23 @@ process may call them. Standard library only.
 
 from __future__ import annotations
 
+import os
+import shutil
 import sqlite3
 import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
-from silo.bom.errors import InputError
+from silo.api.address import canonical
+from silo.bom.errors import DocumentError, InputError
 from silo.durable import private_file, sync_folder
 
 VERSION = 3
+# What a saved file was made from is forgotten after two years.
+_REMEMBERED = 2 * 366 * 86400.0
 
 _TABLES = """
 CREATE TABLE entry (
@@ -92,8 +98,9 @@ class OutboxError(InputError):
 class Database:
     """The file, and the folder of copies beside it; made where they are missing, for their owner only."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, clock: Callable[[], float] = time.time) -> None:
         self.path = path
+        self.clock = clock
         self.copies = path.parent / f"{path.stem}-files"
         self._lock = threading.Lock()
         self._is_ready = False
@@ -187,6 +194,74 @@ class Database:
 
                     of_first_outbox(db)
                 db.execute(f"PRAGMA user_version = {VERSION}")
+
+
+class Origins(Database):
+    """What files were made from, as far as it is known here."""
+
+    def origin_of(self, sha256: str) -> str:
+        """SHA-256 of the committed file that a file with this content was made from, as far as is known here;
+        the content itself where it was never saved over.
+
+        A file that was saved first and committed then is a committed one itself, also while it waits.
+        """
+        with self._open() as db:
+            row = db.execute(
+                "SELECT origin FROM derived WHERE sha256 = :sha256"
+                " AND NOT EXISTS (SELECT 1 FROM known WHERE sha256 = :sha256)"
+                " AND NOT EXISTS (SELECT 1 FROM entry WHERE sha256 = :sha256)",
+                {"sha256": sha256},
+            ).fetchone()
+        return str(row[0]) if row else sha256
+
+    def derived(self, sha256: str, origin: str) -> None:
+        """A file was saved without being committed; it was made from ``origin``."""
+        if not sha256 or sha256 == origin:
+            return
+        with self.transaction() as db:
+            db.execute("INSERT OR REPLACE INTO derived VALUES (?, ?, ?)", (sha256, origin, self.clock()))
+            db.execute("DELETE FROM derived WHERE at < ?", (self.clock() - _REMEMBERED,))
+
+    def known_revision(self, server: str, sha256: str, item: str) -> int | None:
+        """The revision that a file is, for servers that keep no checksums; None where that is not known."""
+        with self._open() as db:
+            row = db.execute(
+                "SELECT revision FROM known WHERE server = ? AND sha256 = ? AND item = ?",
+                (canonical(server), sha256, item),
+            ).fetchone()
+        return int(row[0]) if row else None
+
+    def learn(self, server: str, sha256: str, item: str, revision: int) -> None:
+        """This file is that revision of an item."""
+        if not (sha256 and item):
+            return
+        with self.transaction() as db:
+            row = (canonical(server), sha256, item, revision)
+            db.execute("INSERT OR REPLACE INTO known VALUES (?, ?, ?, ?)", row)
+
+    def aside(self, path: str) -> Path:
+        """A new place for a copy of a file; its folder is there. DocumentError where it cannot be made."""
+        folder = self.path.parent / "kept-aside" / time.strftime("%Y-%m-%d")
+        try:
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        except OSError as error:
+            raise DocumentError(str(folder), f"cannot be made ({error.strerror or error})") from error
+        return folder / f"{time.strftime('%H%M%S')}-{time.monotonic_ns() % 10**6}-{os.path.basename(path)}"
+
+    def keep_aside(self, path: str) -> Path | None:
+        """Keep a copy of a file that is about to be replaced; where it is, None where there is no file.
+
+        Raises DocumentError where the disk does not take it.
+        """
+        target = self.aside(path)
+        try:
+            shutil.copy2(path, target)
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            told = f"no copy of it could be kept ({error.strerror or error}); it was not replaced"
+            raise DocumentError(path, told) from error
+        return target
 
 
 @contextmanager

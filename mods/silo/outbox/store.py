@@ -33,14 +33,12 @@ from silo.bom.snapshot import to_plain
 from silo.durable import remove_patiently, replacing
 from silo.files import content_hash
 from silo.folders import data_folder
-from silo.outbox.database import Database, insert
+from silo.outbox.database import Origins, insert
 from silo.outbox.entry import ASKED, SAME_PART, Commit, Entry, State
 
 _BLOCK = 1 << 20
 # A second name that no row has is one for which a commit may just be coming.
 _HELD_AGE = 3600.0
-# What a saved file was made from is forgotten after two years.
-_REMEMBERED = 2 * 366 * 86400.0
 
 # All but what may be large.
 _COLUMNS = ", ".join(one.name for one in fields(Entry) if one.name != "superseded")
@@ -56,7 +54,7 @@ _AS_GIVEN = (
 )
 
 
-class Store(Database):
+class Store(Origins):
     """Rows and copies. Any thread may call the methods, and other processes share the file.
 
     path
@@ -64,9 +62,8 @@ class Store(Database):
     """
 
     def __init__(self, path: Path | None = None, *, clock: Callable[[], float] = time.time) -> None:
-        super().__init__(path or data_folder() / "outbox.sqlite3")
+        super().__init__(path or data_folder() / "outbox.sqlite3", clock)
         self._held = self.path.parent / f"{self.path.stem}-held"
-        self.clock = clock
         self._finishing: set[str] = set()
 
     # -- a commit comes in ------------------------------------------------------------------------------
@@ -261,72 +258,6 @@ class Store(Database):
                 )
         if kind == "file" or not left:
             self._drop_files(entry)
-
-    # -- what a file was made from ----------------------------------------------------------------------
-
-    def origin_of(self, sha256: str) -> str:
-        """SHA-256 of the committed file that a file with this content was made from, as far as is known here;
-        the content itself where it was never saved over.
-
-        A file that was saved first and committed then is a committed one itself, also while it waits.
-        """
-        with self._open() as db:
-            row = db.execute(
-                "SELECT origin FROM derived WHERE sha256 = :sha256"
-                " AND NOT EXISTS (SELECT 1 FROM known WHERE sha256 = :sha256)"
-                " AND NOT EXISTS (SELECT 1 FROM entry WHERE sha256 = :sha256)",
-                {"sha256": sha256},
-            ).fetchone()
-        return str(row[0]) if row else sha256
-
-    def derived(self, sha256: str, origin: str) -> None:
-        """A file was saved without being committed; it was made from ``origin``."""
-        if not sha256 or sha256 == origin:
-            return
-        with self.transaction() as db:
-            db.execute("INSERT OR REPLACE INTO derived VALUES (?, ?, ?)", (sha256, origin, self.clock()))
-            db.execute("DELETE FROM derived WHERE at < ?", (self.clock() - _REMEMBERED,))
-
-    def known_revision(self, server: str, sha256: str, item: str) -> int | None:
-        """The revision that a file is, for servers that keep no checksums; None where that is not known."""
-        with self._open() as db:
-            row = db.execute(
-                "SELECT revision FROM known WHERE server = ? AND sha256 = ? AND item = ?",
-                (canonical(server), sha256, item),
-            ).fetchone()
-        return int(row[0]) if row else None
-
-    def learn(self, server: str, sha256: str, item: str, revision: int) -> None:
-        """This file is that revision of an item."""
-        if not (sha256 and item):
-            return
-        with self.transaction() as db:
-            row = (canonical(server), sha256, item, revision)
-            db.execute("INSERT OR REPLACE INTO known VALUES (?, ?, ?, ?)", row)
-
-    def aside(self, path: str) -> Path:
-        """A new place for a copy of a file; its folder is there. DocumentError where it cannot be made."""
-        folder = self.path.parent / "kept-aside" / time.strftime("%Y-%m-%d")
-        try:
-            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        except OSError as error:
-            raise DocumentError(str(folder), f"cannot be made ({error.strerror or error})") from error
-        return folder / f"{time.strftime('%H%M%S')}-{time.monotonic_ns() % 10**6}-{os.path.basename(path)}"
-
-    def keep_aside(self, path: str) -> Path | None:
-        """Keep a copy of a file that is about to be replaced; where it is, None where there is no file.
-
-        Raises DocumentError where the disk does not take it.
-        """
-        target = self.aside(path)
-        try:
-            shutil.copy2(path, target)
-        except FileNotFoundError:
-            return None
-        except OSError as error:
-            told = f"no copy of it could be kept ({error.strerror or error}); it was not replaced"
-            raise DocumentError(path, told) from error
-        return target
 
     # -- copies -----------------------------------------------------------------------------------------
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The form of a BOM line: what it shows, what a person changed in it, and what others did meanwhile.
+"""The forms of BOM lines: what they show, what a person changed or decided, and what others did meanwhile.
 
 A form sends each field twice: as it stands now, and as it was shown. So only what the person changed is
 written, whatever happened to the line since, and only a field that two people changed needs a choice.
@@ -20,9 +20,9 @@ from silo_server.db.engine import Tx
 from silo_server.services.bom import history
 from silo_server.services.bom.changes import ChangeKind
 from silo_server.services.bom.history import Change, ChangedLine
-from silo_server.services.bom.review import Review, told_quantities
+from silo_server.services.bom.review import Action, Decision, Review, told_quantities
 from silo_server.values import Item, Line, LineState
-from silo_server.web.forms import Edit, amount, compared, text
+from silo_server.web.forms import Edit, amount, compared, text, texts
 from silo_server.web.render import quantity
 from silo_server.web.words import FIELDS, by_whom, changes
 
@@ -31,6 +31,13 @@ MOST_TEXT = 10_000
 # "6" and "m" mean something only together.
 TOGETHER = (("quantity", "unit"),)
 MINE, THEIRS = "mine", "theirs"
+KEPT = "kept on purpose, not in the CAD model"
+DONE = {
+    Action.REMOVE: "removed",
+    Action.KEEP: "kept as intentional",
+    Action.TAKE_CAD: "set to what CAD says",
+    Action.KEEP_SILO: "left as Silo says",
+}
 
 
 @dataclass(frozen=True)
@@ -134,6 +141,33 @@ def values_of(texts: Mapping[str, str]) -> dict[str, Any]:
         else:
             values[name] = written or None
     return values
+
+
+def decision_of(form: FormData) -> tuple[Action, str | None]:
+    """What a form decides, and why; RejectedError where it has no button of ours."""
+    try:
+        action = Action(text(form, "action"))
+    except ValueError:
+        raise RejectedError("action: wanted one of the buttons, got none; load the page again") from None
+    return action, text(form, "reason") or (KEPT if action is Action.KEEP else None)
+
+
+def decisions_of(form: FormData, names: Mapping[str, str]) -> list[Decision]:
+    """The decisions in a submitted form: one action for each line (by its id, or its child) in ``chosen``.
+
+    names
+        line id → part number, of the BOM's lines. After the id may stand the mark of what was seen.
+    """
+    action, reason = decision_of(form)
+    decisions = []
+    for value in texts(form, "chosen"):
+        which, _, seen = value.partition(" ")
+        if seen:
+            decisions.append(Decision(names.get(which, ""), action, reason, which, seen))
+        else:
+            line_id = which if which in names else None
+            decisions.append(Decision(names.get(value, value), action, reason, line_id))
+    return decisions
 
 
 def meanwhile(tx: Tx, parent: Item, line_ids: Sequence[str], after: int) -> dict[str, list[str]]:

@@ -23,7 +23,7 @@ from silo_server.services.bom import edits, history
 from silo_server.services.bom import review as service
 from silo_server.services.bom.last_sync import in_sentences, last_sync
 from silo_server.services.bom.lines import LineId, component_of, line_of, lines_of, mark_of
-from silo_server.services.bom.review import Action, Decision
+from silo_server.services.bom.review import Decision
 from silo_server.services.items import get_item
 from silo_server.values import Actor, Item, Line, LineState
 from silo_server.web import line_form
@@ -39,13 +39,6 @@ router = APIRouter(include_in_schema=False)
 LATER_CHANGES = 5
 # So many open questions are shown; up to so many have a form each, more are decided by boxes.
 MOST_SHOWN, MOST_FORMS = 1000, 100
-KEPT = "kept on purpose, not in the CAD model"
-DONE = {
-    Action.REMOVE: "removed",
-    Action.KEEP: "kept as intentional",
-    Action.TAKE_CAD: "set to what CAD says",
-    Action.KEEP_SILO: "left as Silo says",
-}
 
 
 @dataclass(frozen=True)
@@ -116,7 +109,7 @@ def decide(request: Request, server: ServerDep, caller: Writer, part_number: str
     def work(tx: Tx) -> tuple[str, int]:
         parent = get_item(tx, part_number)
         names = {line.id: line.child_part_number for line in lines_of(tx, parent)}
-        decisions = decisions_of(form, names)
+        decisions = line_form.decisions_of(form, names)
         if not decisions:
             return "No line was chosen, so nothing was changed.", 0
         try:
@@ -241,33 +234,6 @@ def _line_to_change(tx: Tx, parent: Item, line_id: str, sent: LineForm, asked: A
 def view_of(query: str) -> str:
     """The query of the page, without the line that is being edited: what the page goes back to."""
     return urlencode([(name, value) for name, value in parse_qsl(query[:1000]) if name != "edit"])
-
-
-def decision_of(form: FormData) -> tuple[Action, str | None]:
-    """What a form decides, and why; RejectedError where it has no button of ours."""
-    try:
-        action = Action(text(form, "action"))
-    except ValueError:
-        raise RejectedError("action: wanted one of the buttons, got none; load the page again") from None
-    return action, text(form, "reason") or (KEPT if action is Action.KEEP else None)
-
-
-def decisions_of(form: FormData, names: Mapping[str, str]) -> list[Decision]:
-    """The decisions in a submitted form: one action for each line (by its id, or its child) in ``chosen``.
-
-    names
-        line id → part number, of the BOM's lines. After the id may stand the mark of what was seen.
-    """
-    action, reason = decision_of(form)
-    decisions = []
-    for value in texts(form, "chosen"):
-        which, _, seen = value.partition(" ")
-        if seen:
-            decisions.append(Decision(names.get(which, ""), action, reason, which, seen))
-        else:
-            line_id = which if which in names else None
-            decisions.append(Decision(names.get(value, value), action, reason, line_id))
-    return decisions
 
 
 def _do(
@@ -401,7 +367,7 @@ def _editing(lines: list[Line], asked: Asked, item: Any) -> Line | None:
 def _done(decisions: list[Decision]) -> str:
     who = isolate(decisions[0].child_part_number)
     lines = who if len(decisions) == 1 else plural(len(decisions), "line", "lines")
-    return f"{lines} {DONE[decisions[0].action]}."
+    return f"{lines} {line_form.DONE[decisions[0].action]}."
 
 
 def _sentence(error: SiloError) -> str:

@@ -15,8 +15,8 @@ from silo_server.routes.context import Server, ServerDep
 from silo_server.services.bom.review import Waiting, decide_all, waiting
 from silo_server.values import Actor
 from silo_server.web.forms import Form, back, text, texts
+from silo_server.web.line_form import DONE, decision_of
 from silo_server.web.login_page import Reader, Writer
-from silo_server.web.merge_page import DONE, decision_of
 from silo_server.web.render import isolate, page, plural
 from silo_server.web.tables import Address, arranged, fits, page_of
 

@@ -44,11 +44,10 @@ from silo_server.values import Item, Line, LineState, number
 
 @dataclass(frozen=True, slots=True)
 class MergeOutcome:
-    """The answer's JSON text, the BOM's version, and whether this is an earlier answer given again."""
+    """The answer's JSON text, and the BOM's version."""
 
     answer: str
     version: int
-    replayed: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -252,7 +251,7 @@ def _replay(tx: Tx, parent: Item, order: MergeOrder) -> MergeOutcome | None:
             "send a new one with new content"
         )
     answer = row.answer if row.change_id is None else _rebuilt(tx, parent, row.answer, row.change_id)
-    return MergeOutcome(answer, row.version, replayed=True)
+    return MergeOutcome(answer, row.version)
 
 
 def _reference(
