@@ -45,11 +45,14 @@ demo: $(SERVER)
 test: setup
 	$(BIN)/python -m pytest $(SPREAD) --dist worksteal -m "not freecad and not browser"
 
-# The suites that read and write files, with files as Windows has them; PostgreSQL's test library is POSIX only.
+# The suites that read and write files, with files as Windows has them; PostgreSQL's test library is POSIX only. Of
+# the server those whose subject is uploads, backups, or its start and end: nothing else of it replaces or deletes.
+ON_FILES = tests/contract/test_files.py tests/contract/test_hostile_values.py $(addprefix tests/server/test_,backup.py \
+	deploy.py failures.py file_store.py housekeeping.py kill.py processes.py requests.py settings.py)
 test-windows-files: setup
 	PYTHONPATH=tests/support $(BIN)/python -m pytest -p windows_files $(SPREAD) --dist worksteal -k "not postgres" \
-		-m "not freecad and not browser" tests/api tests/cli tests/contract tests/fcstd tests/outbox tests/server \
-		tests/vault tests/workbench tests/test_*.py
+		-m "not freecad and not browser" tests/api tests/cli tests/fcstd tests/outbox tests/vault tests/workbench \
+		tests/test_*.py $(ON_FILES)
 
 # The suites that name files, on a mounted disk that finds a name in any case and normal form.
 test-other-disk: setup
