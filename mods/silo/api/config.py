@@ -111,14 +111,17 @@ def save_config(
     path: Path | None = None,
     env: Mapping[str, str] = os.environ,
 ) -> Path:
-    """Remember server and token; the file's other settings stay. Gives the file's path (mode 0600)."""
+    """Remember server and token. Gives the file's path (mode 0600).
+
+    Raises :class:`ConfigError` for a file that holds anything else, which stays as it is.
+    """
     ServerAddress.parse(url)
     path = path or config_path(env)
-    config = load_config(path)
-    table = {**config.get("server", {}), "url": url, "verify": verify}
-    table.pop("token", None)
-    config["server"] = {**table, "token": token} if token else table
-    _write_private(path, _toml(config))
+    checked_config(path)
+    values = {"url": url, "verify": verify, **({"token": token} if token else {})}
+    # JSON's texts are TOML's; DEL is the one character that only TOML wants escaped.
+    lines = [f"{name} = {json.dumps(value, ensure_ascii=False)}" for name, value in values.items()]
+    _write_private(path, "\n".join(["[server]", *lines, ""]).replace("\x7f", "\\u007f"))
     return path
 
 
@@ -208,32 +211,3 @@ def _write_private(path: Path, text: str) -> None:
         raise ConfigError(
             f"{path}: the configuration cannot be written ({error.strerror or error})"
         ) from error
-
-
-def _toml(tables: Mapping[str, Any], prefix: str = "") -> str:
-    """TOML for what a TOML file can hold; the standard library only reads it."""
-    plain = [f"{_key(k)} = {_value(v)}" for k, v in tables.items() if not isinstance(v, dict)]
-    text = "\n".join(plain) + "\n" if plain else ""
-    for key, table in tables.items():
-        if isinstance(table, dict):
-            name = f"{prefix}{_key(key)}"
-            text += f"\n[{name}]\n" + _toml(table, f"{name}.")
-    return text.lstrip("\n") if not prefix else text
-
-
-def _key(key: str) -> str:
-    bare = key and all(c.isascii() and (c.isalnum() or c in "-_") for c in key)
-    return key if bare else _value(key)
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        # JSON's escapes are TOML's; DEL is the one character that only TOML wants escaped.
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(value, list):
-        return "[" + ", ".join(_value(v) for v in value) + "]"
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{_key(k)} = {_value(v)}" for k, v in value.items()) + " }"
-    return str(value)
