@@ -111,7 +111,7 @@ class Silo(RuleBasedStateMachine):
     @precondition(lambda self: self.syncs)
     @rule(data=st.data())
     def repeat_a_sync(self, data: st.DataObject) -> None:
-        """The same request again, however late and whatever version it names: the same answer, nothing changes."""
+        """The same request again, however late and by whatever version: the same answer, nothing changes."""
         sync_id = data.draw(st.sampled_from(sorted(self.syncs)))
         entries, answer = self.syncs[sync_id]
         order = read_merge_order(merge_body(entries, sync_id=sync_id), 100)
