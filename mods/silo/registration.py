@@ -92,8 +92,9 @@ class Registration:
 
 
 def component_key(entry: BomEntry) -> str:
-    """How the journal names a component."""
-    return f"{entry.doc_path}#{entry.object_name}"
+    """How the journal names a component; a path may be no text, and SQLite keeps text only."""
+    path = entry.doc_path.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
+    return f"{path}#{entry.object_name}"
 
 
 def document_uid(entry: BomEntry) -> str:

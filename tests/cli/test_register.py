@@ -126,7 +126,7 @@ def test_the_questions_on_a_terminal(silo: Any, gearbox: Path) -> None:
 
 def planned(run: Any, top: Path, table: Path) -> list[dict[str, str]]:
     assert run("register", top, "--plan", table).code == 0
-    with table.open(newline="", encoding="utf-8-sig") as file:
+    with table.open(newline="", encoding="utf-8-sig", errors="surrogateescape") as file:
         return list(csv.DictReader(file))
 
 
@@ -155,6 +155,9 @@ def test_a_table_is_edited_and_applied(run: Any, silo: Any, gearbox: Path, tmp_p
     assert registered["=Bolt; long"]["part_number"].startswith("F01-")
     count = len(registered)
     assert len(silo.client.search_items()) == count == sum(row["register"] == "yes" for row in rows)
+    edited = table.read_bytes()
+    assert run("register", gearbox, "--plan", table).code == 2
+    assert table.read_bytes() == edited, "a table that a person edited is not written over"
     again = run("register", gearbox, "--apply", table)
     assert (again.code, f"{count} of the table's components had their number" in again.out) == (0, True)
     assert len(silo.client.search_items()) == count
@@ -243,6 +246,34 @@ def test_an_interrupted_table_can_be_applied_again(run: Any, silo: Any, tmp_path
     assert len(silo.client.search_items()) == 3
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems refuse such names")
+def test_a_table_knows_files_with_odd_names(run: Any, silo: Any, tmp_path: Path) -> None:
+    """No text, a formula, quotes, line ends, spaces: each is the file that it was."""
+    vault = tmp_path / "vault"
+    vault.mkdir()
+    names = [
+        b"caf\xe9",
+        b"=cmd,x;y",
+        b"'=a",
+        b"''-a",
+        b"new\nline",
+        b" space ",
+        "日本".encode(),
+        b'"q"',
+        b"a\tb",
+    ]
+    for number, name in enumerate(names):
+        path = Path(os.fsdecode(os.path.join(os.fsencode(vault), name + b".FCStd")))
+        part(f"part {number}", "Body").save(path)
+    rows = planned(run, vault, tmp_path / "plan.csv")
+    assert len(rows) == len(names)
+    text = (tmp_path / "plan.csv").read_bytes().replace(b"\nno,", b"\nyes,")
+    (tmp_path / "plan.csv").write_bytes(text)
+    done = run("register", vault, "--apply", tmp_path / "plan.csv", "--json")
+    assert done.code == 0, done.err
+    assert {row["name"] for row in done.json()["registered"]} == {f"part {n}" for n in range(len(names))}
+
+
 # --- whole folders --------------------------------------------------------------------------------------
 
 
@@ -266,7 +297,7 @@ def test_a_folder_is_registered_as_a_whole(run: Any, silo: Any, gearbox: Path) -
     one = run("register", gearbox, "--plan", vault / "one.csv")
     assert one.code == 0
     rows = planned(run, vault, vault / "all.csv")
-    alone = planned(run, gearbox, vault / "one.csv")
+    alone = planned(run, gearbox, vault / "two.csv")
     assert {(r["file"], r["name"], r["type"], r["category"]) for r in rows if r["file"] != "Spare.FCStd"} == {
         (r["file"], r["name"], r["type"], r["category"]) for r in alone
     }

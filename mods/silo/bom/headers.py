@@ -130,11 +130,12 @@ def _others(role: Role) -> str:
 
 def safe_cell(value: Any) -> Any:
     """A cell for CSV: what would be run as a formula is made text; numbers stay numbers."""
-    if isinstance(value, str) and value.startswith(FORMULA_STARTS):
+    if isinstance(value, str) and value.lstrip("'").startswith(FORMULA_STARTS):
         return "'" + value
     return value
 
 
 def plain_cell(text: str) -> str:
     """What :func:`safe_cell` was given."""
-    return text[1:] if text.startswith("'") and text[1:].startswith(FORMULA_STARTS) else text
+    made_text = text.startswith("'") and text.lstrip("'").startswith(FORMULA_STARTS)
+    return text[1:] if made_text else text

@@ -52,7 +52,7 @@ def clean_name(text: str) -> str:
     """A label as a name for people: no file suffix, no control characters, single spaces."""
     # A label may be megabytes long, and no more than the beginning of it is used.
     text = _SUFFIX.sub("", unicodedata.normalize("NFC", text[:_MOST_READ]))
-    printable = "".join(" " if unicodedata.category(c) in ("Cc", "Cf", "Zl", "Zp") else c for c in text)
+    printable = "".join(" " if unicodedata.category(c) in ("Cc", "Cf", "Cs", "Zl", "Zp") else c for c in text)
     return " ".join(printable.replace("_", " ").split())[:200]
 
 

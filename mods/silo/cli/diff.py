@@ -278,7 +278,7 @@ def _show_changes(changes: tuple[AssemblyChange, ...], old: FolderBoms, new: Fol
             out.print(table)
         out.print()
     if not changes:
-        out.print(Text(f"No BOM changed; assemblies compared: {len(new.assemblies)}.", "green"))
+        out.print(Text(_unchanged(old, new), "green" if new.assemblies and new.complete else "yellow"))
     for words in (*_incomplete(old, "old"), *_incomplete(new, "new")):
         out.print(Text("✗ ", "bold red").append(show.plain(words), ""))
 
@@ -287,12 +287,19 @@ def _name(entry: BomEntry) -> str:
     return display_name(entry) or entry.object_name
 
 
+def _unchanged(old: FolderBoms, new: FolderBoms) -> str:
+    if not (old.assemblies or new.assemblies):
+        return "There is no assembly to compare, before or after."
+    part = "" if old.complete and new.complete else " as far as they could be read"
+    return f"No BOM changed{part}; assemblies compared: {len(new.assemblies)}."
+
+
 def _markdown(changes: tuple[AssemblyChange, ...], old: FolderBoms, new: FolderBoms) -> str:
     from silo.batch_report import cell
 
     lines = ["## BOM changes", ""]
     if not changes:
-        lines += [f"No BOM changed. Assemblies compared: {len(new.assemblies)}.", ""]
+        lines += [_unchanged(old, new), ""]
     for change in changes:
         lines += [f"### {cell(_title(change))}", ""]
         if change.lines:

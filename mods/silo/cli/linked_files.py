@@ -45,6 +45,8 @@ def run_where_used(args: argparse.Namespace) -> int:
     if not os.path.isdir(args.vault):
         raise InputError(f"{args.vault} is no folder. Name the folder of the vault.")
     base, part = os.path.realpath(args.vault), os.path.realpath(args.part)
+    if not os.path.lexists(part) and os.path.lexists(inner := os.path.join(base, args.part)):
+        part = os.path.realpath(inner)  # as the other commands print it
     tops = documents_in([base])
     if part not in tops and not os.path.lexists(part) and not os.path.isdir(os.path.dirname(part)):
         raise InputError(f"{args.part}: there is no such file, nor its folder.")

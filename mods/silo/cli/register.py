@@ -27,6 +27,7 @@ from silo.cli import common
 from silo.cli.common import Commands
 from silo.cli.register_dialog import Dialog
 from silo.declaring import chosen, modelled
+from silo.files import check_writable
 from silo.open_in_freecad import open_in_any
 from silo.registering.offer import Candidate, Offer, Seen, State, offer
 from silo.registering.orders import Order, carry_out
@@ -115,6 +116,10 @@ def run(args: argparse.Namespace) -> int:
         return _undeclare(args)
     if args.declare:
         return _declare(args)
+    if args.plan and args.plan != "-":
+        check_writable(args.plan)
+        if os.path.lexists(args.plan):
+            raise InputError(f"{args.plan} is there already, and may hold edits; name another file")
     rows = read_table(Path(args.apply).read_bytes(), args.apply) if args.apply else []
     extraction, unused = _folder(args) if os.path.isdir(args.top) else (common.read_top(args), frozenset())
     base = os.path.realpath(args.top) if os.path.isdir(args.top) else base_of(extraction)

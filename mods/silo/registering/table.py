@@ -25,6 +25,7 @@ COLUMNS = (
     *("register", "file", "object", "standard", "name", "type", "category", "part_number"),
     *("note", "fingerprint"),
 )
+_AS_THEY_ARE = ("file", "object", "standard")
 _ANSWERS = {"yes": True, "y": True, "no": False, "n": False}
 _FILES = {
     State.READ_ONLY: "the file is read-only",
@@ -130,7 +131,9 @@ def read_table(data: bytes, name: str) -> list[Row]:
             if len(cells) != len(header):
                 problems.append(f"line {line}: wanted {len(header)} cells as in the header, got {len(cells)}")
                 continue
-            rows.append(Row(line, {c: plain_cell(t.strip()) for c, t in zip(header, cells, strict=True)}))
+            # The name of a file may begin with a space; what people write does not.
+            row = {c: plain_cell(t) for c, t in zip(header, cells, strict=True)}
+            rows.append(Row(line, {c: t if c in _AS_THEY_ARE else t.strip() for c, t in row.items()}))
     except csv.Error as error:
         raise InputError(f"{name}: line {reader.line_num} cannot be read as CSV: {error}") from None
     lacking = [column for column in COLUMNS if column not in (header or ())]
