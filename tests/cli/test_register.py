@@ -271,7 +271,10 @@ def test_a_table_knows_files_with_odd_names(run: Any, silo: Any, tmp_path: Path)
     (tmp_path / "plan.csv").write_bytes(text)
     done = run("register", vault, "--apply", tmp_path / "plan.csv", "--json")
     assert done.code == 0, done.err
-    assert {row["name"] for row in done.json()["registered"]} == {f"part {n}" for n in range(len(names))}
+    assert len({row["doc_path"] for row in done.json()["registered"]}) == len(names)
+    assert run("register", vault, "--plan", tmp_path / "after.csv").err.startswith(
+        f"{tmp_path}/after.csv: 0 "
+    )
 
 
 # --- whole folders --------------------------------------------------------------------------------------
