@@ -8,7 +8,7 @@ from collections.abc import Callable
 import pytest
 from large_boms import fcstd_with_picture
 from playwright.sync_api import Page, expect
-from server_testing import Api
+from server_testing import Api, bom
 
 Visit = Callable[..., Page]
 
@@ -186,3 +186,33 @@ def test_viewers_change_no_item(api: Api, visit: Visit) -> None:
         answer = page.goto(path)
         assert answer is not None
         assert answer.status == 403
+
+
+def test_what_a_program_wrote_can_be_edited(api: Api, visit: Visit) -> None:
+    """Spaces at ends, line breaks, a text too long for a form: none of them is a change of anybody's."""
+    odd = {"supplier": "ACME ", "material": "steel\nhardened", "own": " x\r\ny ", "log": "z" * 20_000}
+    child = api.item(properties=odd)
+    api.good("PUT", f"/api/items/{child}", {"description": "long ", "long_description": "a\r\nb\rc \n"})
+    parent = api.item()
+    api.merge(parent, {child: 1})
+    api.good("PUT", bom(parent, child), {"notes": " n1\r\nn2\n", "unit": "m ", "find_number": " 1"})
+    page = visit("editor")
+    page.goto(f"/items/{child}/edit")
+    page.get_by_label("Name", exact=True).fill("Another name")
+    page.get_by_role("button", name="Save").click()
+    expect(page.locator(".notice")).to_contain_text(f"{child} changed")
+    item = api.get(f"/api/items/{child}")
+    assert (item["name"], item["description"], item["properties"]) == ("Another name", "long ", odd)
+    page.goto(f"/items/{child}/edit")
+    page.get_by_label("Supplier", exact=True).fill("Bolts Inc.")
+    page.get_by_label("Description", exact=True).fill("short")
+    page.get_by_role("button", name="Save").click()
+    expect(page.locator(".notice")).to_contain_text(f"{child} changed")
+    item = api.get(f"/api/items/{child}")
+    assert (item["description"], item["properties"]) == ("short", {**odd, "supplier": "Bolts Inc."})
+    page.goto(f"/items/{parent}/bom?edit={child}")
+    page.locator("#edit").get_by_label("Find number").fill("2")
+    page.locator("#edit").get_by_role("button", name="Save", exact=True).click()
+    expect(page.locator(".notice")).to_contain_text(f"{child} changed")
+    line = api.lines(parent)[child]
+    assert (line["notes"], line["unit"], line["find_number"]) == (" n1\r\nn2\n", "m ", "2")

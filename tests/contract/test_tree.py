@@ -83,6 +83,10 @@ def test_alternates_are_not_counted(api: Api) -> None:
     assert [row["part_number"] for row in api.get(bom(top, "flat"))["flat_bom"]] == [a]
     assert len(api.get(bom(top, "expanded"))) == 2
     assert api.get(bom(top, "cost"))["missing"] == [a]
+    # What an alternate consists of is no part of the product, in no view.
+    api.merge(b, {api.item(): 3})
+    assert len(api.get(bom(top, "expanded"))) == 2
+    assert [row["part_number"] for row in api.get(bom(top, "flat"))["flat_bom"]] == [a]
 
 
 def test_where_used(api: Api, gearbox: dict[str, str]) -> None:

@@ -56,6 +56,8 @@ def test_fields_that_were_not_sent_stay() -> None:
         ({"quantity": "5"}, {"quantity": "4"}, {"quantity": "5"}),
         ({"unit": "ab"}, {"unit": "a\nb"}, {}),  # an input of one line drops the break
         ({"notes": "a b"}, {"notes": "a\nb"}, {"notes": "a b"}),
+        ({"notes": "a\nb"}, {"notes": " a\r\nb\n"}, {}),
+        ({"unit": "m"}, {"unit": "m "}, {}),
         ({"reference_designators": "R1, R2"}, {"reference_designators": "R1 R2"}, {}),
     ],
 )

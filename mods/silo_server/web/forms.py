@@ -196,6 +196,22 @@ class Edit:
     theirs: Sequence[str]
 
 
+def same_text(a: str, b: str, *, lines: bool = False) -> bool:
+    """True for two texts that a form sends back alike: without spaces at the ends, and without line breaks.
+
+    Programs store such texts, which nobody has changed where only a browser did.
+
+    lines
+        the field has several lines, and keeps their breaks, each as ``\\n``.
+    """
+
+    def sent(text: str) -> str:
+        text = text.replace("\r\n", "\n").replace("\r", "\n")
+        return (text if lines else text.replace("\n", "")).strip()
+
+    return sent(a) == sent(b)
+
+
 def compared(
     now: Mapping[str, str],
     seen: Mapping[str, str],

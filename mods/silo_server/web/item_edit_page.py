@@ -28,7 +28,7 @@ from silo_server.services.bom.tree import where_used
 from silo_server.services.items import ItemChange, NewItem, get_item
 from silo_server.services.revisions import Origin
 from silo_server.values import Actor, Item, Revision
-from silo_server.web.forms import Form, back, text, whole
+from silo_server.web.forms import Form, back, compared, same_text, text, whole
 from silo_server.web.login_page import Writer
 from silo_server.web.render import isolate, page, segment
 
@@ -120,20 +120,17 @@ def change(request: Request, server: ServerDep, caller: Writer, part_number: str
         with server.db.write(caller) as tx:
             item = get_item(tx, part_number, lock=True)
             now = texts_of(item)
-            mine = {name for name in {*typed, *was} if typed.get(name, "") != was.get(name, "")}
-            clashes = {
-                name: now.get(name, "")
-                for name in mine
-                if now.get(name, "") not in (was.get(name, ""), typed.get(name, ""))
-            }
-            after = item if clashes else _change(tx, item, typed, mine, text(form, "comment"))
+            empty = dict.fromkeys([*now, *was, *typed], "")
+            edit = compared({**empty, **now}, {**empty, **was}, {**empty, **typed}, same=_same)
+            clashes = {name: now.get(name, "") for name in edit.clashes}
+            after = item if clashes else _change(tx, item, typed, set(edit.mine), text(form, "comment"))
     except SiloError as error:
         return _again(
             request, server, caller, part_number, Shown(typed, was, _problems(error), {}, error.status_hint)
         )
     if clashes:
         # What others changed and this person did not is taken over; the rest is asked about.
-        merged = {**now, **{name: typed.get(name, "") for name in mine}}
+        merged = {**now, **{name: typed.get(name, "") for name in [*edit.mine, *clashes]}}
         problem = (
             f"{isolate(item.updated_by)} changed this item while you were editing, so nothing was saved yet."
         )
@@ -187,7 +184,7 @@ def texts_of(item: Item) -> dict[str, str]:
     shown = {name: str(getattr(item, name) or "") for name in OWN}
     known = {one.name for one in find_schema(item.schema).fields}
     for name, value in item.properties.items():
-        if name in known:
+        if name in known and not (isinstance(value, str) and len(value) > LONGEST):
             shown[f"p.{name}"] = property_text(value)
         elif _is_plain(value):
             shown[f"o.{name}"] = property_text(value)
@@ -280,13 +277,17 @@ def _typed(form: FormData, prefix: str = "") -> dict[str, str]:
     return found
 
 
+def _same(name: str, a: str, b: str) -> bool:
+    return same_text(a, b, lines=name == "long_description")
+
+
 def _text(form: FormData, key: str) -> str:
     most = SHORT if key == "name" else LONGEST
     return text(form, key, most).replace("\r\n", "\n")
 
 
 def _is_plain(value: Any) -> bool:
-    return isinstance(value, str | bool | int | float)
+    return isinstance(value, bool | int | float) or (isinstance(value, str) and len(value) <= LONGEST)
 
 
 def _again(request: Request, server: Server, caller: Actor, part_number: str, shown: Shown) -> Response:

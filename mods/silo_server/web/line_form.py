@@ -22,7 +22,7 @@ from silo_server.services.bom.changes import ChangeKind
 from silo_server.services.bom.history import Change, ChangedLine
 from silo_server.services.bom.review import Action, Decision, Review, told_quantities
 from silo_server.values import Item, Line, LineState
-from silo_server.web.forms import Edit, amount, compared, text, texts
+from silo_server.web.forms import Edit, amount, compared, same_text, text, texts
 from silo_server.web.render import quantity
 from silo_server.web.words import FIELDS, by_whom, changes
 
@@ -233,8 +233,7 @@ def _same(name: str, a: str, b: str) -> bool:
         return one is not None and other is not None and same_quantity(one, other)
     if name == "reference_designators":
         return a.replace(",", " ").split() == b.replace(",", " ").split()
-    # An input of one line gives line breaks back as nothing.
-    return name != "notes" and a.replace("\n", "") == b.replace("\n", "")
+    return same_text(a, b, lines=name == "notes")
 
 
 def _text(form: FormData, name: str) -> str:
