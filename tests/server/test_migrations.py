@@ -25,6 +25,8 @@ from silo_server.services.access.credentials import actor_by_token
 from silo_server.services.bom.history import list_changes, state_at
 from silo_server.services.bom.last_sync import last_sync
 from silo_server.services.bom.lines import lines_of
+from silo_server.services.bom.merge import merge_bom
+from silo_server.services.bom.merge_json import read_merge_order
 from silo_server.services.items import get_item
 from silo_server.services.search import search_for
 from silo_server.settings import Settings
@@ -71,9 +73,15 @@ def upgrade():
 @pytest.fixture(params=SCHEMAS)
 def released(request: pytest.FixtureRequest, url: str, tmp_path: Path) -> Iterator[Database]:
     """A database as a released version left it, on the kind of ``url``, not yet brought up to date."""
-    db = Database(Settings(database_url=url, files_dir=tmp_path))
+    db = _as_released(request.param, url, tmp_path)
+    yield db
+    db.close()
+
+
+def _as_released(schema: str, url: str, folder: Path) -> Database:
+    db = Database(Settings(database_url=url, files_dir=folder))
     kind = "sqlite" if db.settings.is_sqlite else "postgres"
-    dump = (FOLDER / f"{request.param}.{kind}.sql").read_text("utf-8")
+    dump = (FOLDER / f"{schema}.{kind}.sql").read_text("utf-8")
     if db.settings.sqlite_path:
         with sqlite3.connect(db.settings.sqlite_path) as connection:
             connection.executescript(dump)
@@ -83,8 +91,7 @@ def released(request: pytest.FixtureRequest, url: str, tmp_path: Path) -> Iterat
         raw.driver_connection.execute(dump)
         raw.commit()
         raw.invalidate()  # the dump leaves this connection without a search path
-    yield db
-    db.close()
+    return db
 
 
 def test_there_are_dumps_of_every_schema_that_filled_tables_changed_after() -> None:
@@ -162,6 +169,52 @@ def test_a_released_database_comes_up_with_its_data(
     assert past == lines
 
 
+def test_the_last_syncs_are_taken_over_from_the_history(url: str, tmp_path: Path) -> None:
+    """Each assembly has its newest merge, whatever was edited since; lines and history stay as they were."""
+    db = _as_released("schema-0001", url, tmp_path)
+    upgrade(db, "0002")
+    late = {"version": 9, "username": "night", "document_file": "Top Ünï.FCStd", "summary": "merged"}
+    changes = [  # the clock of a server may stand still, or go back: the order is that of the ids
+        {**late, "parent_id": 2, "kind": "merge", "at": "2026-11-22T01:00:00.000000Z"},
+        {**late, "parent_id": 2, "kind": "edit", "at": "2026-11-22T03:00:00.000000Z"},
+        {**late, "parent_id": 4, "kind": "edit", "at": "2026-11-22T03:00:00.000000Z"},
+    ]
+    with db.write() as tx:
+        columns = ", ".join(changes[0])
+        values = ", ".join(f":{name}" for name in changes[0])
+        tx.conn.execute(text(f"INSERT INTO bom_changes ({columns}) VALUES ({values})"), changes)  # noqa: S608
+    before = {name: _rows(db, name) for name in ("bom_lines", "bom_changes", "bom_change_lines")}
+    merges = {row["parent_id"]: row for row in before["bom_changes"] if row["kind"] == "merge"}
+    upgrade(db, "0003")
+    assert {name: _rows(db, name) for name in before} == before
+    taken = {row["parent_id"]: row for row in _rows(db, "bom_last_syncs")}
+    assert taken.keys() == merges.keys() == {2, 3}
+    for parent, row in taken.items():
+        copied = ("at", "username", "document_file")
+        assert [row[name] for name in copied] == [merges[parent][name] for name in copied]
+        assert (row["left_out"], row["components"], row["refused_at"], row["refusal"]) == (
+            "[]",
+            "{}",
+            None,
+            None,
+        )
+    upgrade(db)
+    with db.read() as tx:
+        names = {row.id: row.part_number for row in tx.conn.execute(select(items))}
+        top, never = (get_item(tx, names[number]) for number in (2, 4))
+        assert last_sync(tx, top).document_file == "Top Ünï.FCStd"
+        assert last_sync(tx, never).at is None
+        lines = {line.child_part_number: line.state for line in lines_of(tx, top)}
+    # Nobody knows which line a missing component had before: none of them reads as removed.
+    missing = {"reason": "missing", "name": "Lid", "file": "parts/Lid.FCStd", "object": "Body", "quantity": 1}
+    order = read_merge_order({"source": "assembly", "entries": [], "left_out": [missing]}, 10)
+    with db.write() as tx:
+        merge_bom(tx, top.part_number, order, None)
+        after = {line.child_part_number: line.state for line in lines_of(tx, top)}
+    assert after == lines
+    db.close()
+
+
 def test_a_revision_that_rebuilds_filled_tables_keeps_their_rows(released: Database, tmp_path: Path) -> None:
     """Rows, references, and the rule that an id is never given out twice, all outlive a rebuild."""
     upgrade(released)
@@ -230,6 +283,13 @@ def _differences(db: Database) -> tuple[list[object], set[str]]:
         # The search index has another form in each database, of which Alembic knows nothing.
         found = [each for each in found if "item_search" not in str(each)]
         return found, set(inspect(connection).get_table_names())
+
+
+def _rows(db: Database, table: str) -> list[dict[str, object]]:
+    with db.read() as tx:
+        order = "id" if table in ("bom_lines", "bom_changes") else "1, 2"
+        found = tx.conn.execute(text(f"SELECT * FROM {table} ORDER BY {order}"))  # noqa: S608
+        return [dict(row) for row in found.mappings()]
 
 
 def _counts(db: Database) -> dict[str, int]:
