@@ -290,10 +290,6 @@ def _add_mass(commands: Commands) -> None:
 def run_mass(args: argparse.Namespace) -> int:
     """Calculate and show; 1 for warnings with --strict, or items that a push did not find."""
     shared.need_inertia_extra(args.via)
-    if args.no_hardware:
-        raise InputError(
-            "mass weighs every part that is there; --no-hardware cannot leave standard parts out"
-        )
     # The documents hold identities; their part numbers are the server's, for a preview as well.
     shared.check_options(args, asks_server=args.push)
     from silo.inertia.calculator import Task, calculate
@@ -304,7 +300,9 @@ def run_mass(args: argparse.Namespace) -> int:
     parser = shared.bom_parser(args)
     table = parser.parse(args.bom) if args.bom else None
     materials = shared.material_table(args)
-    assembly = shared.read(args.top, args, via=args.via, object_name=args.assembly)
+    assembly = shared.read(
+        args.top, args, via=args.via, object_name=args.assembly, hardware=not args.no_hardware
+    )
     name = assembly.name or "assembly"
     # A FreeCAD document is its own BOM: where it states no material, nobody does.
     options = Options(
@@ -325,16 +323,18 @@ def run_mass(args: argparse.Namespace) -> int:
 
 def _push(args: argparse.Namespace, report: InertiaReport) -> int:
     """The documents' identities give the part numbers; the top assembly's own, unless --item says another."""
-    from silo.bom.paths import relative
     from silo.bom.report import base_of
     from silo.bom_sync import resolve
+    from silo.inertia.geometry.freecad.walk import product_key
 
     extraction = common.read_top(args)
     base = base_of(extraction)
     with common.client_of(args) as client:
         resolved = resolve(extraction, client)
     numbers = {
-        f"{relative(entry.doc_path, base)}#{entry.object_name}": entry.part_number
+        product_key(
+            entry.doc_path, entry.object_name, (entry.standard or "") if entry.is_standard else "", base
+        ): entry.part_number
         for entry in _all((*resolved.entries, resolved.assembly))
         if entry.part_number
     }

@@ -33,6 +33,7 @@ _GEOMETRY = frozenset({Kind.LOCAL, Kind.NOTHING, Kind.FOLDER})
 # What a target is and which item it is: without these a link to it would only be guessed at.
 _SAID_OF_ITSELF = ("SiloItemId", "SiloUUID", "Type")
 _BREP_TEXT = (b"CASCADE Topology", b"DBRep_DrawableShape")
+_MANY_OBJECTS = 20_000
 _SIZE = Struct("<I")
 _DOUBLES, _FLOATS = Struct("<3d"), Struct("<3f")
 
@@ -189,6 +190,11 @@ class FcstdDocument:
         return set() if self.survey.only(_GEOMETRY) else self._xml.linked()
 
     # For the objects of this document and the session; a walker has no use for what follows.
+
+    @cached_property
+    def is_large(self) -> bool:
+        """True where memory counts more than time."""
+        return len(self._xml.head.types) > _MANY_OBJECTS
 
     def complete(self) -> None:
         """Read the file to its end and check it. Raises DocumentError."""

@@ -8,8 +8,8 @@ lists are tuples, and a link without a target says why (``LinkProblem``).
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
-from functools import cached_property
+from collections.abc import Callable, Iterable, Iterator
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any
 
 from silo.bom.document import LinkProblem as Problem
@@ -38,6 +38,12 @@ _KINDS: dict[str, type] = {
     "ScaleVector": Vector,
     "VisibilityList": tuple,
 }
+
+
+@cache
+def _answer_of(type_id: str) -> Callable[[str], bool]:
+    """One bound method for all objects of a type: a file may have hundreds of thousands."""
+    return ancestors(type_id).__contains__
 
 
 class FcstdObject:
@@ -125,6 +131,8 @@ class FcstdObject:
             raise AttributeError(name)
         # The file does not change while it is open, so the next access need not come here.
         value = mine[name] = self._value(name, properties.piece(name))
+        if self.Document.is_large:
+            properties.forget(mine)
         return value
 
     def shape_key(self) -> str:
@@ -140,6 +148,8 @@ class FcstdObject:
         for name, piece in properties.kept.items():
             if piece in known:
                 mine[name] = known[piece]
+        if self.Document.is_large:
+            properties.forget(mine)
 
     def __repr__(self) -> str:
         return f"<{self.TypeId} {self.Name} of {self.Document.FileName}>"

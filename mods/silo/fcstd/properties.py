@@ -9,7 +9,7 @@ first.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from silo.fcstd import careful
@@ -73,15 +73,18 @@ class Shape(NamedTuple):
 
 
 _NOTHING = Shape.of((), b"")
+# One empty table for all that keep nothing any more.
+_NONE_KEPT: dict[str, bytes] = {}
 
 
 class Properties:
     """The property table of one element of a document's XML. Reading may raise FcstdError."""
 
-    __slots__ = ("_careful", "_decode", "_span", "_xml", "kept", "names", "numbers")
+    __slots__ = ("_begin", "_careful", "_decode", "_end", "_xml", "kept", "names", "numbers")
 
     def __init__(self, xml: XmlText, span: Span | None, kind: str) -> None:
-        self._xml, self._span, self._decode = xml, span or (0, 0), xml.decode
+        self._xml, self._decode = xml, xml.decode
+        self._begin, self._end = span or (0, 0)
         self._careful = xml.is_careful
         if span is None:  # a foreign document may have no properties of its own
             shape, pieces = _NOTHING, [b""]
@@ -108,6 +111,11 @@ class Properties:
             piece = (self._careful_cut()[1] if self._careful else self._cut())[self.numbers[name]]
         return piece
 
+    def forget(self, known: Container[str]) -> None:
+        """What is known needs no piece; it is cut out again if it does after all."""
+        left = {name: piece for name, piece in self.kept.items() if name not in known}
+        self.kept = left or _NONE_KEPT
+
     def value(self, name: str) -> Any:
         """The value, ABSENT where there is no such property or it has no plain value."""
         if name not in self.numbers:
@@ -118,7 +126,7 @@ class Properties:
         return value_of(self._node(piece))
 
     def _cut(self) -> list[bytes]:
-        begin, end = self._span
+        begin, end = self._begin, self._end
         return self._xml.text[begin:end].split(_CUT)
 
     def _other_shape(self, pieces: list[bytes], kind: str) -> tuple[Shape, list[bytes]]:
@@ -136,7 +144,7 @@ class Properties:
         return shape, pieces
 
     def _careful_cut(self) -> tuple[Shape, list[bytes]]:
-        begin, end = self._span
+        begin, end = self._begin, self._end
         element = self._xml.text[begin:end].lstrip()
         try:
             spans = careful.index_properties(element, self._xml.limits.depth)

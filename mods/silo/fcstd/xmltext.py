@@ -15,7 +15,7 @@ import re
 from bisect import bisect_right
 from collections.abc import Callable, Set
 from hashlib import sha256
-from itertools import accumulate, pairwise
+from itertools import accumulate, islice, pairwise
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import unescape
 
@@ -45,6 +45,13 @@ _TAIL = re.compile(rb"\s*</ObjectData>\s*</Document>\s*\Z")
 
 # The first step holds the head and the object of a small part; then bigger ones, since more was needed.
 _FIRST_STEP, _GROWTH, _HEAD_AT_MOST = 1 << 14, 4, 1 << 16
+
+
+_CUT_AT_MOST = 1 << 24
+
+# A span in one number: its begin above its end.
+_HALF = 40
+_LOW = (1 << _HALF) - 1
 
 
 class _Unexpected(Exception):
@@ -82,7 +89,7 @@ class XmlText:
         self._text: bytes | None = b""
         self._known = 0
         self._head: Head | None = None
-        self._data: dict[str, Span] = {}
+        self._data: dict[str, int] = {}  # begin and end in one number: a quarter of the memory of a pair
         self._names: list[bytes] = []
         self._position = 0
         self._complete = False
@@ -131,12 +138,13 @@ class XmlText:
 
     def span(self, name: str) -> Span | None:
         """Where the data of an object of ``head.types`` stands."""
-        if (found := self._data.get(name)) is not None:
-            return found
-        if name not in self.head.types:
-            return None
-        self._settle(lambda: self._index_objects(name))
-        return self._data.get(name)
+        if (found := self._data.get(name)) is None:
+            if name not in self.head.types:
+                return None
+            self._settle(lambda: self._index_objects(name))
+            if (found := self._data.get(name)) is None:
+                return None
+        return found >> _HALF, found & _LOW
 
     def complete(self) -> None:
         """Read to the end, and check all that can be checked there."""
@@ -246,10 +254,15 @@ class XmlText:
             self._find_head(whole=until is None)
         if self._complete:
             return
-        if until is None and not self._data and self._inflater.finished and self._cut_at_once():
+        whole = until is None and not self._data and self._inflater.finished
+        # The pieces are as much as the text; of a large one they would be too much.
+        if whole and self._known <= _CUT_AT_MOST and self._cut_at_once():
             self._complete = True
+            self._names.clear()
             return
         text, data, position = self.text, self._data, self._position
+        # Where the data stands in the order of the list, the names are those of the list, not copies of them.
+        listed = islice(self._head.types if self._head is not None else (), len(data), None)
         match, closing = _OBJECT.match, _CLOSING
         while True:
             opening = match(text, position)
@@ -258,7 +271,9 @@ class XmlText:
                 name = self.decode(opening[1])
                 if name in data:
                     raise _Unexpected
-                data[name] = position, end + 9
+                if (same := next(listed, name)) == name:
+                    name = same
+                data[name] = position << _HALF | end + 9
                 self._position = position = end + 9
                 if name == until:
                     return
@@ -269,6 +284,7 @@ class XmlText:
         if self._head is None or data.keys() != self._head.types.keys():
             raise _Unexpected
         self._complete = True
+        self._names.clear()
 
     def _cut_at_once(self) -> bool:
         """Index the data of all objects where they stand in the order of the list; False where not."""
@@ -286,7 +302,8 @@ class XmlText:
         if not indent.isspace() and indent:
             return False
         ends = list(accumulate((len(piece) + len(_CLOSING) for piece in pieces), initial=self._position))
-        self._data = dict(zip(self._head.types, pairwise(ends), strict=True))
+        spans = (begin << _HALF | end for begin, end in pairwise(ends))
+        self._data = dict(zip(self._head.types, spans, strict=True))
         self._position = ends[-1]
         return True
 
@@ -295,10 +312,10 @@ class XmlText:
         text, wanted = self.text, word.encode()
         if b"&" in text and b"&#" in text:  # which may be a letter
             return self.head.types.keys()
-        found, names, ends = set(), list(self._data), [end for _, end in self._data.values()]
+        found, names, ends = set(), list(self._data), [span & _LOW for span in self._data.values()]
         if ends != sorted(ends):
             return self.head.types.keys()
-        at = text.find(wanted, self._data[names[0]][0]) if names else -1
+        at = text.find(wanted, self._data[names[0]] >> _HALF) if names else -1
         while at >= 0:
             number = bisect_right(ends, at)
             if number == len(names):
@@ -321,7 +338,8 @@ class XmlText:
         self._limit_objects(len(head.types))
         if lost := [name for name in head.types if name not in data]:
             raise self.error(f"lists the object {lost[0]!r} but does not hold its data")
-        self._head, self._data = head, data
+        self._head = head
+        self._data = {name: begin << _HALF | end for name, (begin, end) in data.items()}
         self._hold(text)
         self._complete = self.is_careful = True
 

@@ -299,7 +299,7 @@ class AddOn:
         if doc is not None:
             from silo.workbench.mass.flow import MassFlow
 
-            MassFlow().start(doc)
+            MassFlow(self.preferences.flag("CountHardware")).start(doc)
 
     def open_from_silo(self) -> None:
         """Find an item and open its file."""

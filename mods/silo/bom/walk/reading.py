@@ -50,6 +50,7 @@ class Reading:
         self._path, _ = reader.key(container)
         self._is_root = getattr(container, "is_document_root", False)
         self._worths: dict[Key, Worth] = {}
+        self._ones: dict[Key, Worth] = {}
         self._way = Way(reader.notes)
         self._members = Members(container, reader.key, reader.notes, self._way, reader.declare)
         self._links: set[Key] = set()
@@ -236,7 +237,7 @@ class Reading:
             return {}
         # An object of another file is a component, whatever it is.
         text, _ = self._reader.standard(target.obj, name)
-        worth = self._standard(target.obj) if text else {name: (target.obj, 1)}
+        worth = self._standard(target.obj) if text else self._one_of(name, target.obj)
         if not worth:
             return {}
         if is_link(link):
@@ -247,9 +248,16 @@ class Reading:
         if target.instances != 1:
             whole = {brought: (obj, count * target.instances) for brought, (obj, count) in worth.items()}
         if is_assembly_link(link):
+            whole = dict(whole)
             for part in own_parts(link, target.obj, self._key):
                 add(whole, self._worth(self._key(part), part, kind_of(part)))
         return whole
+
+    def _one_of(self, name: Key, obj: Any) -> Worth:
+        """What each of the links to an object brings; the same for all of them."""
+        if (known := self._ones.get(name)) is None:
+            known = self._ones[name] = {name: (obj, 1)}
+        return known
 
     def _in_document(self, link: Any, target: Target) -> Worth:
         """A link within the file brings what its target brings, which may be nothing."""

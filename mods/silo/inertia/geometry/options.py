@@ -87,6 +87,8 @@ class ReadOptions:
         a file that expands to more placed parts than this is refused.
     object_name
         FreeCAD documents: the assembly or part to read; None takes the top one.
+    hardware
+        FreeCAD documents: False leaves standard parts out.
     root
         FreeCAD documents: links leaving this folder are not followed; None: the top file's own rules.
 
@@ -111,6 +113,7 @@ class ReadOptions:
     max_siblings: int = 200
     max_instances: int = 1_000_000
     object_name: str | None = None
+    hardware: bool = True
     root: Path | None = None
 
     isolate: bool = field(default=True, metadata={"local": True})

@@ -23,7 +23,14 @@ PATIENCE_MS = 500
 
 
 class MassFlow:
-    """Opens mass windows."""
+    """Opens mass windows.
+
+    hardware
+        False leaves standard parts out, as the settings say.
+    """
+
+    def __init__(self, hardware: bool = True) -> None:
+        self._hardware = hardware
 
     def start(self, doc: Any) -> Any:
         """Measure a document's assembly and show its masses; the window, None where there is nothing."""
@@ -58,12 +65,14 @@ class MassFlow:
 
         with Waiting(plain(doc.Label, 60)) as waiting:
             # FreeCAD's own volume stands witness here; meshes are for pictures, and cost as much again.
-            assembly = shapes.read_live(doc, ReadOptions(mesh_check=False), waiting.report)
-        options = Options(step_density=True, unknown_is_zero=True, own_bom=True)
+            assembly = shapes.read_live(
+                doc, ReadOptions(mesh_check=False, hardware=self._hardware), waiting.report
+            )
+        rule = Options(step_density=True, unknown_is_zero=True, own_bom=True)
         # Without anything placed there is nothing for a pattern to match, which would be reported as a fault.
         everything = Link(assembly.name or "assembly", ("**",))
         whole = LinkMap((everything,)) if assembly.instances else None
-        task = Task(load_materials(freecad=False), options, whole, simulated=False)
+        task = Task(load_materials(freecad=False), rule, whole, simulated=False)
         return shown(calculate(assembly, None, task))
 
 

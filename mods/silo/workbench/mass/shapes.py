@@ -70,7 +70,7 @@ def read_live(document: Any, options: ReadOptions, report: Report) -> Assembly:
     if lost := live.lost_assemblies(document):
         raise DocumentError(source, f"this FreeCAD is too old to load its assemblies ({', '.join(lost)})")
     cached = live.cached_document(document)
-    walk = Walk(LiveFacts(), os.path.dirname(cached.FileName).replace("\\", "/"))
+    walk = Walk(LiveFacts(), os.path.dirname(cached.FileName).replace("\\", "/"), options.hardware)
     top = walk.product(top_object(cached, options.object_name))
 
     def measured(leaf: Leaf) -> Measured:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import struct
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,9 @@ from OCP.BRepTools import BRepTools
 from OCP.gp import gp_Pnt
 
 from silo.bom.errors import DocumentError
+from silo.bom.links import extract
+from silo.bom.roots import choose_assembly
+from silo.fcstd import Library
 from silo.inertia.core import place
 from silo.inertia.geometry import ReadOptions, read
 from silo.inertia.geometry.freecad.places import placed
@@ -266,6 +270,76 @@ def test_suppressed_excluded_and_meshes_are_reported(body: Any, tmp_path: Path, 
     assembly = read_in(assembly_of(tmp_path, doc))
     assert [i.name for i in assembly.instances] == ["Kept"]
     assert [p.code for p in assembly.problems] == ["not_counted"] * 3
+
+
+@pytest.fixture(name="screw")
+def _screw(box: Any, tmp_path: Path) -> Any:
+    """``screw(doc, name, length, **values)``: a fastener whose shape is a box of that length."""
+
+    def screw(doc: Doc, name: str, length: int = 16, **values: Any) -> Doc:
+        entry = f"{name}.Shape.brp"
+        doc.entries[entry] = brep(box(4, 4, length), tmp_path)
+        made: dict[str, Any] = {"Type": "ISO4762", "Diameter": "M4", "Length": str(length), "Thread": False}
+        made = {"Placement": at(0), "Shape": shape(entry), **made, **values}
+        return doc.add("Part::FeaturePython", name, **made)
+
+    return screw
+
+
+def hardware_of_all_kinds(body: Any, screw: Any, folder: Path) -> Path:
+    """M4×16 eight times: in the assembly, a part, a compound, linked, an array, another file, beside it."""
+    screw(Doc("screws"), "FromElsewhere").save(folder / "screws.FCStd")
+    doc = body(Doc("top"), "Plate")
+    for number, name in enumerate(("Alone", "Inner", "One", "Two", "Beside")):
+        screw(doc, name, Placement=at(100.0 * number))
+    screw(doc, "Long", 30)
+    doc.add("App::Part", "Inside", Placement=at(0, 50), Group=locals_("Inner"))
+    doc.add(
+        "Part::Compound",
+        "Bundle",
+        Placement=at(0, 0, 7),
+        Links=locals_("One", "Two"),
+        Shape=shape("One.Shape.brp"),
+    )
+    doc.link("Elsewhere", "screws.FCStd", "FromElsewhere", LinkPlacement=at(0, 200))
+    doc.link("Again", "", "Alone", ElementCount=2, PlacementList=PLACES)
+    doc.entries["Places"] = struct.pack("<I7d7d", 2, *(0.0, 60, 0, 0, 0, 0, 1), *(0.0, 70, 0, 0, 0, 0, 1))
+    members = ("Plate", "Alone", "Inside", "Bundle", "Elsewhere", "Again", "Long")
+    doc.add("Assembly::AssemblyObject", "Top", Placement=at(0, 0, 1000), Group=locals_(*members))
+    return doc.save(folder / "top.FCStd")
+
+
+def test_a_standard_part_is_one_product_wherever_it_lies(
+    body: Any, screw: Any, tmp_path: Path, read_in: Any
+) -> None:
+    """One product for each designation, as often as the BOM counts it, each where it stands."""
+    path = hardware_of_all_kinds(body, screw, tmp_path)
+    assembly = read_in(path)
+    counts = Counter(assembly.prototypes[instance.prototype].name for instance in assembly.instances)
+    assert counts == {"Plate": 1, "ISO 4762 M4×16": 8, "ISO 4762 M4×30": 1}
+    assert assembly.problems == ()
+    with Library() as library:
+        bom = extract(choose_assembly(library.open(path)))
+    assert {entry.standard: entry.quantity for entry in bom.entries} == {
+        "ISO 4762 M4×16": 8,
+        "ISO 4762 M4×30": 1,
+    }
+    origins = {
+        tuple(np.round(instance.transform[:3, 3] * 1000).astype(int).tolist())
+        for instance in assembly.instances
+        if assembly.prototypes[instance.prototype].name == "ISO 4762 M4×16"
+    }
+    near = {(0, 0, 0), (100, 50, 0), (200, 0, 7), (300, 0, 7), (0, 60, 0), (0, 70, 0)}
+    assert origins == near | {(0, 200, 0), (400, 0, -1000)}
+
+
+def test_standard_parts_can_be_left_out_of_the_mass(
+    body: Any, screw: Any, tmp_path: Path, read_in: Any
+) -> None:
+    """All of them, however they are repeated; and the result says so."""
+    assembly = read_in(hardware_of_all_kinds(body, screw, tmp_path), hardware=False)
+    assert [prototype.name for prototype in assembly.prototypes.values()] == ["Plate"]
+    assert [problem.code for problem in assembly.problems] == ["no_hardware"]
 
 
 def test_a_container_that_is_hidden_as_a_whole_counts(body: Any, tmp_path: Path, read_in: Any) -> None:

@@ -41,7 +41,7 @@ def read_freecad(path: Path, options: ReadOptions, report: Report, helpers: Help
         ):
             document = library.open(path)
             base = os.path.dirname(document.FileName).replace("\\", "/")
-            walk = Walk(StoredFacts(entries), base)
+            walk = Walk(StoredFacts(entries), base, options.hardware)
             top = walk.product(top_object(document, options.object_name))
             unpacked = _Unpacked(entries, Path(folder))
 

@@ -9,13 +9,14 @@ How FreeCAD places things (``src/App/Link.cpp``, tried with 0.20 and 1.0):
 * an AssemblyLink is a link without it; a flexible one has the placements of its own copies.
 
 What counts: links as in the BOM, hidden or not; of geometry modelled in place, what no sibling consumes (the
-operands of a cut), and of that the visible, where any is.
+operands of a cut), and of that the visible, where any is. A standard part is one product for each
+designation, wherever it lies, and has the shape of its first occurrence.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,10 @@ from silo.bom.document import derived, label_of, object_name, own, same_document
 from silo.bom.model import BomEntry
 from silo.bom.naming import display_name
 from silo.bom.paths import relative
-from silo.bom.walk.kinds import REPEATERS, Kind, is_container, is_named_assembly, kind_of
+from silo.bom.roots import loose_hardware, silent_reader
+from silo.bom.walk.contents import Reader
+from silo.bom.walk.kinds import REPEATERS, Kind, is_container, is_named_assembly, kind_of, sources
+from silo.bom.walk.standard import STANDARD_PARTS
 from silo.bom.walk.targets import is_assembly_link, is_link
 from silo.inertia.geometry.freecad.facts import Facts, element_places, file_of, link_placement, scale
 from silo.inertia.geometry.freecad.members import MODELLED, child_named, counted, steps_of
@@ -53,16 +57,22 @@ class Leaf:
 
 @dataclass(eq=False)
 class Walk:
-    """Products of FreeCAD documents, each once; ``notes`` in plain words by code, each once."""
+    """Products of FreeCAD documents, each once; ``notes`` in plain words by code, each once.
+
+    hardware
+        False leaves standard parts out.
+    """
 
     facts: Facts
     base: str = ""
+    hardware: bool = True
     nodes: dict[str, Node] = field(default_factory=dict)
     leaves: dict[str, Leaf] = field(default_factory=dict)
     documents: set[str] = field(default_factory=set)
     absent: set[str] = field(default_factory=set)
     notes: dict[str, list[str]] = field(default_factory=dict)
     _open: list[str] = field(default_factory=list)
+    _reader: Reader = field(default_factory=silent_reader)
 
     def note(self, code: str, message: str) -> None:
         """Keep one remark."""
@@ -104,6 +114,12 @@ class Walk:
         children: list[Child] = []
         for member in found:
             children += self._uses(member, moved.get(object_name(member)))
+        if beside := loose_hardware(obj, self._reader):
+            inwards = np.linalg.inv(_metres(self.facts.placement(obj)))
+            for member in beside:
+                children += [
+                    replace(use, transform=inwards @ use.transform) for use in self._uses(member, None)
+                ]
         self.nodes[key] = Node(key, self._name(obj), tuple(children))
 
     def _moved(self, link: Any) -> dict[str, Floats]:
@@ -135,8 +151,8 @@ class Walk:
         return key
 
     def _key(self, obj: Any) -> str:
-        path = file_of(obj)
-        return f"{relative(path, self.base)}#{object_name(obj)}"
+        designation, registered = self._reader.standard(obj)
+        return product_key(file_of(obj), object_name(obj), "" if registered else designation, self.base)
 
     def _name(self, obj: Any) -> str:
         document = getattr(obj, "Document", None)
@@ -145,16 +161,37 @@ class Walk:
             object_name=object_name(obj),
             label=label_of(obj),
             document_label=getattr(document, "Label", "") or "",
+            standard=self._reader.standard(obj)[0] or None,
         )
         return display_name(entry)
+
+    def _left_out(self, obj: Any) -> bool:
+        """True for standard parts where they are left out; says so."""
+        if self.hardware or not self._is_hardware(obj):
+            return False
+        self.note("no_hardware", "standard parts are left out, as asked: the masses are those of the others")
+        return True
+
+    def _is_hardware(self, obj: Any) -> bool:
+        """True for a standard part, and for arrays, compounds and copies of nothing else."""
+        if kind_of(obj) is Kind.STANDARD:
+            return True
+        shown = sources(obj) if kind_of(obj) in REPEATERS else []
+        return bool(shown) and all(map(self._is_hardware, shown))
 
     # --- uses ----------------------------------------------------------------------------------------------
 
     def _uses(self, member: Any, moved: Floats | None) -> list[Child]:
         name = label_of(member)
         kind = kind_of(member)
+        if self._left_out(member):
+            return []
         if kind is Kind.DRAFT_ARRAY:
             return self._draft_array(member)
+        if kind is Kind.COMPOUND and self._is_hardware(member):
+            outer = self.facts.placement(member)
+            uses = (use for source in sources(member) for use in self._resolved(source, True, None, MAX_HOPS))
+            return [Child(name, key, _metres(outer @ inner)) for key, inner in uses]
         if kind in (Kind.LINK, Kind.ASSEMBLY_LINK):
             self._remark(member)
         return [
@@ -177,6 +214,8 @@ class Walk:
             inside = self._followed(obj, own(obj, "LinkTransform") is True, hops, None)
             places = element_places(obj, self.facts) if is_link(obj) else [np.eye(4)]
             return [(key, outer @ place @ inner) for place in places for key, inner in inside]
+        if self._left_out(obj):
+            return []
         return [(self.product(obj), outer)]
 
     def _followed(self, link: Any, with_place: bool, hops: int, flexible: Any) -> list[tuple[str, Floats]]:
@@ -242,12 +281,17 @@ class Walk:
             if own(link, "LinkCopyOnChangeSource") is not None:
                 words = f"“{label_of(link)}” is a variant of its part; its mass is that of the variant"
                 self.note("variant", words)
-            else:
+            elif not self._is_hardware(target):
                 self.note(
                     "in_document",
                     f"“{label_of(link)}” is a link within its own document: its mass counts, "
                     "though it is no line of the BOM",
                 )
+
+
+def product_key(path: str, name: str, designation: str, base: str) -> str:
+    """What identifies a product: a standard part by its designation, any other by its file and its object."""
+    return f"{STANDARD_PARTS}{designation}" if designation else f"{relative(path, base)}#{name}"
 
 
 def _metres(matrix: Floats) -> Floats:
