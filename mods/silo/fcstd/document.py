@@ -194,7 +194,7 @@ class FcstdDocument:
     @cached_property
     def is_large(self) -> bool:
         """True where memory counts more than time."""
-        return len(self._xml.head.types) > _MANY_OBJECTS
+        return self.content.facts is None and len(self._xml.head.types) > _MANY_OBJECTS
 
     def complete(self) -> None:
         """Read the file to its end and check it. Raises DocumentError."""
