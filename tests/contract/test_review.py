@@ -73,6 +73,18 @@ def test_undo_is_refused_where_the_line_went_on(api: Api, unreferenced: Any) -> 
     assert a in error["message"]
 
 
+def test_undo_of_a_removal_makes_no_second_line(api: Api) -> None:
+    """The part was added again meanwhile, as another line: there is nothing to bring back."""
+    parent, a = api.items(2)
+    api.merge(parent, {a: 4})
+    api.good("DELETE", bom(parent, a))
+    removal = api.get(bom(parent, "history"))[0]["id"]
+    api.good("POST", bom(parent), {"child_part_number": a, "quantity": 2})
+    error = api.bad(409, "POST", bom(parent, "undo"), {"change_id": removal})
+    assert a in error["message"]
+    assert api.quantities(parent) == {a: 2}
+
+
 def test_a_conflict_is_settled_either_way(api: Api) -> None:
     """CAD says 4, Silo says 6: keep either, one click; then the next merge is quiet."""
     for action, quantity, source in (("take_cad", 4, "assembly"), ("keep_silo", 6, "manual")):
