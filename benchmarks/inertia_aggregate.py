@@ -18,12 +18,12 @@ import time
 from collections.abc import Callable
 
 import numpy as np
+from bodies import box, placement
 
-from silo.inertia.bodies import box, placement
 from silo.inertia.bom import BOMParser
 from silo.inertia.calculator import Task, calculate
 from silo.inertia.core import Floats, MassProps, combine_arrays, place
-from silo.inertia.frames import origin_frame
+from silo.inertia.links import origin_frame
 from silo.inertia.materials import load_materials
 from silo.inertia.model import Assembly, Instance
 

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bodies import placement
 
-from silo.inertia.bodies import placement
 from silo.inertia.bom import BOMParser, BomTable
 from silo.inertia.calculator import Task, calculate
 from silo.inertia.materials import load_materials

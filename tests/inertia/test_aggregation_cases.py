@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from bodies import box, cylinder
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from silo.inertia.bodies import box, cylinder
-from silo.inertia.frames import origin_frame
-from silo.inertia.links import link_map
+from silo.inertia.links import link_map, origin_frame
 from silo.inertia.model import Assembly, Instance
 
 Fixture = Callable[..., Any]

@@ -5,10 +5,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from bodies import box, cylinder, placement, sphere
 
 from silo.bom.errors import InputError
-from silo.inertia.bodies import box, cylinder, placement, sphere
 from silo.inertia.core import (
+    InertialProperties,
     MassProps,
     TensorProblem,
     as_placement,
@@ -17,7 +18,6 @@ from silo.inertia.core import (
     parallel_axis,
     place,
 )
-from silo.inertia.types import InertialProperties
 
 TURN_Z = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
 

@@ -11,14 +11,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bodies import box, placement
 from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.bom.errors import ConfigError, InputError
-from silo.inertia.bodies import box, placement
 from silo.inertia.calculator import Task, calculate
-from silo.inertia.frames import FrameChoice, origin_frame
-from silo.inertia.links import as_link_map, claim, link_map, matches, read_link_map
+from silo.inertia.links import FrameChoice, as_link_map, claim, link_map, matches, origin_frame, read_link_map
 from silo.inertia.materials import load_materials
 from silo.inertia.model import Instance
 from silo.inertia.output.urdf import frame_doubts, root_link

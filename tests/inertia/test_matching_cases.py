@@ -7,8 +7,8 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from bodies import box
 
-from silo.inertia.bodies import box
 from silo.inertia.codes import Decided, Rule, Source
 
 HEAD = "Item,Quantity,Part number,Material,Mass,Name\n"

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
+from bodies import box
 
 from silo.bom.errors import AuthError, NotFoundError, ServerFaultError, SiloError
-from silo.inertia.bodies import box
 from silo.inertia.massrule import Options
 from silo.inertia.push import describe, plan_push, push
 

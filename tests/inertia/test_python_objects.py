@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from bodies import box, placement
 
 import silo.inertia as inertia
 from silo.bom.errors import ConfigError, InputError
 from silo.inertia import MATERIAL_DENSITIES, EnhancedInertiaCalculator, InertiaCalculator, MassProps
-from silo.inertia.bodies import box, placement
 from silo.inertia.links import as_link_map, link_map
 
 Fixture = Callable[..., Any]

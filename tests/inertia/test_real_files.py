@@ -14,10 +14,9 @@ import pytest
 from silo.inertia.calculator import read_geometry
 from silo.inertia.codes import Source
 from silo.inertia.geometry import ReadOptions
-from silo.inertia.model import Assembly, GeometryCode
+from silo.inertia.model import Assembly, GeometryCode, leaf_products
 from silo.inertia.output.snippets import snippets
 from silo.inertia.output.values import writable
-from silo.inertia.products import leaf_products
 
 Fixture = Callable[..., Any]
 FILES = (

@@ -7,8 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-
-from silo.inertia.bodies import box, shape_only
+from bodies import box, shape_only
 
 Fixture = Callable[..., Any]
 HEAD = "Quantity,Material,Mass,Name\n"

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bodies import box, shape_only
 
-from silo.inertia.bodies import box, shape_only
 from silo.inertia.codes import Source
 
 HEAD = "Item,Quantity,Part number,Material,Mass,Name\n"

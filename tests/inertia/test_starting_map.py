@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from bodies import box, placement
 from hypothesis import given
 from hypothesis import strategies as st
 
-from silo.inertia.bodies import box, placement
 from silo.inertia.geometry.graph import unique_names
 from silo.inertia.links import claim, link_map, read_link_map
 from silo.inertia.model import Assembly, Instance

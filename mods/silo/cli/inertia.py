@@ -111,8 +111,7 @@ def run_inertia(args: argparse.Namespace) -> int:
 
 def _task(args: argparse.Namespace) -> Task:
     from silo.inertia.calculator import Task
-    from silo.inertia.frames import FrameChoice
-    from silo.inertia.links import ROOT_LINK, read_link_map
+    from silo.inertia.links import ROOT_LINK, FrameChoice, read_link_map
     from silo.inertia.massrule import Options
     from silo.inertia.output.urdf import frame_doubts, link_names, read_urdf, root_link, urdf_frames
 

@@ -16,14 +16,11 @@ from silo.inertia.bom.rows import BomTable
 from silo.inertia.codes import MassCode
 from silo.inertia.core import Floats, MassProps, TensorProblem, combine_arrays, is_rigid
 from silo.inertia.doubts import Note
-from silo.inertia.frames import ASSEMBLY_FRAME, FrameChoice, LinkFrame
-from silo.inertia.groups import Occurrence
-from silo.inertia.links import Claims
+from silo.inertia.links import ASSEMBLY_FRAME, Claims, FrameChoice, LinkFrame
 from silo.inertia.matching import Matching
-from silo.inertia.model import Assembly
+from silo.inertia.model import Assembly, Product
 from silo.inertia.names import plain
-from silo.inertia.placed import Placed
-from silo.inertia.products import Product
+from silo.inertia.placed import Occurrence, Placed
 from silo.inertia.report import InertiaReport, LinkResult, PartResult, PartWarning, SubAssemblyResult
 
 _TENSOR_WORDS = {

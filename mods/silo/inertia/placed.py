@@ -1,22 +1,217 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Masses of all instances: a decision per product, then one mass per instance, then the sub-assembly rows."""
+"""Masses of all instances: a decision per product, then one mass per instance, then sub-assembly rows. Pure.
+
+Rows of sub-assemblies never add mass to that of their parts. A row's mass is used where its parts have no
+data of their own: a bought motor is one row of the BOM and twelve parts of the STEP file. Where they have,
+the two are compared. A row without children stands for all below it, so that what its mass leaves after the
+parts that are listed elsewhere belongs to the others.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from silo.inertia.codes import MassCode, Source
+from silo.inertia.bom.rows import BOMEntry
+from silo.inertia.codes import MassCode, Rule, Source
 from silo.inertia.core import Floats, place, rigid_mask
-from silo.inertia.doubts import TOTAL_BY_OTHERS, Note, looks_like_totals
-from silo.inertia.groups import Groups, Occurrence
-from silo.inertia.massrule import Decision, MassRule
-from silo.inertia.matching import Matching
-from silo.inertia.model import Assembly, GeometryCode
-from silo.inertia.products import companions
+from silo.inertia.doubts import (
+    MISMATCH_LIMIT,
+    TOTAL_BY_OTHERS,
+    GivenMass,
+    Note,
+    implausible,
+    looks_like_totals,
+)
+from silo.inertia.massrule import Decision, MassRule, two_ways
+from silo.inertia.matching import Match, Matching
+from silo.inertia.model import Assembly, GeometryCode, Instance, companions
+
+
+@dataclass(frozen=True)
+class Occurrence:
+    """A placed sub-assembly whose row gives a mass.
+
+    path, below
+        its instance path, and the indices of all parts in it.
+    agrees
+        the parts' masses sum up to it, or were taken from it.
+    implausible
+        nothing that parts are made of gives this mass in their volume.
+    """
+
+    match: Match
+    path: tuple[str, ...]
+    below: tuple[int, ...]
+    agrees: bool
+    implausible: bool
+
+
+@dataclass(frozen=True)
+class _Density:
+    source: Source
+    density: float
+    where: str = ""
+    notes: tuple[Note, ...] = ()
+
+
+@dataclass(eq=False)
+class Groups:
+    """The masses and decisions of all instances, while sub-assembly rows may still change them.
+
+    ``mass`` and ``decisions`` are changed in place; instances that are not ``counted`` are left alone.
+    """
+
+    instances: Sequence[Instance]
+    volume: Floats
+    mass: Floats
+    decisions: list[Decision]
+    counted: NDArray[np.bool_]
+    rule: MassRule
+    _made: dict[tuple[Match, Decision, bool], Decision] = field(default_factory=dict)
+
+    def apply(self, matches: Mapping[str, Match]) -> Iterator[Occurrence]:
+        """Use or compare every matched row, once per placed sub-assembly. ``matches``: by product name."""
+        for match, path, below in self._occurrences(matches):
+            row = match.row
+            known = [i for i in below if _has_data(self.decisions[i])]
+            gaps = [i for i in below if not _has_data(self.decisions[i])]
+            if row.mass_kg is None:
+                if not row.has_children:
+                    self._cover(match, gaps)
+                continue
+            left = row.mass_kg - float(self.mass[known].sum())
+            stands_for_all = not row.has_children and left > row.quantum_kg
+            agrees = True
+            if gaps and (not known or stands_for_all):
+                self._share(match, gaps, left, partly=bool(known))
+            elif known:
+                agrees = self._compare(match, below, known[0])
+            volume = float(self.volume[below].sum())
+            odd = any(implausible(GivenMass(row.mass_kg, row.quantum_kg), volume))
+            yield Occurrence(match, path, tuple(below), agrees, odd)
+
+    def _occurrences(
+        self, matches: Mapping[str, Match]
+    ) -> Iterator[tuple[Match, tuple[str, ...], list[int]]]:
+        """Each placed sub-assembly that has a row, deepest first, with its instances."""
+        if not matches:
+            return
+        below: dict[tuple[str, ...], list[int]] = defaultdict(list)
+        product: dict[tuple[str, ...], str] = {}
+        for index, instance in enumerate(self.instances):
+            if not self.counted[index]:
+                continue
+            for depth in range(1, len(instance.product_path)):
+                name = instance.product_path[depth - 1]
+                if name in matches:
+                    below[instance.path[:depth]].append(index)
+                    product[instance.path[:depth]] = name
+        for path in sorted(below, key=len, reverse=True):
+            yield matches[product[path]], path, below[path]
+
+    def _share(self, match: Match, gaps: list[int], mass: float, *, partly: bool) -> None:
+        """Spread a mass over parts without data by volume, or evenly where none has one."""
+        row = match.row
+        weights = self.volume[gaps]
+        solid = bool(weights.sum() > 0)
+        if not solid:
+            weights = np.ones(len(gaps))
+        self.mass[gaps] = mass * weights / weights.sum()
+        what = f"{row.mass_kg:.6g} kg for “{row.name}” around it"
+        if partly:
+            what += f", of which its other parts leave {mass:.6g} kg"
+        note = Note(
+            MassCode.SUB_ASSEMBLY_SHARED,
+            f"the BOM has no data for it, but {what}; that was spread "
+            + ("by volume" if solid else "evenly, as points, since there is no solid"),
+        )
+        volume = float(self.volume[gaps].sum())
+        doubts = tuple(implausible(GivenMass(mass, row.quantum_kg), volume)) if solid else ()
+        for index in gaps:
+            self._decide(
+                index,
+                match,
+                source=Source.SUB_ASSEMBLY_MASS,
+                mass_kg=None,
+                density=None,
+                density_source="",
+                quantum_kg=row.quantum_kg,
+                notes=(*_doubt(match), note, *doubts),
+            )
+
+    def _compare(self, match: Match, below: list[int], first: int) -> bool:
+        row = match.row
+        total = float(self.mass[below].sum())
+        stated = row.mass_kg or 0.0
+        if abs(total - stated) <= max(row.quantum_kg, MISMATCH_LIMIT * stated):
+            return True
+        note = Note(
+            MassCode.SUB_ASSEMBLY,
+            f"the parts of “{row.name}” sum up to {total:.6g} kg, its own row says {stated:.6g} kg; "
+            "the parts were used",
+        )
+        old = self.decisions[first]
+        if note not in old.notes:
+            new = replace(old, notes=(*old.notes, note))
+            self.decisions[:] = [new if decision is old else decision for decision in self.decisions]
+        return False
+
+    def _cover(self, match: Match, gaps: list[int]) -> None:
+        """A row without children and mass stands for the parts that the BOM does not have themselves."""
+        found = self._density(match.row)
+        for index in gaps:
+            if self.decisions[index].rule is not Rule.NONE:
+                continue
+            self._decide(
+                index,
+                match,
+                source=found.source,
+                mass_kg=None,
+                density=found.density,
+                density_source=found.where,
+                material=match.row.material,
+                notes=(*_doubt(match), *found.notes, *(() if self.volume[index] > 0 else (_NO_VOLUME,))),
+            )
+            self.mass[index] = found.density * self.volume[index]
+
+    def _density(self, row: BOMEntry) -> _Density:
+        """What a sub-assembly's row says of its parts' density."""
+        if row.material is None:
+            words = f"No mass or material assigned to “{row.name}” around it: counted as 0 kg"
+            return _Density(Source.ZERO, 0.0, notes=(Note(MassCode.NO_MASS_NO_MATERIAL, words),))
+        known = self.rule.density_of(row.material)
+        if known is not None:
+            return _Density(Source.MATERIAL, known, f"material of “{row.name}”")
+        default = self.rule.options.default_density
+        words = (
+            f"Unknown material '{row.material}' of “{row.name}” around it; "
+            f"the default density ({default:g} kg/m³) was used"
+        )
+        return _Density(Source.DEFAULT_DENSITY, default, "default", (Note(MassCode.UNKNOWN_MATERIAL, words),))
+
+    def _decide(self, index: int, match: Match, **changes: object) -> None:
+        """One decision per (row, product): instances of one product stay one part in the report."""
+        old = self.decisions[index]
+        lines = tuple(row.line for row in match.bundle.rows)
+        common = {"rule": Rule.SUB_ASSEMBLY, "decided": match.decided, "lines": lines}
+        new = Decision(**{**old.__dict__, **common, **changes})
+        self.decisions[index] = self._made.setdefault((match, old, bool(self.volume[index] > 0)), new)
+
+
+_NO_VOLUME = Note(MassCode.NO_VOLUME, "the part has no solid to multiply a density with: counted as 0 kg")
+
+
+def _has_data(decision: Decision) -> bool:
+    return decision.informed or decision.source is Source.SUB_ASSEMBLY_MASS
+
+
+def _doubt(match: Match) -> tuple[Note, ...]:
+    return (*((Note(MassCode.AMBIGUOUS, match.doubt),) if match.doubt else ()), *two_ways(match.row))
 
 
 @dataclass(frozen=True, eq=False)

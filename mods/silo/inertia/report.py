@@ -9,11 +9,11 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from silo.inertia.codes import Decided, Rule, Source
-from silo.inertia.types import InertialProperties
+from silo.inertia.core import InertialProperties
 
 if TYPE_CHECKING:
     from silo.inertia.core import MassProps, TensorProblem
-    from silo.inertia.frames import LinkFrame
+    from silo.inertia.links import LinkFrame
 
 logger = logging.getLogger(__name__)
 

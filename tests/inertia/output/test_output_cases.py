@@ -16,13 +16,12 @@ from typing import Any
 import jsonschema_rs
 import numpy as np
 import pytest
+from bodies import box, cylinder, placement, shape_only
 from rich.console import Console
 
 from silo.bom.errors import InputError
-from silo.inertia.bodies import box, cylinder, placement, shape_only
 from silo.inertia.core import MassProps, combine
-from silo.inertia.frames import ASSEMBLY_FRAME, origin_frame
-from silo.inertia.links import link_map
+from silo.inertia.links import ASSEMBLY_FRAME, link_map, origin_frame
 from silo.inertia.output.data import CSV_HEADER, report_csv, report_data, report_json
 from silo.inertia.output.snippets import SNIPPETS, document, snippets
 from silo.inertia.output.text import report_markdown, report_tables

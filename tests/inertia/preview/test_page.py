@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bodies import box
 
-from silo.inertia.bodies import box
 from silo.inertia.codes import Source
 from silo.inertia.geometry import Mesh
 from silo.inertia.preview.page import report_html

@@ -23,8 +23,7 @@ from silo.inertia.geometry import Mesh
 from silo.inertia.geometry.mesh import mesh_volume
 from silo.inertia.model import Assembly, Instance, Prototype
 from silo.inertia.preview.glb import quaternion, write_glb
-from silo.inertia.preview.legend import mass_words
-from silo.inertia.preview.lettering import fitted, width_of, write
+from silo.inertia.preview.legend import fitted, mass_words, width_of, write
 from silo.inertia.preview.picture import write_picture
 from silo.inertia.preview.raster import Canvas
 from silo.inertia.preview.scene import colour_of, inertia_ellipsoid, views_of
@@ -272,7 +271,7 @@ def test_masses_have_a_unit_that_suits_them(mass: float, words: str) -> None:
 
 def test_a_report_becomes_views_and_files(assemble: Any, compute: Any, tmp_path: Path) -> None:
     """Links in the report's order with parts and mass, in the assembly's frame; the file by its suffix."""
-    from silo.inertia.bodies import box
+    from bodies import box
 
     block = box("block", 0.1, 0.1, 0.1, mesh=cube_mesh())
     assembly = assemble(("arm/one", block, at(0)), ("hand/two", block, at(0.4)))

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from silo.inertia.core import MassProps, combine, place
-from silo.inertia.frames import origin_frame
+from silo.inertia.links import origin_frame
 from silo.inertia.output.values import settled
 
 length = st.floats(-5, 5, allow_nan=False)

@@ -10,12 +10,12 @@ from typing import Any
 
 import jsonschema_rs
 import pytest
+from bodies import box, placement, shape_only
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from silo.inertia.bodies import box, placement, shape_only
 from silo.inertia.bom import BOMEntry, BomTable
-from silo.inertia.bom.structure import with_structure
+from silo.inertia.bom.parser import with_structure
 from silo.inertia.codes import Source
 from silo.inertia.model import Assembly, Instance
 from silo.inertia.names import bare, plain

@@ -16,10 +16,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from bodies import box, placement
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from silo.inertia.bodies import box, placement
 from silo.inertia.model import Assembly, Instance, Prototype
 
 NAMES = (

@@ -7,8 +7,8 @@ import dataclasses
 
 import numpy as np
 import pytest
+from bodies import box
 
-from silo.inertia.bodies import box
 from silo.inertia.calculator import Task, calculate
 from silo.inertia.links import Link, LinkMap
 from silo.inertia.massrule import Options

@@ -19,8 +19,7 @@ import numpy as np
 
 from silo.bom.errors import InputError
 from silo.inertia.core import Floats, MassProps
-from silo.inertia.frames import origin_frame
-from silo.inertia.links import MOST_RAD, ROOT_LINK
+from silo.inertia.links import MOST_RAD, ROOT_LINK, origin_frame
 from silo.inertia.output.files import write_whole
 from silo.inertia.output.snippets import urdf_inertial
 

@@ -403,7 +403,7 @@ def splines(kind: str) -> tuple[Any, float]:
 def test_splines_of_the_kernel_are_read_as_such(kind: str) -> None:
     """Nothing is asked point by point where numpy can have the surface as a whole; the volume is exact."""
     from silo.inertia.geometry.kernel import occt
-    from silo.inertia.geometry.kernel.faces import _surface, moments
+    from silo.inertia.geometry.kernel.moments import _surface, moments
 
     shape, volume = splines(kind)
     assert not [face for face in occt.faces_of(shape) if isinstance(_surface(face), Asked)]
@@ -416,7 +416,7 @@ def test_both_engines_agree_where_both_converge(box: Any) -> None:
     from OCP.BRepPrimAPI import BRepPrimAPI_MakeCone, BRepPrimAPI_MakeTorus
     from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt
 
-    from silo.inertia.geometry.kernel.faces import moments
+    from silo.inertia.geometry.kernel.moments import moments
     from silo.inertia.geometry.kernel.solids import measure
 
     axis = gp_Ax2(gp_Pnt(6, 5, 4), gp_Dir(1, 2, 3))

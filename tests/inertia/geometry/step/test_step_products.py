@@ -21,7 +21,7 @@ from silo.bom.errors import DocumentError
 from silo.inertia.core import place
 from silo.inertia.geometry.graph import Child, Node
 from silo.inertia.geometry.kernel import occt
-from silo.inertia.geometry.step.checks import lost_stretches
+from silo.inertia.geometry.step.read import lost_stretches
 from silo.inertia.geometry.step.xcaf import StepFile
 from silo.inertia.model import GeometryCode
 
