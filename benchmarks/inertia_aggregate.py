@@ -3,7 +3,7 @@
 
     python benchmarks/inertia_aggregate.py [--instances N] [--repeat N]
 
-Told is the median of N runs: `aggregate` is the numeric stage (place every instance, sum up every link),
+It prints the median of N runs: `aggregate` is the numeric stage (place every instance, sum up every link),
 `loop` the same sums one instance after the other as most tools do, `report` everything from BOM matching to
 the finished report. Import times are those of a fresh process.
 """
@@ -16,9 +16,9 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
-from bodies import box, placement
 
 from silo.inertia.bom import BOMParser
 from silo.inertia.calculator import Task, calculate
@@ -27,11 +27,15 @@ from silo.inertia.links import origin_frame
 from silo.inertia.materials import load_materials
 from silo.inertia.model import Assembly, Instance
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
+
 PARTS, LINKS, DENSITY = 20, 20, 7850.0
 
 
 def assembly(count: int) -> Assembly:
     """``count`` instances of 20 boxes in 20 links, anywhere."""
+    from bodies import box, placement
+
     rng = np.random.default_rng(1)
     prototypes = {f"part {n}": box(f"part {n}", 0.01 + 0.001 * n, 0.02, 0.03) for n in range(PARTS)}
     instances = tuple(
