@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +24,9 @@ from step_writer import StepDocument, emptied, trsf_of
 
 from silo.inertia.geometry import ReadOptions, read
 from silo.inertia.geometry.freecad.files import read_freecad
-from silo.inertia.geometry.helpers import LEAST_MB, Helpers, helpers_for, processors
+from silo.inertia.geometry.helpers import LEAST_MB, WORTH_HELP, Helpers, helpers_for, processors
 from silo.inertia.geometry.kernel.brep import measure_all
+from silo.inertia.geometry.step.prepare import begin
 from silo.inertia.geometry.step.read import read_step
 from silo.inertia.model import Assembly, GeometryCode
 
@@ -135,6 +137,45 @@ def test_a_split_assembly_is_the_same_assembly(helpers: Helpers, tmp_path: Path)
     ]
     codes = [problem.code for part in together.assembly.prototypes.values() for problem in part.problems]
     assert codes == [GeometryCode.EXTERNAL_FILE]
+
+
+class Planned(Helpers):
+    """Starts nothing, and keeps what was asked of it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.asked: list[str] = []
+
+    def start(self) -> bool:
+        """See :class:`Helpers`."""
+        self.asked.append("start")
+        return True
+
+    def load_kernel(self) -> None:
+        """See :class:`Helpers`."""
+        self.asked.append("load the kernel")
+
+
+def test_helpers_of_a_split_assembly_start_before_the_kernel_is_loaded(tmp_path: Path) -> None:
+    """Its text names the files; small ones, and those of parts that have geometry already, need no help."""
+
+    def asked(path: Path, **options: Any) -> list[str]:
+        with Planned() as planned:
+            found = begin(path, replace(OPTIONS, **options), planned)()
+        assert len(found.products.uses) == 2
+        return planned.asked
+
+    path = split_assembly(tmp_path, 2)
+    assert asked(path) == []
+    with (tmp_path / "p1.step").open("ab") as stream:
+        stream.write(b" " * WORTH_HELP)
+    assert asked(path) == ["start", "load the kernel"]
+    assert asked(path, siblings=False) == []
+    document = StepDocument()
+    top = document.assembly("top")
+    for name in ("p0", "p1"):
+        document.place(top, document.part(BRepPrimAPI_MakeTorus(9, 1).Shape(), name))
+    assert asked(document.write(tmp_path / "whole.step")) == []
 
 
 def test_a_freecad_document_is_the_same_assembly(helpers: Helpers, tmp_path: Path) -> None:

@@ -23,7 +23,7 @@ from contextlib import suppress
 from itertools import count
 from pathlib import Path
 from types import TracebackType
-from typing import IO, Any, TypeAlias, TypeVar
+from typing import IO, Any, Self, TypeAlias, TypeVar
 
 from silo import platform
 from silo.folders import scratch_folder
@@ -74,7 +74,7 @@ class Helpers:
         self._running: list[_Helper] = []
         self._folder: tempfile.TemporaryDirectory[str] | None = None
 
-    def __enter__(self) -> Helpers:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(
