@@ -260,7 +260,7 @@ def test_duplicate_names_keep_all_rows(bom: Callable[..., BomTable]) -> None:
     """The mapping never silently keeps the last row: all are beside it, with a warning and their lines."""
     table = bom("Item,Name,Mass,Material\n1,Part 1,1 kg,\n2,Part 1,2 kg,\n3,other,,steel\n")
     assert len(table) == 2
-    assert [row.mass_kg for row in table.rows_named("Part 1")] == [1, 2]
+    assert [row.mass_kg for row in table.rows if row.name == "Part 1"] == [1, 2]
     assert table["Part 1"].mass_kg == 1
     (warning,) = table.warnings
     assert warning.code is BomCode.DUPLICATE_NAME

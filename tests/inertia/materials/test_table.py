@@ -180,7 +180,7 @@ def test_the_nearest_guess_is_named(materials: MaterialTable, text: str, nearest
 
 def test_a_users_row_is_no_reason_to_overlook_a_better_one(materials: MaterialTable) -> None:
     """With "steel" in the user's table, "stainless steel 316, brushed" is still stainless."""
-    table = materials.with_layer([Material("steel", 7700)])
+    table = MaterialTable(((Material("steel", 7700),), *materials.layers), materials.cards)
     for text, density in (("Stainless steel 316, brushed", 8000), ("Steel, brushed", 7700), ("steel", 7700)):
         hit = table.find(text)
         assert isinstance(hit, MaterialHit)

@@ -93,8 +93,8 @@ class BOMEntry:
 class BomTable(Mapping[str, BOMEntry]):
     """All rows of a BOM; as a mapping, name → entry.
 
-    Under a name that several rows share, the mapping gives the *first* row, ``warnings`` says so with the
-    lines, and ``rows_named`` gives them all. Calculations use ``rows``, never the mapping.
+    Under a name that several rows share, the mapping gives the *first* row, and ``warnings`` says so with
+    the lines. Calculations use ``rows``, never the mapping.
     """
 
     def __init__(
@@ -118,10 +118,6 @@ class BomTable(Mapping[str, BOMEntry]):
 
     def __repr__(self) -> str:
         return f"BomTable({len(self.rows)} rows, {len(self)} names, {len(self.warnings)} warnings)"
-
-    def rows_named(self, name: str) -> tuple[BOMEntry, ...]:
-        """Every row with this name, in the file's order."""
-        return tuple(row for row in self.rows if row.name == name)
 
     def total_quantity(self, row: BOMEntry) -> float | None:
         """Pieces in the whole product: its quantity times that of every parent; None where one is unknown."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
@@ -95,10 +95,6 @@ class MaterialTable:
             f"were used instead of the {answer.material.density:g} kg/m³ of {answer.material.name}"
         )
         return MaterialHit(card, Found.CARD, doubt)
-
-    def with_layer(self, rows: Iterable[Material]) -> MaterialTable:
-        """The same with ``rows`` before all others."""
-        return MaterialTable((tuple(rows), *self.layers), self.cards)
 
     @cached_property
     def _index(self) -> _Index:

@@ -13,8 +13,7 @@ from silo.inertia.geometry.kernel import occt
 from silo.inertia.geometry.kernel.moments import by_kernel
 from silo.inertia.geometry.kernel.tessellate import MM
 from silo.inertia.geometry.mesh import Floats, Mesh, is_inside
-from silo.inertia.geometry.mesh_common import NOTHING, MeshCommon
-from silo.inertia.geometry.together import Body
+from silo.inertia.geometry.together import NOTHING, Body, MeshCommon
 from silo.inertia.model import SolidProps
 
 EPS = 1e-8

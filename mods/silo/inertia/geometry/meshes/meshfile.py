@@ -21,9 +21,8 @@ from silo.inertia.geometry.checks import coincident_problems, implausible_size, 
 from silo.inertia.geometry.detect import Kind
 from silo.inertia.geometry.graph import MAX_DEPTH, Child, Floats, Node, unfold
 from silo.inertia.geometry.mesh import Mesh, components, mesh_solid, open_edges, welded, without_doubled
-from silo.inertia.geometry.mesh_common import MeshCommon
 from silo.inertia.geometry.options import MESH_UNITS, Reading, ReadOptions, Report
-from silo.inertia.geometry.together import Body, together
+from silo.inertia.geometry.together import Body, MeshCommon, together
 from silo.inertia.model import Assembly, GeometryCode, GeometryProblem, Prototype, SolidProps
 from silo.inertia.wording import counted
 
