@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from silo.inertia.codes import Decided, Rule, Source
-from silo.inertia.core import InertialProperties
+from silo.inertia.types import InertialProperties
 
 if TYPE_CHECKING:
     from silo.inertia.core import MassProps, TensorProblem
