@@ -204,14 +204,15 @@ def from_row(kind: type[T], row: Any, /, **given: Any) -> T:
 def to_wire(value: Any, *left_out: str) -> dict[str, Any]:
     """The fields of a frozen value, under their own names, as the API sends them."""
     return {
-        name: wire(found) if name.endswith(_TIMES) else found
+        name: wire(found) if _is_time(name) else found
         for name in names_of(type(value))
         if name not in left_out
         for found in (getattr(value, name),)
     }
 
 
-_TIMES = ("at", "since")
+def _is_time(name: str) -> bool:
+    return name in ("at", "since") or name.endswith(("_at", "_since"))
 
 
 def number(value: float | Decimal | None) -> float | int | None:

@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import uuid
 from contextlib import suppress
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from datetime import timedelta
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -35,7 +36,7 @@ from silo_server.services.bom.lines import state_to_json, stored_state
 from silo_server.services.bom.merge_json import quantity_problem, read_merge_order
 from silo_server.services.bom.rollup import positive_number
 from silo_server.services.items import NewItem, create_item
-from silo_server.values import SYSTEM, Actor, LineState, Role, number
+from silo_server.values import SYSTEM, Actor, LineState, Role, from_row, number, to_wire
 
 text = st.text(max_size=20)
 states = st.builds(
@@ -319,3 +320,21 @@ def test_a_failed_transaction_leaves_nothing(db: Database) -> None:
         fail()
     with db.write() as tx:
         assert create_item(tx, NewItem(category="F01", name=name))[0].part_number == "F01-0001"
+
+
+def test_a_value_is_read_and_written_by_its_own_names() -> None:
+    """Times lose an empty fraction; what a row has not is given; nothing else is changed or shown."""
+
+    @dataclass(frozen=True, slots=True)
+    class Value:
+        id: int
+        flat: bool
+        created_at: str
+        since: str | None
+        note: str = ""
+
+    row = SimpleNamespace(id=7, flat=True, created_at="2026-02-08T22:15:00.000000Z", since=None, other="x")
+    value = from_row(Value, row, note="given")
+    assert value == Value(7, True, "2026-02-08T22:15:00.000000Z", None, "given")
+    told = {"flat": True, "created_at": "2026-02-08T22:15:00Z", "since": None, "note": "given"}
+    assert to_wire(value, "id") == told
