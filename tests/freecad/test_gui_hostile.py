@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Documents made to harm whoever shows them: ten thousand links, markup, terminal codes, broken files."""
+"""Documents made to harm whoever shows them: thousands of links, markup, terminal codes, broken files."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from gui_cases.window import Window, window
 
 pytestmark = [pytest.mark.freecad, pytest.mark.slow]
 
-LINKS = 10_000
+# What the window shows is bounded much earlier; the benchmark has ten thousand.
+LINKS = 2500
 WINDOWS = ("commit", "pane", "preview", "pane_after", "register")
 
 

@@ -160,3 +160,12 @@ def test_sync_from_the_preview(day: Told) -> None:
 def test_show_selects_the_instances(day: Told) -> None:
     """The first row is the plate."""
     assert day["selected"] == ["Plate"]
+
+
+@pytest.mark.parametrize("theme", ["light", "dark", "light again"])
+def test_every_text_of_the_pane_can_be_read(day: Told, theme: str) -> None:
+    """Titles, warnings, times and links; 4.5 is what WCAG asks of normal text (AA)."""
+    contrasts = day[theme]
+    assert {text: value for text, value in contrasts.items() if value < 4.5} == {}
+    assert any(text.startswith("BOM Updated") for text in contrasts)
+    assert "Register Parts…" in contrasts

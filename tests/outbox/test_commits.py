@@ -284,7 +284,7 @@ def test_a_file_of_another_name_is_not_sent_unasked(vault: Vault) -> None:
     assert vault.files() == [b"top file", b"the original goes on"]
     (waiting,) = vault.waiting()
     assert waiting.state is State.HELD
-    for word in ("TopLong.FCStd", vault.number, "whose file in Silo is Top.FCStd", "Retry", "Discard"):
+    for word in ("TopLong.FCStd", vault.number, "whose file in Silo is Top.FCStd", "Same part", "Discard"):
         assert word in waiting.reason
 
 

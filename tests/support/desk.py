@@ -26,7 +26,8 @@ from silo.workbench.commit.opened import Base, stamp_of
 from silo.workbench.commit.plan import Plan
 from silo.workbench.commit.snapshot import Snapshot
 from silo.workbench.preview.rows import Preview
-from silo.workbench.session.session import Listener, Session
+from silo.workbench.session.session import Session
+from silo.workbench.session.shown import Listener
 from silo.workbench.settings.preferences import DEFAULTS, Preferences
 from silo.workbench.settings.server import Known
 

@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from silo.workbench.register.flow import RegisterFlow
     from silo.workbench.revisions.flow import RevisionFlow
     from silo.workbench.session.colleagues import Newer
-    from silo.workbench.session.session import Session, Shown
+    from silo.workbench.session.session import Session
+    from silo.workbench.session.shown import Shown
 
 # FreeCAD's window comes first; a server is not talked to before it stands.
 BEGIN_AFTER_MS = 1500
@@ -102,7 +103,8 @@ class AddOn:
     @cached_property
     def session(self) -> Session:
         """What works beside the GUI thread."""
-        from silo.workbench.session.session import Listener, Session
+        from silo.workbench.session.session import Session
+        from silo.workbench.session.shown import Listener
         from silo.workbench.settings.server import read_known
         from silo.workbench.settings.tokens import Keyring
 

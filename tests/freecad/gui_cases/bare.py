@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import sys
+from typing import Any
 
 sys.path.insert(0, os.environ["SILO_TEST_CASES"])
 
@@ -26,12 +27,19 @@ def look() -> None:
     tell(buttons=[action.text() for action in bar.actions()])
     Gui.runCommand("Silo_InstallPackages")
     window = next(w for w in QtWidgets.QApplication.topLevelWidgets() if w.objectName() == "SiloInstall")
-    before = labels(window)
-    window.button.click()
-    during = [window.bar.isVisible(), window.button.isEnabled()]
-    wait(lambda: not window.bar.isVisible())
-    tell(before=before, during=during, after=labels(window), button=window.button.isVisible())
+    tell(before=labels(window))
+    press(window)
+    tell(failed=labels(window), again=window.button.text())
+    os.environ["PIP_FIND_LINKS"] = os.environ["SILO_TEST_WHEELS"]
+    press(window)
+    tell(after=labels(window), button=window.button.isVisible())
     os._exit(0)
+
+
+def press(window: Any) -> None:
+    window.button.click()
+    tell(during=[window.bar.isVisible(), window.button.isEnabled()])
+    wait(lambda: not window.bar.isVisible())
 
 
 QtCore.QTimer.singleShot(1500, look)

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Inside FreeCAD: several commits before the first one has arrived; a page without a browser."""
+"""Inside FreeCAD: several commits before the first one has arrived; a page without a browser.
+
+Then FreeCAD is closed amid further commits; the next start sends those.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +29,9 @@ from inside import (
     wait,
 )
 
-TIMES = 5
+TIMES, CLOSED = 5, 6
+FILLING = "x" * 1000
+SECOND = bool(os.environ.get("SILO_TEST_SECOND"))
 
 
 def burst(one: Any, top: Any, bolt: Any) -> None:
@@ -79,10 +84,29 @@ def page(one: Any) -> None:
     tell(asked=asked, copied=clipboard.text())
 
 
+def close(one: Any) -> None:
+    """Edit and commit part after part, then close, in one event: nothing had its turn yet."""
+    made = [part(f"P{number}") for number in range(CLOSED)]
+    tell(closed=register(*(box.Document for box in made)))
+    for box in made:
+        box.Length = 20
+        box.Label2 = FILLING
+        box.Document.recompute()
+        App.setActiveDocument(box.Document.Name)
+        Gui.runCommand("Origin_Commit")
+    tell(closed_running=one.commits.running)
+    Gui.getMainWindow().close()
+
+
 def story() -> None:
     one = addon()
     one.preferences.set("AskComment", False)
     one.preferences.set("AskRegister", False)
+    if SECOND:
+        wait(lambda: one.session.shown.connection == "online")
+        wait(lambda: settled() and not one.session.shown.waiting)
+        tell(done=True)
+        return
     bolt = part("Bolt")
     top = assembly("Top", ("B1", bolt, 0))
     numbers = register(bolt.Document, top.Document)
@@ -92,6 +116,7 @@ def story() -> None:
     one_after_the_other(one, top, bolt)
     tell(boxes=told())
     page(one)
+    close(one)
 
 
-run(story)
+run(story, closes=not SECOND)

@@ -31,8 +31,12 @@ LONGEST_S = int(os.environ.get("SILO_TEST_LONGEST", "60"))
 _told: dict[str, Any] = {}
 
 
-def run(story: Callable[[], None]) -> None:
-    """Run the story once FreeCAD's window stands, then end FreeCAD; a failed one ends it with 1."""
+def run(story: Callable[[], None], *, closes: bool = False) -> None:
+    """Run the story once FreeCAD's window stands, then end FreeCAD; a failed one ends it with 1.
+
+    closes
+        the story closes FreeCAD's window as its last step, and FreeCAD ends as it does for a person.
+    """
 
     def go() -> None:
         code = 0
@@ -43,7 +47,8 @@ def run(story: Callable[[], None]) -> None:
             code = 1
             (FOLDER / "trace.txt").write_text(traceback.format_exc())
         sys.stdout.flush()
-        os._exit(code)
+        if code or not closes:
+            os._exit(code)
 
     # A modal window that nobody expects would hold the story up for ever.
     trace = (FOLDER / "trace.txt").open("w")

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Inside FreeCAD: it is killed in the worst moment, and started again.
 
-``SILO_TEST_KILL`` names the call of the client after which the process kills itself.
+``SILO_TEST_TASKS`` says what is done first; ``SILO_TEST_KILL`` names the call of the client after which the
+process kills itself.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ sys.path.insert(0, os.environ["SILO_TEST_CASES"])
 from inside import VAULT, App, Gui, addon, assembly, boxes, part, register, run, settled, tell, wait
 
 KILL = os.environ.get("SILO_TEST_KILL", "")
+TASKS = os.environ.get("SILO_TEST_TASKS", "").split()
 
 
 def kill_after(name: str) -> None:
@@ -32,12 +34,18 @@ def kill_after(name: str) -> None:
     setattr(SiloClient, name, call)
 
 
-def first_run(one: Any) -> None:
-    bolt = part("Bolt")
-    top = assembly("Top", ("B1", bolt, 0), ("B2", bolt, 4))
-    if KILL != "create_item":
-        tell(numbers=register(bolt.Document, top.Document))
-    App.setActiveDocument(top.Document.Name)
+def die(one: Any) -> None:
+    if KILL == "upload_file":
+        bolt = part("Bolt")
+        top = assembly("Top", ("B1", bolt, 0), ("B2", bolt, 4)).Document
+        tell(numbers=register(bolt.Document, top))
+    elif KILL == "merge_bom":
+        top = App.openDocument(str(VAULT / "Top.FCStd"))
+        top.getObject("B2").ElementCount = 6
+        top.recompute()
+    else:
+        top = assembly("Frame", ("N", part("Nut"), 0)).Document
+    App.setActiveDocument(top.Name)
     kill_after(KILL)
     if KILL == "create_item":
         register_all(one)
@@ -56,14 +64,10 @@ def register_all(one: Any) -> None:
     wait(lambda: boxes("BOM Updated") and settled())
 
 
-def second_run(one: Any) -> None:
-    if (VAULT / "Top.FCStd").exists() and os.environ.get("SILO_TEST_REGISTER"):
-        App.openDocument(str(VAULT / "Top.FCStd"))
-        register_all(one)
-    else:
-        # Nothing is opened and nothing is pressed: it goes by itself.
-        wait(lambda: boxes("BOM Updated") and settled())
-        wait(lambda: not one.session.shown.waiting)
+def finish(one: Any) -> None:
+    """Nothing is opened and nothing is pressed: it goes by itself."""
+    wait(lambda: boxes("BOM Updated") and settled())
+    wait(lambda: not one.session.shown.waiting)
     tell(boxes=boxes("BOM Updated"), waiting=[w.label for w in one.session.shown.waiting])
 
 
@@ -72,10 +76,13 @@ def story() -> None:
     one.preferences.set("AskComment", False)
     one.preferences.set("AskRegister", False)
     wait(lambda: one.session.shown.connection == "online")
+    if "finish" in TASKS:
+        finish(one)
+    if "register" in TASKS:
+        App.openDocument(str(VAULT / "Frame.FCStd"))
+        register_all(one)
     if KILL:
-        first_run(one)
-    else:
-        second_run(one)
+        die(one)
 
 
 run(story)

@@ -10,8 +10,9 @@ from typing import Any
 
 sys.path.insert(0, os.environ["SILO_TEST_CASES"])
 
-from inside import FOLDER, App, Gui, QtCore, QtWidgets, addon, run, tell, wait
+from inside import FOLDER, Gui, QtCore, QtWidgets, addon, run, tell, wait
 
+LEFT = QtCore.Qt.DockWidgetArea.LeftDockWidgetArea
 FLAGS = ("AskComment", "SyncBom", "AskRegister", "LiveActivity", "ShowEverywhere")
 
 
@@ -99,6 +100,10 @@ def first(one: Any) -> None:
     on_page(fill_in)
     wait(lambda: one.session.shown.connection == "online")
     tell(token_from=one.session.shown.server.token_from.value)
+    # The dock is moved; only a normal end of FreeCAD writes down where the docks are.
+    Gui.getMainWindow().addDockWidget(LEFT, one.dock)
+    one.dock.show_and_raise()
+    wait(one.dock.isVisible)
 
 
 def second(one: Any) -> None:
@@ -106,6 +111,23 @@ def second(one: Any) -> None:
     on_page(lambda page: found.update(seen(page)))
     wait(lambda: one.session.shown.connection == "online")
     tell(after=found, token_from=one.session.shown.server.token_from.value)
+    # The page looks at the environment whenever it opens.
+    os.environ["SILO_API_URL"] = os.environ["SILO_TEST_URL"]
+    os.environ["SILO_API_TOKEN"] = os.environ["SILO_TEST_TOKEN"]
+    environment: dict[str, Any] = {}
+    on_page(lambda page: environment.update(seen(page)))
+    tell(environment=environment)
+
+
+def dock() -> dict[str, Any]:
+    """Hidden until it is first wanted."""
+    window, one = Gui.getMainWindow(), addon().dock
+    return {
+        "docks": len(window.findChildren(QtWidgets.QDockWidget, "Database Activity")),
+        "title": one.windowTitle(),
+        "visible": one.isVisible(),
+        "left": window.dockWidgetArea(one) == LEFT,
+    }
 
 
 class Loud(QtCore.QTranslator):  # type: ignore[misc]  # PySide has no types
@@ -126,12 +148,13 @@ def translated() -> None:
 
 
 def story() -> None:
+    tell(dock=dock())
     if os.environ.get("SILO_TEST_SECOND"):
         second(addon())
     else:
         first(addon())
         translated()
-        App.saveParameter()
+        Gui.getMainWindow().close()
 
 
-run(story)
+run(story, closes=not os.environ.get("SILO_TEST_SECOND"))

@@ -29,6 +29,7 @@ from inside import (
     tell,
     wait,
 )
+from themes import in_themes
 
 
 def commit(document: Any, comment: str = "", seen: list[list[str]] | None = None) -> None:
@@ -133,6 +134,8 @@ def preview(one: Any, top: Any) -> None:
     tell(selected=[obj.Name for obj in Gui.Selection.getSelection(top.Name)])
     window.close()
     wait(lambda: not one.previews._open)
+    # 7. Light and dark.
+    in_themes(one)
 
 
 def rows(tree: Any) -> list[list[str]]:

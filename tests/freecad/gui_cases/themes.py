@@ -3,29 +3,10 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from collections import Counter
 from typing import Any
 
-sys.path.insert(0, os.environ["SILO_TEST_CASES"])
-
-from inside import (
-    App,
-    Gui,
-    QtCore,
-    QtGui,
-    QtWidgets,
-    addon,
-    assembly,
-    boxes,
-    part,
-    register,
-    run,
-    settled,
-    tell,
-    wait,
-)
+from inside import QtCore, QtGui, QtWidgets, tell, wait
 
 # As FreeCAD's dark themes do it: by a style sheet, the palette stays light.
 DARK = """
@@ -34,17 +15,8 @@ QPushButton { background-color: #1a1a1a; border: 1px solid #000000; min-width: 8
 """
 
 
-def story() -> None:
-    one = addon()
-    one.preferences.set("AskRegister", False)
-    one.preferences.set("AskComment", False)
-    wait(lambda: one.session.shown.connection == "online")
-    bolt, plate = part("Bolt"), part("Plate")
-    top = assembly("Top", ("B1", bolt, 0), ("B2", bolt, 3), ("P1", plate, 0))
-    register(bolt.Document, top.Document)
-    App.setActiveDocument(top.Document.Name)
-    Gui.runCommand("Origin_Commit")
-    wait(lambda: boxes("BOM Updated") and settled())
+def in_themes(one: Any) -> None:
+    """Also while the theme changes."""
     one.dock.show_and_raise()
     one.dock.setFloating(True)
     one.dock.resize(420, 900)
@@ -97,6 +69,3 @@ def luminance(colour: int) -> float:
     parts = [(colour >> shift & 255) / 255 for shift in (16, 8, 0)]
     linear = [p / 12.92 if p <= 0.03928 else ((p + 0.055) / 1.055) ** 2.4 for p in parts]
     return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
-
-
-run(story)

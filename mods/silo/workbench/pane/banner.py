@@ -8,7 +8,7 @@ from urllib.parse import urlsplit
 
 from silo.workbench.pane.activity import Action, Do, Tone
 from silo.workbench.session.colleagues import Newer
-from silo.workbench.session.session import Shown
+from silo.workbench.session.shown import Shown
 from silo.workbench.words import plain, translate
 
 # Ground and ink; yellow read-only, orange degraded, red offline, as the Kindred workbench has them.

@@ -13,7 +13,7 @@ from silo.workbench.gui.qt import QtCore, QtWidgets
 from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone
 from silo.workbench.pane.banner import Banner
 from silo.workbench.pane.waiting import Row, host_of, meant_for_another, rows
-from silo.workbench.session.session import Shown
+from silo.workbench.session.shown import Shown
 from silo.workbench.words import counted, plain, translate
 
 OnAction = Callable[[Action], None]

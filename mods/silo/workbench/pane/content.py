@@ -11,7 +11,7 @@ from silo.workbench.gui.qt import QtCore, QtWidgets
 from silo.workbench.pane.activity import Entry, Tone, gathered
 from silo.workbench.pane.banner import banner
 from silo.workbench.pane.boxes import BannerWidget, Box, BusyWidget, OnAction, WaitingWidget
-from silo.workbench.session.session import Shown
+from silo.workbench.session.shown import Shown
 from silo.workbench.words import translate
 
 # More boxes than this are made only when somebody asks for them: widgets cost time, values do not.

@@ -14,7 +14,7 @@ from silo.workbench.words import translate
 if TYPE_CHECKING:
     from silo.workbench.pane.activity import Action
     from silo.workbench.pane.content import Pane
-    from silo.workbench.session.session import Shown
+    from silo.workbench.session.shown import Shown
 
 NAME = "Database Activity"
 

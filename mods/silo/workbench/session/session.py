@@ -9,8 +9,8 @@ come back through ``deliver``. No widgets here, and no FreeCAD, so that all of i
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,9 +18,10 @@ from silo.bom.errors import ConfigError, SiloError
 from silo.outbox.entry import Commit, State
 from silo.outbox.entry import Entry as Waiting
 from silo.outbox.store import Store
-from silo.workbench.pane.activity import Activity, Entry
+from silo.workbench.pane.activity import Entry
 from silo.workbench.session.colleagues import Colleagues, Newer
 from silo.workbench.session.jobs import Busy, Control, Deliver, Job, Worker
+from silo.workbench.session.shown import Listener, Shown
 from silo.workbench.settings.server import Known, Server, TokenStore
 from silo.workbench.words import translate
 
@@ -30,48 +31,6 @@ if TYPE_CHECKING:
     from silo.outbox.send import Sent
     from silo.workbench.commit.opened import Base
     from silo.workbench.session.online import Online
-
-
-@dataclass(frozen=True)
-class Shown:
-    """Everything that the pane shows.
-
-    waiting
-        all that is in the outbox, oldest first.
-    newer
-        UUID of an item → the newest commit of it that another FreeCAD has made since this one runs.
-    presence
-        the same in words, for the documents that are open.
-    """
-
-    server: Server = field(default_factory=Server)
-    connection: str = "stopped"
-    reason: str = ""
-    busy: Busy | None = None
-    waiting: tuple[Waiting, ...] = ()
-    activity: Activity = field(default_factory=Activity)
-    newer: Mapping[str, Newer] = field(default_factory=dict)
-    presence: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Listener:
-    """Who hears what happens in a session; all calls come through ``deliver``.
-
-    shown
-        something to show has changed.
-    console
-        a line for the report view.
-    sent
-        a commit of this FreeCAD arrived.
-    bug
-        an exception that should not have been.
-    """
-
-    shown: Callable[[Shown], None] = lambda _shown: None
-    console: Callable[[str], None] = lambda _text: None
-    sent: Callable[[Sent], None] = lambda _sent: None
-    bug: Callable[[BaseException], None] = lambda _error: None
 
 
 class Session:

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What a session shows, and to whom it reports."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from silo.outbox.entry import Entry as Waiting
+from silo.workbench.pane.activity import Activity
+from silo.workbench.session.colleagues import Newer
+from silo.workbench.session.jobs import Busy
+from silo.workbench.settings.server import Server
+
+if TYPE_CHECKING:
+    # It brings pydantic with it, which only a worker may import (start-up time).
+    from silo.outbox.send import Sent
+
+
+@dataclass(frozen=True)
+class Shown:
+    """Everything that the pane shows.
+
+    waiting
+        all that is in the outbox, oldest first.
+    newer
+        UUID of an item → the newest commit of it that another FreeCAD has made since this one runs.
+    presence
+        the same in words, for the documents that are open.
+    """
+
+    server: Server = field(default_factory=Server)
+    connection: str = "stopped"
+    reason: str = ""
+    busy: Busy | None = None
+    waiting: tuple[Waiting, ...] = ()
+    activity: Activity = field(default_factory=Activity)
+    newer: Mapping[str, Newer] = field(default_factory=dict)
+    presence: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Listener:
+    """Who hears what happens in a session; all calls come through ``deliver``.
+
+    shown
+        something to show has changed.
+    console
+        a line for the report view.
+    sent
+        a commit of this FreeCAD arrived.
+    bug
+        an exception that should not have been.
+    """
+
+    shown: Callable[[Shown], None] = lambda _shown: None
+    console: Callable[[str], None] = lambda _text: None
+    sent: Callable[[Sent], None] = lambda _sent: None
+    bug: Callable[[BaseException], None] = lambda _error: None
