@@ -217,7 +217,13 @@ def test_beside_the_real_silos_workbench(version: str, tmp_path: Path) -> None:
     assert said["works"]
     assert said["help"]
     assert said["whats_this"]
-    assert said["shortcuts"]["Register Parts…"] == "Ctrl+Alt+R"
+    # No other command of FreeCAD has our keys, in any workbench that a designer uses.
+    ours = {keys: text for text, keys in said["shortcuts"].items() if keys}
+    assert sorted(ours) == [f"Ctrl+Alt+{key}" for key in "ABMRS"]
+    assert ours["Ctrl+Alt+R"] == "Register Parts…"
+    found = said["commands_of_keys"]
+    assert "Ctrl+Z" in found
+    assert {keys: [*set(found[keys])] for keys in ours} == {keys: [text] for keys, text in ours.items()}
 
 
 def test_an_assembly_of_a_newer_freecad_is_not_saved(tmp_path: Path) -> None:

@@ -29,7 +29,8 @@ from silo.bom.errors import (
     UnreachableError,
 )
 from silo.outbox.entry import Commit, Entry, State
-from silo.outbox.send import Report, Sent, send_all
+from silo.outbox.report import Report, Sent
+from silo.outbox.send import send_all
 from silo.outbox.store import Store
 from silo.testing import FakeSilo
 

@@ -16,7 +16,7 @@ import pytest
 from silo.bom.errors import SiloError
 from silo.bom.findings import Finding
 from silo.bom.model import BomEntry, Extraction
-from silo.outbox.send import Sent
+from silo.outbox.report import Sent
 from silo.registering.offer import Candidate, Offer, Seen, State
 from silo.registering.orders import Order
 from silo.registration import Registration

@@ -12,7 +12,8 @@ import pytest
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.model import BomEntry, Extraction
 from silo.outbox.entry import Commit, Entry
-from silo.outbox.send import Report, Sent, send_all
+from silo.outbox.report import Report, Sent
+from silo.outbox.send import send_all
 from silo.outbox.store import Store
 from silo.testing import FakeSilo
 from silo.workbench.commit.snapshot import Snapshot

@@ -34,7 +34,6 @@ from silo.api.transport import Cancel, stop_if
 from silo.api.wire import (
     LinkedFile,
     MergeRequest,
-    MergeResult,
     Revision,
     SourceDocument,
 )
@@ -48,58 +47,15 @@ from silo.bom.errors import (
     RouteMissingError,
     SiloError,
 )
-from silo.bom.merge import MergePlan
 from silo.bom.report import project_folder
 from silo.bom.snapshot import from_plain
 from silo.bom_sync import Resolved, Status, decide, merge_request, resolve, server_lines
 from silo.outbox.database import OutboxError
 from silo.outbox.entry import ASKED, SAME_PART, Entry, State
+from silo.outbox.report import Report, Sent
 from silo.outbox.store import Store
 
 PAUSES = Backoff(first=5.0, longest=900.0)
-
-
-@dataclass(frozen=True)
-class Sent:
-    """What became of one commit.
-
-    status
-        of the BOM; None where there was none to sync.
-    plan
-        what was compared; None where the request was made by an earlier run.
-    revision
-        the file's new revision; None where it had none, or the server had this very file already.
-    sync_id
-        names the BOM's merge; "" where there was none to sync.
-    """
-
-    entry: Entry
-    part_number: str
-    status: Status | None = None
-    resolved: Resolved | None = None
-    plan: MergePlan | None = None
-    result: MergeResult | None = None
-    revision: int | None = None
-    sync_id: str = ""
-
-
-@dataclass
-class Report:
-    """What became of a run.
-
-    sent, held, failed
-        commits that arrived; entries that a person must look at; entries that failed in passing.
-    stopped_by
-        why the run ended early: nothing answers, read-only, a wrong token, or a person's stop.
-    busy
-        another process or thread is sending.
-    """
-
-    sent: list[Sent] = field(default_factory=list)
-    held: list[Entry] = field(default_factory=list)
-    failed: list[Entry] = field(default_factory=list)
-    stopped_by: SiloError | None = None
-    busy: bool = False
 
 
 def send_all(

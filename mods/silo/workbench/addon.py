@@ -19,7 +19,7 @@ from silo.workbench.words import plain, translate
 
 if TYPE_CHECKING:
     from silo.bom.model import BomEntry
-    from silo.outbox.send import Sent
+    from silo.outbox.report import Sent
     from silo.workbench.buttons import Buttons
     from silo.workbench.commit.flow import CommitFlow
     from silo.workbench.freecad.hooks import CommitHook

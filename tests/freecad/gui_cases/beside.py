@@ -33,6 +33,23 @@ def story() -> None:
     tell(works=bool(wait(lambda: addon().previews._open)))
     Gui.activateWorkbench("SiloWorkbench")
     tell(theirs=[action.text().replace("&", "") for action in menu("Their Silo")])
+    tell(commands_of_keys=commands_of_keys())
+
+
+def commands_of_keys() -> dict[str, list[str]]:
+    """Keys → the menu texts of all commands that have them, with the workbenches that a designer uses."""
+    known = Gui.listWorkbenches()
+    for name in ("Part", "PartDesign", "Sketcher", "Assembly", "TechDraw", "Draft", "Spreadsheet"):
+        if f"{name}Workbench" in known:
+            Gui.activateWorkbench(f"{name}Workbench")
+    Gui.activateWorkbench("SiloModWorkbench")
+    found: dict[str, list[str]] = {}
+    for name in Gui.listCommands():
+        for action in Gui.Command.get(name).getAction():
+            for keys in action.shortcuts():
+                texts = found.setdefault(keys.toString(), [])
+                texts.append(action.text().replace("&", ""))
+    return found
 
 
 def menu(title: str) -> list[Any]:

@@ -20,7 +20,7 @@ from silo.bom.model import BomEntry
 from silo.bom.naming import display_name
 from silo.bom.report import shorten
 from silo.bom_sync import Resolved, Status
-from silo.outbox.send import Sent
+from silo.outbox.report import Sent
 from silo.workbench.pane.activity import Action, Batch, Do, Entry, Line, Tone, shortened
 from silo.workbench.session.colleagues import Newer
 from silo.workbench.words import counted, plain, quantity, translate

@@ -15,7 +15,8 @@ from silo.api.events import ConnectionState, EventListener
 from silo.api.sse import ServerEvent
 from silo.bom.errors import ConfigError
 from silo.outbox.entry import Entry as Waiting
-from silo.outbox.send import Report, Sent, send_all
+from silo.outbox.report import Report, Sent
+from silo.outbox.send import send_all
 from silo.outbox.store import Store
 from silo.outbox.takeover import of_commit_folder
 from silo.workbench.pane import entries

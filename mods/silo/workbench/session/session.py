@@ -28,7 +28,7 @@ from silo.workbench.words import translate
 if TYPE_CHECKING:
     # These bring requests and pydantic with them, which only a worker may import (start-up time).
     from silo.api.client import SiloClient
-    from silo.outbox.send import Sent
+    from silo.outbox.report import Sent
     from silo.workbench.commit.opened import Base
     from silo.workbench.session.online import Online
 

@@ -15,7 +15,7 @@ from silo.workbench.settings.server import Server
 
 if TYPE_CHECKING:
     # It brings pydantic with it, which only a worker may import (start-up time).
-    from silo.outbox.send import Sent
+    from silo.outbox.report import Sent
 
 
 @dataclass(frozen=True)
