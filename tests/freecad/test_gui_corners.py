@@ -118,7 +118,11 @@ def test_missing_packages_are_installed_by_one_button(version: str, tmp_path: Pa
         assert pip is not None
         assert pip.origin is not None
         shutil.copytree(Path(pip.origin).parent, tmp_path / "with-pip" / "pip")
-        env = {"PIP_NO_INDEX": "1", "PYTHONPATH": str(tmp_path / "with-pip"), "SILO_TEST_WHEELS": str(wheels)}
+        env = {
+            "PIP_NO_INDEX": "1",
+            "SILO_TEST_PIP": str(tmp_path / "with-pip"),
+            "SILO_TEST_WHEELS": str(wheels),
+        }
         said = freecad.run("bare.py", env=env)
     (line,) = said["report"]
     by_hand = (

@@ -28,6 +28,8 @@ def look() -> None:
     Gui.runCommand("Silo_InstallPackages")
     window = next(w for w in QtWidgets.QApplication.topLevelWidgets() if w.objectName() == "SiloInstall")
     tell(before=labels(window))
+    # FreeCAD's starter of some Debian releases empties this variable, so it is set only now.
+    os.environ["PYTHONPATH"] = os.environ["SILO_TEST_PIP"]
     press(window)
     tell(failed=labels(window), again=window.button.text())
     os.environ["PIP_FIND_LINKS"] = os.environ["SILO_TEST_WHEELS"]
