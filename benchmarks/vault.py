@@ -295,7 +295,7 @@ def kills(folder: Path, scratch: Path, documents: int, count: int, seed: int) ->
     wild, wild_server = serve(scratch / "wild", documents)
     calm_env = environment(calm_server, scratch / "calm-home")
     env = environment(wild_server, scratch / "wild-home")
-    killed = edition = whole = 0
+    killed, edition, whole = 0, 0, 0.0
     codes = set()
     while killed < count:
         if edition:

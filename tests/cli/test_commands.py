@@ -411,17 +411,6 @@ def test_where_used_answers_without_a_server(run: Any, gearbox: Path) -> None:
     assert run("where-used", bolt, gearbox.parent / "nowhere").code == 2
 
 
-def test_a_second_job_on_one_folder_says_who_holds_it(run: Any, silo: Any, gearbox: Path) -> None:
-    """It changes nothing; the lock ends with the first job."""
-    from silo.cli.common import only_job
-
-    with only_job(str(gearbox.parent)):
-        ran = run("sync", gearbox.parent)
-        assert ran.code == 2
-        assert f"process {os.getpid()}" in ran.err
-    assert run("sync", gearbox.parent).code == 1, "nothing is registered yet"
-
-
 def test_a_vault_report_names_what_changed_and_what_moved(
     run: Any, silo: Any, gearbox: Path, tmp_path: Path
 ) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from http.client import HTTPConnection
@@ -27,6 +27,7 @@ class Fault:
     status: int = 0
     page: bytes = b""
     kind: str = "text/html"
+    headers: Mapping[str, str] = field(default_factory=dict)
     spoil: Callable[[bytes], tuple[bytes, int] | None] | None = None
 
 
@@ -50,15 +51,29 @@ FAULTS = {
 
 @dataclass
 class Proxy:
-    """``fault`` is met by every request whose path has ``item`` in it; None hands all on."""
+    """``fault`` is met by every request whose path has ``item`` in it; None hands all on.
+
+    left
+        so many requests more; negative: all.
+    met
+        set when the first one was.
+    """
 
     url: str = ""
     fault: Fault | None = None
     item: str = ""
+    left: int = -1
     ended: threading.Event = field(default_factory=threading.Event)
+    met: threading.Event = field(default_factory=threading.Event)
+    _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def meets(self, path: str) -> Fault | None:
-        return self.fault if self.fault is not None and self.item in path else None
+        with self._lock:
+            if self.fault is None or self.item not in path or not self.left:
+                return None
+            self.left -= 1
+        self.met.set()
+        return self.fault
 
 
 @contextmanager
@@ -77,7 +92,9 @@ def fault_proxy(target: str) -> Iterator[Proxy]:
             fault = proxy.meets(self.path)
             body = self.rfile.read(int(self.headers.get("Content-Length") or 0))
             if fault is not None and fault.status:
-                self._answer(fault.status, {"Content-Type": fault.kind}, fault.page, len(fault.page))
+                self._answer(
+                    fault.status, {"Content-Type": fault.kind, **fault.headers}, fault.page, len(fault.page)
+                )
                 return
             upstream = HTTPConnection(host, timeout=60)
             upstream.request(self.command, self.path, body, dict(self.headers))
@@ -91,7 +108,7 @@ def fault_proxy(target: str) -> Iterator[Proxy]:
                 proxy.ended.wait(SLOW_S)
                 self.close_connection = True
                 return
-            kept = ("content-type", "etag")
+            kept = ("content-encoding", "content-type", "etag")
             headers = {name: value for name, value in reply.getheaders() if name.lower() in kept}
             self._answer(reply.status, headers, *spoilt)
 

@@ -4,12 +4,10 @@
 from __future__ import annotations
 
 import argparse
-import hashlib
 import json
 import os
-import socket
 import sys
-import time
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
@@ -22,8 +20,6 @@ from silo.bom.identity import walk_entries
 from silo.bom.links import extract
 from silo.bom.model import Extraction
 from silo.bom.roots import choose_assembly
-from silo.folders import cache_folder
-from silo.platform import hold_lock
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
@@ -126,44 +122,34 @@ def _processors() -> int:
 
 
 @contextmanager
-def only_job(folder: str) -> Iterator[None]:
-    """Keep a second job of this user away from a folder. InputError names the first one."""
-    real = os.path.realpath(folder)
-    name = hashlib.sha256(real.encode("utf-8", "surrogateescape")).hexdigest()[:32]
-    path = cache_folder() / "jobs" / f"{name}.lock"
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        held = hold_lock(path)
-    except OSError:  # nowhere to lock: two jobs at once cost requests, never a wrong BOM
-        yield
-        return
-    if held is None:
-        who = path.read_text(encoding="utf-8", errors="replace").strip() or "another process"
-        raise InputError(f"{folder} is being synced by {who}. Wait for it, or stop it.")
-    with held:
-        held.truncate(0)
-        since = time.strftime("%Y-%m-%d %H:%M:%S")
-        held.write(f"process {os.getpid()} on {socket.gethostname()} since {since}\n".encode())
-        held.flush()
-        yield
-
-
-@contextmanager
 def client_of(
-    args: argparse.Namespace, *, busy_tries: int | None = None, longest: float = 10.0
+    args: argparse.Namespace,
+    *,
+    busy_tries: int | None = None,
+    longest: float = 10.0,
+    stop: threading.Event | None = None,
 ) -> Iterator[SiloClient]:
     """A client for the server that the options, the environment or the configuration name.
 
     busy_tries, longest
         for jobs that may wait: how often a server that puts us off is asked, and the longest pause (seconds).
+    stop
+        once it is set, nobody waits for the server any more.
     """
     from silo.api.caller import abilities_path
     from silo.api.client import SiloClient
     from silo.api.config import resolve_server
     from silo.api.policy import Retries
+    from silo.api.transport import stop_if
+
+    stopped = stop or threading.Event()
+
+    def rest(seconds: float) -> None:
+        stopped.wait(seconds)
+        stop_if(stopped)
 
     where = resolve_server(getattr(args, "server", None), getattr(args, "token", None))
-    retries = Retries(busy_tries=busy_tries, longest=longest)
+    retries = Retries(busy_tries=busy_tries, longest=longest, sleep=rest)
     memory = abilities_path()
     with SiloClient(where.url, where.token, verify=where.verify, memory=memory, retries=retries) as client:
         yield client

@@ -7,6 +7,7 @@ import argparse
 import os
 import signal
 import sys
+import threading
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -71,6 +72,7 @@ def register(commands: Commands) -> None:
 def run(args: argparse.Namespace) -> int:
     """Sync each file; one failure does not stop the rest. 1 or 3 where anything was left undone."""
     from silo.batch_report import Report, Summary, form_of
+    from silo.vault.lock import only_job
 
     tops = documents_in(args.tops)
     if not tops:
@@ -87,16 +89,19 @@ def run(args: argparse.Namespace) -> int:
         skip_parts=bool(folders),
     )
     summary = Summary(base)
+    stop = threading.Event()
     with ExitStack() as stack:
         stack.enter_context(_terminated())
         for folder in folders:
-            stack.enter_context(common.only_job(folder))
-        client = stack.enter_context(common.client_of(args, busy_tries=_BUSY_TRIES, longest=_LONGEST_S))
+            summary.notes += filter(None, [stack.enter_context(only_job(folder))])
+        client = stack.enter_context(
+            common.client_of(args, busy_tries=_BUSY_TRIES, longest=_LONGEST_S, stop=stop)
+        )
         reports = [Report(path) for path in args.report]
         shown = _Shown(args, summary, many=len(tops) > 1)
         ended = None
         try:
-            for result in _results(args, tops, options, client, summary):
+            for result in _results(args, tops, options, client, summary, stop):
                 summary.add(result)
                 shown.add(result)
                 for report in reports:
@@ -130,7 +135,12 @@ def _terminated() -> Iterator[None]:
 
 
 def _results(
-    args: argparse.Namespace, tops: Sequence[str], options: Options, client: SiloClient, summary: Summary
+    args: argparse.Namespace,
+    tops: Sequence[str],
+    options: Options,
+    client: SiloClient,
+    summary: Summary,
+    stop: threading.Event,
 ) -> Iterator[TopResult]:
     if args.via == "freecad":
         yield from _by_freecad(args, tops, options, client)
@@ -158,7 +168,7 @@ def _results(
         if not plan.uuids and plan.nodes:
             common.reach(client)
         begin = time.monotonic()
-        yield from Job(plan, reading, client, options, summary.base).results()
+        yield from Job(plan, reading, client, options, summary.base, stop).results()
         summary.seconds["server"] = time.monotonic() - begin
         summary.add_findings(plan.shared)
         summary.notes += filter(None, [reading.index.trouble])

@@ -9,18 +9,19 @@ the job, the next one continues: what was merged agrees then, and is not sent ag
 from __future__ import annotations
 
 import os
+import threading
 import uuid
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from typing import Any
 
 from silo.api.policy import ends_run
 from silo.api.wire import SourceDocument
 from silo.batch import Options, TopResult, source_document, suggest_by_identity
-from silo.bom.errors import DocumentError, SiloError
+from silo.bom.errors import CancelledError, DocumentError, SiloError
 from silo.bom.findings import FindingCode
 from silo.bom.resolve import Known
 from silo.bom_sync import (
@@ -49,6 +50,8 @@ class Job:
 
     base
         the folder that paths in the results are relative to; "" for that of each file.
+    stop
+        set where the job is interrupted, so that no merge waits for a busy server any more.
     senders
         merges that are under way at one time.
     """
@@ -58,6 +61,7 @@ class Job:
     api: SyncApi
     options: Options
     base: str
+    stop: threading.Event = field(default_factory=threading.Event)
     senders: int = _SENDERS
 
     def __post_init__(self) -> None:
@@ -112,7 +116,12 @@ class Job:
                     if number is not None and not blocking(one):
                         self._sent[number] = first
                 asked.append(first)
-            found = [future.result() for future in asked]
+            try:
+                found = [future.result() for future in asked]
+            except BaseException:  # Ctrl-C; the senders end what is under way
+                self.stopped = self.stopped or CancelledError("the job was stopped")
+                self.stop.set()
+                raise
         return [
             outcome if outcome.resolved is one else _as_the_first(one, outcome)
             for one, outcome in zip(several, found, strict=True)

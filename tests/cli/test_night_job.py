@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""A disturbed job over a folder: a busy server, a signal, a second job, files that were not fetched."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fault_proxy import Fault, Proxy, fault_proxy
+
+from silo.vault.lock import NAME, only_job
+
+BUSY = b'{"error": "busy", "message": "later"}'
+
+
+def busy(status: int, after: str) -> Fault:
+    """A server that puts its client off."""
+    return Fault(status, BUSY, "application/json", headers={"Retry-After": after})
+
+
+@pytest.fixture
+def proxy(silo: Any, run: Any, gearbox: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Proxy]:
+    """Between the job and the server, which knows the parts of the example."""
+    assert run("register", gearbox, "--yes").code == 0
+    with fault_proxy(os.environ["SILO_API_URL"]) as proxy:
+        monkeypatch.setenv("SILO_API_URL", proxy.url)
+        yield proxy
+
+
+@contextmanager
+def job(folder: Path, report: Path) -> Iterator[subprocess.Popen[str]]:
+    """The job as a process of its own."""
+    command = [sys.executable, "-m", "silo.cli.main", "sync", str(folder), "--report", str(report)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+@pytest.mark.parametrize(("status", "path"), [(429, "/merge"), (503, "/api/items")])
+def test_a_busy_server_is_waited_for(run: Any, proxy: Proxy, gearbox: Path, status: int, path: str) -> None:
+    """As long as it says, also by several senders; then all is as if it had not been busy."""
+    proxy.item, proxy.fault, proxy.left = path, busy(status, "1"), 2
+    ran = run("sync", gearbox.parent)
+    assert (ran.code, proxy.left) == (0, 0), ran.out + ran.err
+    assert run("diff", gearbox.parent, "--check").code == 0
+
+
+def test_a_job_that_is_stopped_while_it_waits_ends_at_once_and_the_next_one_continues(
+    run: Any, proxy: Proxy, gearbox: Path, tmp_path: Path
+) -> None:
+    """SIGTERM, by which a service is stopped: the report is written, and says that the run did not end."""
+    proxy.item, proxy.fault = "/merge", busy(503, "100")
+    report = tmp_path / "night.json"
+    with job(gearbox.parent, report) as process:
+        assert proxy.met.wait(60)
+        process.send_signal(signal.SIGTERM)
+        process.communicate(timeout=30)
+        assert process.returncode not in (0, -signal.SIGKILL)
+    assert json.loads(report.read_text(encoding="utf-8"))["ended"] is False
+    assert not (gearbox.parent / NAME).exists()
+    proxy.fault = None
+    assert run("sync", gearbox.parent).code == 0
+    assert run("diff", gearbox.parent, "--check").code == 0
+
+
+def test_a_git_lfs_pointer_is_named_with_what_fetches_it(
+    run: Any, proxy: Proxy, gearbox: Path, tmp_path: Path
+) -> None:
+    """As a file of its own, and as a part that others use: neither counts as in order."""
+    cover = gearbox.parent / "parts" / "Cover.FCStd"
+    oid = "0" * 64
+    cover.write_text(f"version https://git-lfs.github.com/spec/v1\noid sha256:{oid}\nsize 12345\n")
+    report = tmp_path / "night.json"
+    ran = run("sync", gearbox.parent, "--report", report)
+    assert ran.code == 1
+    assert "git lfs pull" in ran.out + ran.err
+    rows = json.loads(report.read_text(encoding="utf-8"))
+    assert rows["ended"] is True
+    assert "git lfs pull" in json.dumps(rows)
+
+
+# --- one job at a time ----------------------------------------------------------------------------------
+
+
+def test_a_second_job_on_one_folder_says_who_holds_it(
+    run: Any, silo: Any, gearbox: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also that of another user, with another cache. It changes nothing; the lock ends with the first job."""
+    with only_job(str(gearbox.parent)) as doubt:
+        monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "another user"))
+        ran = run("sync", gearbox.parent)
+        assert (ran.code, doubt) == (2, "")
+        assert f"process {os.getpid()} of " in ran.err
+    assert not (gearbox.parent / NAME).exists()
+    assert run("sync", gearbox.parent).code == 1, "nothing is registered yet"
+
+
+def test_what_a_killed_job_left_behind_holds_nothing(tmp_path: Path) -> None:
+    """The lock is the system's, not the file."""
+    code = (
+        "import os, sys; from silo.vault.lock import only_job\n"
+        "with only_job(sys.argv[1]): os.kill(os.getpid(), 9)"
+    )
+    assert subprocess.run([sys.executable, "-c", code, tmp_path], check=False).returncode == -signal.SIGKILL
+    assert (tmp_path / NAME).exists()
+    with only_job(str(tmp_path)) as doubt:
+        assert doubt == ""
+    assert not (tmp_path / NAME).exists()
+
+
+def test_where_the_folder_takes_no_lock_the_report_says_what_that_means(
+    run: Any, silo: Any, gearbox: Path, tmp_path: Path
+) -> None:
+    """A folder that may not be written. Two jobs of one user still see each other."""
+    (gearbox.parent / NAME).mkdir()
+    report = tmp_path / "night.json"
+    assert run("sync", gearbox.parent, "--report", report).code == 1, "nothing is registered yet"
+    assert "of another user or machine is not noticed" in report.read_text(encoding="utf-8")
+    with only_job(str(gearbox.parent)):
+        assert run("sync", gearbox.parent).code == 2
+
+
+def test_a_lock_that_is_a_link_is_not_followed(tmp_path: Path) -> None:
+    """Who may write into the vault must not choose which file of ours is emptied."""
+    mine = tmp_path / "mine"
+    mine.write_text("dear")
+    vault = tmp_path / "vault"
+    vault.mkdir()
+    (vault / NAME).symlink_to(mine)
+    with only_job(str(vault)) as doubt:
+        assert "symbolic link" in doubt
+    assert mine.read_text() == "dear"
