@@ -327,7 +327,13 @@ def _plan_row(
     before = line.state if line else None
     after = None
     if not problems:
-        after = edited_state(before, changes) if before else LineState(**{"source": "manual", **changes})
+        if before:
+            changes = {
+                field: value for field, value in changes.items() if not _as_written(before, field, value)
+            }
+            after = edited_state(before, changes)
+        else:
+            after = LineState(**{"source": "manual", **changes})
         try:
             check_state(after)
         except RejectedError as error:
@@ -336,6 +342,14 @@ def _plan_row(
         return ImportRow(number, name, "error", problems)
     status = "add" if before is None else "same" if after == before else "change"
     return ImportRow(number, name, status, (), before, after, child[0], line)
+
+
+def _as_written(before: LineState, field: str, value: Any) -> bool:
+    """True where a file says what the line says; it drops spaces at the ends, and parts designators."""
+    known = getattr(before, field)
+    if field == "reference_designators":
+        return " ".join(known).replace(",", " ").split() == list(value)
+    return isinstance(known, str) and known.strip() == (value or "")
 
 
 def _changes(record: Mapping[str, str], problems: list[str]) -> dict[str, Any]:
