@@ -203,16 +203,20 @@ def from_row(kind: type[T], row: Any, /, **given: Any) -> T:
 
 def to_wire(value: Any, *left_out: str) -> dict[str, Any]:
     """The fields of a frozen value, under their own names, as the API sends them."""
+    kind = type(value)
+    if kind not in _TIMES:
+        # Found once for each class: a BOM has thousands of lines.
+        _TIMES[kind] = {
+            name: name in ("at", "since") or name.endswith(("_at", "_since")) for name in names_of(kind)
+        }
     return {
-        name: wire(found) if _is_time(name) else found
-        for name in names_of(type(value))
+        name: wire(getattr(value, name)) if is_time else getattr(value, name)
+        for name, is_time in _TIMES[kind].items()
         if name not in left_out
-        for found in (getattr(value, name),)
     }
 
 
-def _is_time(name: str) -> bool:
-    return name in ("at", "since") or name.endswith(("_at", "_since"))
+_TIMES: dict[type, dict[str, bool]] = {}  # class → field → whether it is a time
 
 
 def number(value: float | Decimal | None) -> float | int | None:
