@@ -28,11 +28,11 @@ from silo.batch import Options, TopResult, sync_top
 from silo.bom.errors import InputError, SiloError
 from silo.bom_sync import Status, compare, resolve
 from silo.cli.common import read_assembly
-from silo.cli.register import proposals_for, register_all
 from silo.inertia.push import PushItem, PushPlan, push
 from silo.outbox.entry import Commit, State
 from silo.outbox.send import send_all
 from silo.outbox.store import Store
+from silo.registering.on_disk import proposals_for, register_all
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "gearbox"
 NAMES = 9

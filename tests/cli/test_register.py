@@ -20,8 +20,12 @@ from fcstd_writer import Doc, locals_, part
 from silo.bom.errors import InputError
 from silo.bom.model import BomEntry
 from silo.bom.naming import Proposal
+from silo.cli.common import read_assembly
 from silo.cli.register_dialog import Dialog
+from silo.fcstd import open_document
 from silo.registering.offer import Candidate, Offer, Similar, State
+from silo.registering.on_disk import carry_out_on_disk, proposals_for
+from silo.registering.orders import Order
 from silo.registering.table import ITEM_TYPES, read_table
 from silo.testing import FakeSilo
 
@@ -86,7 +90,7 @@ def test_a_probable_duplicate_is_not_taken_by_enter() -> None:
     assert talk(twin, answers=[""], own=True)[0] == [("Bracket", "part", "M01", None)]
     rows, left = talk(candidate("A"), twin, candidate("B"), answers=["all", "n"])
     assert ([row[0] for row in rows], left) == (["A", "B"], ["Bracket"])
-    copies = [candidate(name, sha256="same") for name in ("A", "B")]
+    copies = [candidate(name, sha256="same", twins=("the other",)) for name in ("A", "B")]
     assert talk(*copies, answers=["all", "n"])[1] == ["B"]
 
 
@@ -275,6 +279,28 @@ def test_a_table_knows_files_with_odd_names(run: Any, silo: Any, tmp_path: Path)
     assert run("register", vault, "--plan", tmp_path / "after.csv").err.startswith(
         f"{tmp_path}/after.csv: 0 "
     )
+
+
+class Interrupted(FakeSilo):
+    """Ctrl-C while the second item is made."""
+
+    def create_item(self, *args: Any, **more: Any) -> Any:
+        if self.items:
+            raise KeyboardInterrupt
+        return super().create_item(*args, **more)
+
+
+def test_what_was_done_before_ctrl_c_is_known(gearbox: Path) -> None:
+    """Its number is in the list that the report is made of, and in its file."""
+    silo, done = Interrupted(), []
+    extraction = read_assembly(str(gearbox))
+    with pytest.raises(KeyboardInterrupt):
+        orders = [
+            Order.of(Candidate(one, State.READY)) for one in proposals_for(extraction, silo, "kindred-rd")
+        ]
+        carry_out_on_disk(orders, silo, schema="kindred-rd", done=done)
+    (first,) = done
+    assert open_document(first.proposal.entry.doc_path).Meta["SiloUUID"] == first.item_id
 
 
 # --- whole folders --------------------------------------------------------------------------------------

@@ -28,10 +28,10 @@ from silo.bom.resolve import consolidation_findings
 from silo.bom_sync import Outcome, Status, resolve, sync_tree
 from silo.cli import common, show
 from silo.cli.common import Commands
-from silo.cli.register import proposals_for, register_all
 from silo.cli.server import need_server_extra
 from silo.files import shipped
 from silo.folders import scratch_folder
+from silo.registering.on_disk import proposals_for, register_all
 
 if TYPE_CHECKING:
     from rich.console import Console

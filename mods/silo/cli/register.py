@@ -9,39 +9,33 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Callable, Mapping, Sequence
+import time
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from silo.bom.declare import Modelled
 from silo.bom.errors import ConflictError, DocumentError, Exit, InputError
-from silo.bom.findings import Finding
 from silo.bom.identity import walk_entries
-from silo.bom.model import BomEntry, Extraction
-from silo.bom.naming import Proposal, propose, propose_all
+from silo.bom.model import Extraction
+from silo.bom.naming import Proposal, propose
 from silo.bom.paths import relative
 from silo.bom.report import base_of
-from silo.bom_sync import resolve
 from silo.cli import common
 from silo.cli.common import Commands
 from silo.cli.register_dialog import Dialog
 from silo.declaring import chosen, modelled
 from silo.files import check_writable
 from silo.open_in_freecad import open_in_any
-from silo.registering.offer import Candidate, Offer, Seen, State, offer
-from silo.registering.orders import Order, carry_out
+from silo.registering.offer import Candidate, Offer, State, offer
+from silo.registering.on_disk import OPEN, Ask, carry_out_on_disk, is_own, seen_on_disk, whole_folder
+from silo.registering.orders import Order
 from silo.registering.table import doubts, orders_of, read_table, write_table
-from silo.registration import Journal, Registration, component_key, document_uid, unclear
+from silo.registration import Journal, Registration, unclear
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
-
-_MOST_MODELLED = 40
-_OPEN = (
-    "it is open in FreeCAD, and saving it there would undo the registration. Close it there, or register it "
-    "from there (Silo, Register Parts), then run this again; --even-if-open registers it all the same"
-)
 
 
 def register(commands: Commands) -> None:
@@ -139,10 +133,9 @@ def run(args: argparse.Namespace) -> int:
         if args.yes:
             orders, left = run.all_but_duplicates(unused)
             return run.register(orders, left)
-        offered = [
-            one for one in found.candidates if one.article is None and one.entry.doc_path not in unused
-        ]
-        orders, left = Dialog(offered, found, client, base, _own).ask()
+        counted = (one for one in found.candidates if one.article is None)
+        offered = [one for one in counted if one.entry.doc_path not in unused]
+        orders, left = Dialog(offered, found, client, base, is_own).ask()
         return run.register(orders, left)
 
 
@@ -150,34 +143,16 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _folder(args: argparse.Namespace) -> tuple[Extraction, frozenset[str]]:
-    """All components of a folder's assemblies, and the files that no assembly uses."""
-    from silo.vault.reading import Question
-
-    entries: dict[tuple[str, str], BomEntry] = {}
-    findings: list[Finding] = []
     with common.plan_of(args) as (plan, reading, base):
-        for node in (node for layer in plan.layers for node in layer):
-            found = plan.extraction(node, reading)
-            findings += found.findings
-            for entry in (*found.entries, found.assembly):
-                entries.setdefault(entry.key, replace(entry, children=()))
-        used = {path for path, _ in entries}
-        alone = [top for top in plan.tops if os.path.realpath(top) not in used and top not in plan.errors]
-        for answer in reading.ask_many(Question(top, None, not args.no_hardware) for top in alone):
-            if isinstance(part := answer.found, Extraction):
-                head = part.assembly
-                entries.setdefault(head.key, replace(head, children=(), is_assembly=False))
         for path, error in plan.errors.items():
             print(f"silo-mod: {relative(path, base)} is left out: {error}", file=sys.stderr)
-    unused = frozenset(path for path, _ in entries) - used
-    head = BomEntry(base, object_name="", is_assembly=True, level=0)
-    return Extraction(head, tuple(entries.values()), tuple(dict.fromkeys(findings))), unused
+        return whole_folder(plan, reading, base, hardware=not args.no_hardware)
 
 
 def _offer(extraction: Extraction, client: SiloClient, schema: str, args: argparse.Namespace) -> Offer:
     folder = os.path.isdir(args.top)
     paths = {entry.doc_path for entry in walk_entries((extraction.assembly, *extraction.entries))}
-    seen = {path: Seen(_state(path, args.even_if_open)) for path in paths}
+    seen = seen_on_disk(paths, even_if_open=args.even_if_open)
     journal = Journal()
     found = offer(
         extraction, seen, client, schema, _Told(), journal.pending(), most=None, own_file=not folder
@@ -202,29 +177,18 @@ def _tell_rules(categories: Mapping[str, str]) -> None:
         print(f"silo-mod: {plain(rules_text(problem))}", file=sys.stderr)
 
 
-def _state(path: str, even_if_open: bool) -> State:
-    if not os.path.isfile(path):
-        return State.MISSING
-    if not os.access(path, os.W_OK):
-        return State.READ_ONLY
-    return State.ELSEWHERE if not even_if_open and open_in_any().has_file(path) else State.READY
-
-
-def _own(candidate: Candidate) -> bool:
-    """True where the look-alike is its own item, made by a run that was interrupted or undone."""
-    record = Journal().find(component_key(candidate.entry))
-    if record is None:
-        return False
-    return not record.finished or record.document_uid == document_uid(candidate.entry)
-
-
 class _Told:
-    """A long run on a terminal says where it is; Ctrl-C ends it."""
+    """A long run on a terminal says where it is, once a second; Ctrl-C ends it."""
+
+    def __init__(self) -> None:
+        self._at = time.monotonic()
 
     def progress(self, detail: str = "", fraction: float | None = None) -> None:
         from silo.cli import show
 
-        if fraction and sys.stderr.isatty():
+        now = time.monotonic()
+        if fraction and now - self._at > 1 and sys.stderr.isatty():
+            self._at = now
             print(f"[{fraction:4.0%}] {show.plain(detail)}", file=sys.stderr)
 
     def check(self) -> None:
@@ -250,7 +214,7 @@ class _Run:
         earlier: list[Candidate] = []
 
         def wanted(one: Candidate) -> bool:
-            doubtful = bool(doubts(one, earlier)) and not _own(one)
+            doubtful = bool(doubts(one, earlier)) and not is_own(one)
             earlier.append(one)
             return not doubtful and one.article is None and one.entry.doc_path not in unused
 
@@ -275,7 +239,7 @@ class _Run:
         for one in self.found.candidates:
             if one.article is not None or one.same_as or one.entry.doc_path in unused:
                 continue
-            doubtful = bool(doubts(one, earlier)) and not _own(one)
+            doubtful = bool(doubts(one, earlier)) and not is_own(one)
             earlier.append(one)
             if not doubtful or self.args.duplicates == "new":
                 orders.append(Order.of(one))
@@ -283,24 +247,23 @@ class _Run:
                 orders.append(replace(Order.of(one), existing=one.similar[0]))
             else:
                 left.append(one)
-        if unused and not self.args.json:
-            count = len(unused)
-            files = "1 file" if count == 1 else f"{count} files"
-            print(
-                f"{files} that no assembly uses: left alone (name the file, or use --plan)", file=sys.stderr
-            )
+        if unused:
+            files = "1 file" if len(unused) == 1 else f"{len(unused)} files"
+            words = f"{files} that no assembly uses: left alone (name the file, or use --plan)"
+            print(words, file=sys.stderr)
         return orders, left
 
     def register(self, orders: Sequence[Order], left: Sequence[Candidate], *, already: int = 0) -> int:
         """Carry out; what was done is reported also where Ctrl-C ends it."""
         try:
-            done = carry_out_in_files(
+            done = carry_out_on_disk(
                 orders,
                 self.client,
                 schema=self.schema,
                 ask=_asker(self.args.unclear),
                 even_if_open=self.args.even_if_open,
                 done=self.done,
+                control=_Told(),
             )
         finally:
             self._report(left, already)
@@ -320,73 +283,6 @@ class _Run:
         )
         if already and not self.args.json:
             print(f"{already} of the table's components had their number already.")
-
-
-def carry_out_in_files(
-    orders: Sequence[Order],
-    client: SiloClient,
-    *,
-    schema: str,
-    ask: Callable[[Proposal, Sequence[Mapping[str, Any]]], Mapping[str, Any] | None] = unclear,
-    even_if_open: bool = True,
-    done: list[Registration] | None = None,
-) -> list[Registration]:
-    """Register, with the identities written into the files; ``done`` grows with each.
-
-    even_if_open
-        also files that a running FreeCAD has open; else they are left alone, and are an error.
-    """
-    from silo.fcstd import check_stampable, stamp
-
-    results: list[Registration] = [] if done is None else done
-
-    def places(candidate: Candidate) -> list[tuple[str | None, str | None]]:
-        """(the object that the identity is for, the object that gets the property), each once."""
-        if candidate.article is not None:
-            return [(name, name) for name in candidate.article.objects]
-        name = candidate.entry.object_name
-        return [(name if candidate.shares_file else None, name or None)]
-
-    def write(candidate: Candidate, identity: str) -> None:
-        for own, item in places(candidate):
-            again = bool(candidate.same_as)
-            stamp(candidate.entry.doc_path, identity, object_name=own, item_object=item, replace=again)
-
-    def check(candidate: Candidate) -> None:
-        # Looked at anew for each file: people open files while a long run is under way.
-        if not even_if_open and open_in_any().has_file(candidate.entry.doc_path):
-            raise DocumentError(candidate.entry.doc_path, _OPEN)
-        for own, item in places(candidate):
-            again = bool(candidate.same_as)
-            check_stampable(candidate.entry.doc_path, object_name=own, item_object=item, replace=again)
-
-    carry_out(
-        orders,
-        client,
-        Journal(),
-        write,
-        schema=schema,
-        control=_Told(),
-        done=lambda _order, result: results.append(result),
-        check=check,
-        ask=lambda _order, proposal, items: ask(proposal, items),
-    )
-    return results
-
-
-def proposals_for(extraction: Extraction, client: SiloClient, schema: str) -> list[Proposal]:
-    """What to register: the components without an item, parts first, and the assembly itself last."""
-    wanted = resolve(extraction, client).unregistered
-    tree = (extraction.assembly, *extraction.entries)
-    return propose_all(wanted, tree, client.categories(schema)) if wanted else []
-
-
-def register_all(
-    proposals: Sequence[Proposal], client: SiloClient, *, schema: str, **more: Any
-) -> list[Registration]:
-    """Register these as they were proposed (:func:`carry_out_in_files`)."""
-    orders = [Order.of(Candidate(one, State.READY)) for one in proposals]
-    return carry_out_in_files(orders, client, schema=schema, **more)
 
 
 def _declare(args: argparse.Namespace) -> int:
@@ -422,7 +318,7 @@ def _undeclare(args: argparse.Namespace) -> int:
     path = articles[0].entry.doc_path if articles else os.path.realpath(args.top)
     wanted = chosen(articles, args.undeclare)
     if not args.even_if_open and open_in_any().has_file(path):
-        raise DocumentError(path, _OPEN)
+        raise DocumentError(path, OPEN)
     names = [name for one in wanted for name in one.objects]
     taken = [name for name in names if unstamp(path, name)]
     if args.json:
@@ -432,7 +328,7 @@ def _undeclare(args: argparse.Namespace) -> int:
     return Exit.DONE
 
 
-def _asker(how: str) -> Callable[[Proposal, Sequence[Mapping[str, Any]]], Mapping[str, Any] | None]:
+def _asker(how: str) -> Ask:
     """Which of the items that fit an interrupted run made: as ``--unclear`` says."""
 
     def ask(proposal: Proposal, found: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
@@ -467,18 +363,18 @@ def report(
     articles: Sequence[Modelled],
 ) -> None:
     """What became of each; ``left``: proposals that were not registered, and why."""
+    from silo.cli import show
+
     if args.json:
         common.print_json(
             {
-                "registered": [_row(r.proposal, base, r) for r in done if r.error is None],
-                "failed": [_row(r.proposal, base, r) for r in done if r.error is not None],
-                "unregistered": [_row(proposal, base, note=why) for proposal, why in left],
-                "modelled": [_modelled_row(one, base) for one in articles],
+                "registered": [show.proposal_json(r.proposal, base, r) for r in done if r.error is None],
+                "failed": [show.proposal_json(r.proposal, base, r) for r in done if r.error is not None],
+                "unregistered": [show.proposal_json(proposal, base, note=why) for proposal, why in left],
+                "modelled": [show.article_json(one, base) for one in articles],
             }
         )
         return
-    from silo.cli import show
-
     out = show.console()
     if not done and not left:
         out.print("Every component has its part number already.")
@@ -500,53 +396,5 @@ def report(
             "Is it the same part? --duplicates join takes the item, --duplicates new makes another; "
             "--plan asks for each."
         )
-    for line in _modelled_text(articles, base) if articles else ():
+    for line in show.articles_text(articles, base) if articles else ():
         out.print(line, markup=False, highlight=False)
-
-
-def _modelled_row(article: Modelled, base: str) -> Mapping[str, Any]:
-    """What is modelled in the file and not counted."""
-    return {
-        "doc_path": relative(article.entry.doc_path, base),
-        "objects": list(article.objects),
-        "label": article.entry.label,
-        "quantity": article.entry.quantity,
-        "alike": article.alike,
-        "source": relative(article.source, base),
-    }
-
-
-def _modelled_text(articles: Sequence[Modelled], base: str) -> list[str]:
-    """The section of what is modelled in the file, line by line."""
-    from silo.cli import show
-
-    lines = ["Modelled in this file, not counted:"]
-    for one in articles[:_MOST_MODELLED]:
-        copies = f", {len(one.objects)} copies of one {one.alike}" if len(one.objects) > 1 else ""
-        source = f", imported from {show.plain(relative(one.source, base))}" if one.source else ""
-        label = show.plain(one.entry.label)
-        lines.append(f"  {one.entry.quantity} × {label} ({one.entry.object_name}{copies}{source})")
-    if len(articles) > _MOST_MODELLED:
-        lines.append(f"  and {len(articles) - _MOST_MODELLED} more; --json has them all")
-    lines.append("Declare what is a part: silo-mod register TOP.FCStd --yes --declare OBJECT")
-    return lines
-
-
-def _row(
-    proposal: Proposal, base: str, result: Registration | None = None, note: str = ""
-) -> Mapping[str, Any]:
-    row: dict[str, Any] = {
-        "doc_path": relative(proposal.entry.doc_path, base),
-        "object": proposal.entry.object_name,
-        "standard": proposal.entry.standard,
-        "name": proposal.name,
-        "item_type": proposal.item_type,
-        "category": proposal.category,
-        "guess": proposal.is_guess,
-        "note": note,
-    }
-    if result is not None and result.error is None:
-        row |= {"part_number": result.part_number, "silo_uuid": result.item_id, "found": result.found}
-    if result is not None and result.error is not None:
-        row |= {"error": {"code": result.error.code, "message": str(result.error)}}
-    return row

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any, Literal
+from types import GenericAlias
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, create_model
 
 import silo.inertia
 from silo.api.wire import MergeResult
@@ -36,406 +37,274 @@ def schema_of(name: str) -> dict[str, Any]:
 class Shape(BaseModel):
     """An object with these keys and no others."""
 
-    model_config = ConfigDict(extra="forbid", use_attribute_docstrings=True)
+    model_config = ConfigDict(extra="forbid")
 
 
-class Place(Shape):
-    file: str
-    object: str
-
-
-class Error(Shape):
-    code: str
-    message: str
-
-
-class Finding(Shape):
-    code: FindingCode
-    severity: Severity
-    message: str
-    where: list[Place]
-    file: str = ""
-    """the file that a broken link records"""
-    did_you_mean: str = ""
-    """the file that was probably meant"""
-
-
-# --- bom ------------------------------------------------------------------------------------------------
-
-
-class Head(Shape):
-    """An assembly."""
-
-    doc_path: str
-    object: str
-    label: str
-    silo_uuid: str | None
-    part_number: str | None
-    name: str | None
-
-
-class Entry(Head):
-    """A component; ``quantity`` is per one parent."""
-
-    standard: str | None
-    """the designation of a standard part"""
-    quantity: int
-    missing: bool
-    level: int
-    consolidation_warning: bool
-    children: list[Entry]
-
-
-class Bom(Shape):
-    assembly: Head
-    entries: list[Entry]
-    findings: list[Finding]
-
-
-class FlatLine(Shape):
-    """A component once, with its total."""
-
-    part_number: str | None
-    name: str
-    quantity: int
-    unit: str
-    standard: str | None
-    doc_path: str
-    object: str
-    missing: bool
-
-
-class FolderBoms(Shape):
-    """Of a folder: every assembly with its own lines, children first, and the files that cannot be read."""
-
-    assemblies: list[Bom]
-    errors: dict[str, str]
-
-
-class Witnessed(Bom):
-    """With --verify: what FreeCAD shows of each assembly."""
-
-    witness: list[dict[str, Any]]
-
-
-# --- against the server ---------------------------------------------------------------------------------
-
-
-class Line(Shape):
-    part_number: str
-    quantity: float | None
-
-
-class Change(Shape):
-    part_number: str
-    local_quantity: float
-    remote_quantity: float | None
-
-
-class Diff(Shape):
-    """CAD against the server; ``kept``: lines whose file is missing."""
-
-    added: list[Line]
-    quantity_changed: list[Change]
-    removed: list[Line]
-    unchanged: list[Line]
-    manual: list[Line]
-    conflicts: list[Change]
-    kept: list[Line]
-
-
-class Compared(Shape):
-    doc_path: str
-    object: str
-    part_number: str | None
-    name: str | None
-    diff: Diff | None = None
-    """not there where there was nothing to compare"""
-
-
-class Files(Shape):
-    message: str
-    files: list[str]
-
-
-class Comparison(Shape):
-    drift: bool
-    assemblies: list[Compared]
-    findings: list[Finding]
-    errors: list[Files] = []
-    """of a folder: what kept files from being compared"""
-
-
-class Outcome(Shape):
-    """What became of one assembly."""
-
-    doc_path: str
-    object: str
-    part_number: str | None
-    status: Status
-    diff: Diff | None = None
-    result: MergeResult | None = None
-    """what the server answered"""
-    error: Error | None = None
-    blocked_by: list[Finding] = []
-
-
-class TopResult(Shape):
-    """What became of one file; ``skipped``: why it was left alone."""
-
-    top: str
-    ok: bool
-    assemblies: list[Outcome]
-    error: Error | None = None
-    skipped: str = ""
-    unregistered: list[Entry] = []
-    findings: list[Finding] = []
-
-
-class Unregistered(Shape):
-    doc_path: str
-    object: str
-    label: str
-
-
-class Moved(Shape):
-    name: str
-    from_: str = Field(alias="from")
-    to: str
-
-
-class Summary(Shape):
-    files: int
-    in_order: int
-    parts: int
-    assemblies: dict[Status, int]
-    lines_changed: int
-    errors: list[Files]
-    warnings: list[Files]
-    unregistered: list[Unregistered]
-    moved: list[Moved]
-    notes: list[str]
-    seconds: dict[str, float]
-    findings: list[Finding]
-
-
-class Sync(Shape):
-    """Also of ``--report FILE.json``; ``ended`` is false until the run has ended by itself."""
-
-    results: list[TopResult]
-    ended: bool
-    summary: Summary | None = None
-
-
-# --- files ----------------------------------------------------------------------------------------------
-
-
-class Where(Shape):
-    doc_path: str
-    object: str
-
-
-class Named(Where):
-    name: str
-    silo_uuid: str | None
-    missing: bool
-    moved_from: Where | None
-
-
-class LineChange(Named):
-    change: Literal["added", "removed", "moved", "quantity_changed"]
-    old_quantity: int | None
-    new_quantity: int | None
-
-
-class AssemblyChange(Named):
-    change: Literal["added", "removed", "moved", "changed"]
-    lines: list[LineChange]
-
-
-class Unreadable(Shape):
-    file: str
-    reason: str
-
-
-class State(Shape):
-    assemblies: int
-    complete: bool
-    unreadable: list[Unreadable]
-    findings: list[Finding]
-
-
-class BomDiff(Shape):
-    changes: list[AssemblyChange]
-    old: State
-    new: State
-
-
-class WhereUsed(Shape):
-    part: str
-    direct: list[str]
-    all: list[str]
-    tops: list[str]
-    unreadable: list[str]
-
-
-class RelinkedFile(Shape):
-    file: str
-    links: int
-    objects: list[str]
-
-
-class Relinked(Shape):
-    dry_run: bool
-    to: str
-    files: list[RelinkedFile]
-
-
-class Proposed(Shape):
-    """A component as it was, or would be, registered; ``note``: why it was left out."""
-
-    doc_path: str
-    object: str
-    standard: str | None
-    name: str
-    item_type: str
-    category: str
-    guess: bool
-    """the category was found by little"""
-    note: str
-    part_number: str | None = None
-    silo_uuid: str | None = None
-    found: bool = False
-    """the item was there already"""
-    error: Error | None = None
-
-
-class Modelled(Shape):
-    doc_path: str
-    objects: list[str]
-    label: str
-    quantity: int
-    alike: str
-    source: str
-
-
-class Registered(Shape):
-    registered: list[Proposed]
-    failed: list[Proposed]
-    unregistered: list[Proposed]
-    modelled: list[Modelled]
-
-
-class Undeclared(Shape):
-    undeclared: list[str]
-
-
-class PulledFile(Shape):
-    path: str
-    part_number: str
-    revision: int
-    state: Literal["new", "same", "updated", "edited", "overwritten", "open"]
-    kept: str | None
-    """the copy of the user's file"""
-
-
-class Lost(Shape):
-    file: str
-    link: str
-    reason: str
-
-
-class Pulled(Shape):
-    top: str
-    complete: bool
-    files: list[PulledFile]
-    missing: list[Lost]
-
-
-class Revision(Shape):
-    revision_number: int
-    comment: str | None
-    created_by: str | None
-    created_at: str | None
-    file_name: str | None
-    file_size: int | None
-    base_revision: int | None = None
-    bom: str | None = None
-    """with --bom: what the revision changed, in words"""
-
-
-class Log(Shape):
-    part_number: str
-    file_is: int | None
-    """the revision that the file is, or was made from"""
-    edited: bool
-    revisions: list[Revision]
-
-
-# --- server and machine ---------------------------------------------------------------------------------
-
-
-class Greeting(Shape):
-    url: str
-    token: str | None
-    login_url: str | None
-    database: str
-    public: bool
-
-
-class Backup(Shape):
-    """Of ``backup`` and ``restore``; ``missing_files``: hashes that the server itself had lost."""
-
-    format: int
-    schema_: str = Field(alias="schema")
-    made_at: str
-    database_sha256: str
-    rows: dict[str, int]
-    files: int
-    missing_files: list[str]
-
-
-class Event(Shape):
-    """One line each, as they come."""
-
-    id: str | None
-    type: str
-    event: str
-    data: Any
-
-
-class Doctor(BaseModel):
-    """What was looked at → what was found, or what is wrong with it."""
-
+class _Open(BaseModel):
     model_config = ConfigDict(extra="allow", json_schema_extra={"additionalProperties": {"type": "string"}})
-    ok: bool
 
 
-class Login(Shape):
-    url: str
-    username: str | None
-    role: str | None
-    configuration: str
+def _shape(title: str, /, base: type[BaseModel] = Shape, doc: str = "", **keys: Any) -> Any:
+    """A shape; each key with its type, or with (type, default) where it may be left out."""
+    fields: dict[str, Any] = {}
+    for key, given in keys.items():
+        kind, *default = given if isinstance(given, tuple) else (given,)
+        alias = key.removesuffix("_")  # from_ and schema_, whose names mean something else already
+        fields[key] = (kind, Field(*default, alias=alias if alias != key else None))
+    return create_model(title, __base__=base, __doc__=doc or None, __module__=__name__, **fields)
 
 
-class Addon(Shape):
-    freecad: str
-    addon: str
-    packages: str
+def _many(kind: Any) -> Any:
+    return GenericAlias(list, (kind,))
 
 
-class LinkParts(Shape):
-    parts: list[str]
+def _said(kind: Any, words: str) -> Any:
+    return Annotated[kind, Field(description=words)]
 
 
-class LinkMap(Shape):
-    """As the YAML, without its comments; ``silo-mod inertia --links`` reads both."""
-
-    links: dict[str, LinkParts]
+Place = _shape("Place", file=str, object=str)
+Error = _shape("Error", code=str, message=str)
+Finding = _shape(
+    "Finding",
+    code=FindingCode,
+    severity=Severity,
+    message=str,
+    where=_many(Place),
+    file=(_said(str, "the file that a broken link records"), ""),
+    did_you_mean=(_said(str, "the file that was probably meant"), ""),
+)
+Head = _shape(
+    "Head",
+    doc="An assembly.",
+    doc_path=str,
+    object=str,
+    label=str,
+    silo_uuid=str | None,
+    part_number=str | None,
+    name=str | None,
+)
+Entry = _shape(
+    "Entry",
+    base=Head,
+    doc="A component; ``quantity`` is per one parent.",
+    standard=_said(str | None, "the designation of a standard part"),
+    quantity=int,
+    missing=bool,
+    level=int,
+    consolidation_warning=bool,
+    children="list[Entry]",
+)
+Bom = _shape("Bom", assembly=Head, entries=_many(Entry), findings=_many(Finding))
+FlatLine = _shape(
+    "FlatLine",
+    doc="A component once, with its total.",
+    part_number=str | None,
+    name=str,
+    quantity=int,
+    unit=str,
+    standard=str | None,
+    doc_path=str,
+    object=str,
+    missing=bool,
+)
+FolderBoms = _shape(
+    "FolderBoms",
+    doc="Of a folder: every assembly with its own lines, children first, and the files that cannot be read.",
+    assemblies=_many(Bom),
+    errors=dict[str, str],
+)
+Witnessed = _shape(
+    "Witnessed",
+    base=Bom,
+    doc="With --verify: what FreeCAD shows of each assembly.",
+    witness=list[dict[str, Any]],
+)
+Line = _shape("Line", part_number=str, quantity=float | None)
+Change = _shape("Change", part_number=str, local_quantity=float, remote_quantity=float | None)
+Diff = _shape(
+    "Diff",
+    doc="CAD against the server; ``kept``: lines whose file is missing.",
+    added=_many(Line),
+    quantity_changed=_many(Change),
+    removed=_many(Line),
+    unchanged=_many(Line),
+    manual=_many(Line),
+    conflicts=_many(Change),
+    kept=_many(Line),
+)
+Compared = _shape(
+    "Compared",
+    doc_path=str,
+    object=str,
+    part_number=str | None,
+    name=str | None,
+    diff=(_said(Diff | None, "not there where there was nothing to compare"), None),
+)
+Files = _shape("Files", message=str, files=list[str])
+Comparison = _shape(
+    "Comparison",
+    drift=bool,
+    assemblies=_many(Compared),
+    findings=_many(Finding),
+    errors=(
+        _said(_many(Files), "of a folder: what kept files from being compared"),
+        [],
+    ),
+)
+Outcome = _shape(
+    "Outcome",
+    doc="What became of one assembly.",
+    doc_path=str,
+    object=str,
+    part_number=str | None,
+    status=Status,
+    diff=(Diff | None, None),
+    result=(_said(MergeResult | None, "what the server answered"), None),
+    error=(Error | None, None),
+    blocked_by=(_many(Finding), []),
+)
+TopResult = _shape(
+    "TopResult",
+    doc="What became of one file; ``skipped``: why it was left alone.",
+    top=str,
+    ok=bool,
+    assemblies=_many(Outcome),
+    error=(Error | None, None),
+    skipped=(str, ""),
+    unregistered=(_many(Entry), []),
+    findings=(_many(Finding), []),
+)
+Unregistered = _shape("Unregistered", doc_path=str, object=str, label=str)
+Moved = _shape("Moved", name=str, from_=str, to=str)
+Summary = _shape(
+    "Summary",
+    files=int,
+    in_order=int,
+    parts=int,
+    assemblies=dict[Status, int],
+    lines_changed=int,
+    errors=_many(Files),
+    warnings=_many(Files),
+    unregistered=_many(Unregistered),
+    moved=_many(Moved),
+    notes=list[str],
+    seconds=dict[str, float],
+    findings=_many(Finding),
+)
+Sync = _shape(
+    "Sync",
+    doc="Also of ``--report FILE.json``; ``ended`` is false until the run has ended by itself.",
+    results=_many(TopResult),
+    ended=bool,
+    summary=(Summary | None, None),
+)
+Where = _shape("Where", doc_path=str, object=str)
+Named = _shape("Named", base=Where, name=str, silo_uuid=str | None, missing=bool, moved_from=Where | None)
+LineChange = _shape(
+    "LineChange",
+    base=Named,
+    change=Literal["added", "removed", "moved", "quantity_changed"],
+    old_quantity=int | None,
+    new_quantity=int | None,
+)
+AssemblyChange = _shape(
+    "AssemblyChange",
+    base=Named,
+    change=Literal["added", "removed", "moved", "changed"],
+    lines=_many(LineChange),
+)
+Unreadable = _shape("Unreadable", file=str, reason=str)
+State = _shape("State", assemblies=int, complete=bool, unreadable=_many(Unreadable), findings=_many(Finding))
+BomDiff = _shape("BomDiff", changes=_many(AssemblyChange), old=State, new=State)
+WhereUsed = _shape(
+    "WhereUsed", part=str, direct=list[str], all=list[str], tops=list[str], unreadable=list[str]
+)
+RelinkedFile = _shape("RelinkedFile", file=str, links=int, objects=list[str])
+Relinked = _shape("Relinked", dry_run=bool, to=str, files=_many(RelinkedFile))
+Proposed = _shape(
+    "Proposed",
+    doc="A component as it was, or would be, registered; ``note``: why it was left out.",
+    doc_path=str,
+    object=str,
+    standard=str | None,
+    name=str,
+    item_type=str,
+    category=str,
+    guess=_said(bool, "the category was found by little"),
+    note=str,
+    part_number=(str | None, None),
+    silo_uuid=(str | None, None),
+    found=(_said(bool, "the item was there already"), False),
+    error=(Error | None, None),
+)
+Modelled = _shape("Modelled", doc_path=str, objects=list[str], label=str, quantity=int, alike=str, source=str)
+Registered = _shape(
+    "Registered",
+    registered=_many(Proposed),
+    failed=_many(Proposed),
+    unregistered=_many(Proposed),
+    modelled=_many(Modelled),
+)
+Undeclared = _shape("Undeclared", undeclared=list[str])
+PulledFile = _shape(
+    "PulledFile",
+    path=str,
+    part_number=str,
+    revision=int,
+    state=Literal["new", "same", "updated", "edited", "overwritten", "open"],
+    kept=_said(str | None, "the copy of the user's file"),
+)
+Lost = _shape("Lost", file=str, link=str, reason=str)
+Pulled = _shape("Pulled", top=str, complete=bool, files=_many(PulledFile), missing=_many(Lost))
+Revision = _shape(
+    "Revision",
+    revision_number=int,
+    comment=str | None,
+    created_by=str | None,
+    created_at=str | None,
+    file_name=str | None,
+    file_size=int | None,
+    base_revision=(int | None, None),
+    bom=(_said(str | None, "with --bom: what the revision changed, in words"), None),
+)
+Log = _shape(
+    "Log",
+    part_number=str,
+    file_is=_said(int | None, "the revision that the file is, or was made from"),
+    edited=bool,
+    revisions=_many(Revision),
+)
+Greeting = _shape("Greeting", url=str, token=str | None, login_url=str | None, database=str, public=bool)
+Backup = _shape(
+    "Backup",
+    doc="Of ``backup`` and ``restore``; ``missing_files``: hashes that the server itself had lost.",
+    format=int,
+    schema_=str,
+    made_at=str,
+    database_sha256=str,
+    rows=dict[str, int],
+    files=int,
+    missing_files=list[str],
+)
+Event = _shape("Event", doc="One line each, as they come.", id=str | None, type=str, event=str, data=Any)
+Login = _shape("Login", url=str, username=str | None, role=str | None, configuration=str)
+Addon = _shape("Addon", freecad=str, addon=str, packages=str)
+Doctor = _shape(
+    "Doctor",
+    doc="Besides ``ok`` what was looked at, each with what was found, or what is wrong with it.",
+    base=_Open,
+    ok=bool,
+)
+LinkParts = _shape("LinkParts", parts=list[str])
+LinkMap = _shape(
+    "LinkMap",
+    doc="As the YAML, without its comments; ``silo-mod inertia --links`` reads both.",
+    links=GenericAlias(dict, (str, LinkParts)),
+)
 
 
 SHAPES: dict[str, Any] = {
-    "bom": Bom | FolderBoms | Witnessed | list[FlatLine],
+    "bom": Bom | FolderBoms | Witnessed | _many(FlatLine),
     "diff": Comparison,
     "bom-diff": BomDiff,
     "where-used": WhereUsed,

@@ -15,18 +15,21 @@ from rich.tree import Tree
 
 from silo.api.activity import ActivityText
 from silo.api.merging import unusual
+from silo.bom.declare import Modelled
 from silo.bom.findings import Finding, Severity
 from silo.bom.model import BomDiff, BomEntry, Extraction
-from silo.bom.naming import display_name
+from silo.bom.naming import Proposal, display_name
 from silo.bom.paths import relative
 from silo.bom.report import base_of, shorten
 from silo.bom_sync import Outcome, Status
+from silo.registration import Registration
 
 _MARK = {
     Severity.ERROR: ("✗", "bold red"),
     Severity.WARNING: ("⚠", "yellow"),
     Severity.INFO: ("·", "dim"),
 }
+_MOST_MODELLED = 40
 # A tree longer than this helps nobody on a terminal; --json has it all.
 _MOST_LINES = 2000
 
@@ -207,3 +210,52 @@ def activity_box(activity: ActivityText) -> Panel:
     if activity.unregistered:
         body.append(f"\n{plain(activity.unregistered)}\n", "yellow").append("[Register Parts...]", "cyan")
     return Panel(body, title="Database Activity", title_align="left", expand=False, padding=(0, 1))
+
+
+# --- registering ----------------------------------------------------------------------------------------
+
+
+def article_json(article: Modelled, base: str) -> Mapping[str, Any]:
+    """What is modelled in the file and not counted."""
+    return {
+        "doc_path": relative(article.entry.doc_path, base),
+        "objects": list(article.objects),
+        "label": article.entry.label,
+        "quantity": article.entry.quantity,
+        "alike": article.alike,
+        "source": relative(article.source, base),
+    }
+
+
+def articles_text(articles: Sequence[Modelled], base: str) -> list[str]:
+    """The section of what is modelled in the file, line by line."""
+    lines = ["Modelled in this file, not counted:"]
+    for one in articles[:_MOST_MODELLED]:
+        copies = f", {len(one.objects)} copies of one {one.alike}" if len(one.objects) > 1 else ""
+        source = f", imported from {plain(relative(one.source, base))}" if one.source else ""
+        label = plain(one.entry.label)
+        lines.append(f"  {one.entry.quantity} × {label} ({one.entry.object_name}{copies}{source})")
+    if len(articles) > _MOST_MODELLED:
+        lines.append(f"  and {len(articles) - _MOST_MODELLED} more; --json has them all")
+    lines.append("Declare what is a part: silo-mod register TOP.FCStd --yes --declare OBJECT")
+    return lines
+
+
+def proposal_json(
+    proposal: Proposal, base: str, result: Registration | None = None, note: str = ""
+) -> Mapping[str, Any]:
+    row: dict[str, Any] = {
+        "doc_path": relative(proposal.entry.doc_path, base),
+        "object": proposal.entry.object_name,
+        "standard": proposal.entry.standard,
+        "name": proposal.name,
+        "item_type": proposal.item_type,
+        "category": proposal.category,
+        "guess": proposal.is_guess,
+        "note": note,
+    }
+    if result is not None and result.error is None:
+        row |= {"part_number": result.part_number, "silo_uuid": result.item_id, "found": result.found}
+    if result is not None and result.error is not None:
+        row |= {"error": {"code": result.error.code, "message": str(result.error)}}
+    return row

@@ -308,7 +308,11 @@ def _with_look_alikes(
     if not first:
         return list(rest)
     with ThreadPoolExecutor(_AT_ONCE, "silo-look-alikes") as pool:
-        return [*pool.map(one, first), *rest]
+        looked = []
+        for candidate in pool.map(one, first):
+            looked.append(candidate)
+            control.progress(candidate.proposal.name, len(looked) / len(first))
+    return [*looked, *rest]
 
 
 def _look_alikes(candidate: Candidate, api: Any, own: str) -> tuple[Similar, ...]:

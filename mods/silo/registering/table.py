@@ -51,7 +51,7 @@ def doubts(candidate: Candidate, earlier: Iterable[Candidate] = ()) -> list[str]
         else f"Silo has {one.part_number} with the same name"
         for one in candidate.similar
     ]
-    if candidate.sha256:
+    if candidate.twins:
         for one in earlier:
             if one.sha256 == candidate.sha256 and one.entry.doc_path != candidate.entry.doc_path:
                 told.append(f"the same content as {one.proposal.name}")

@@ -18,7 +18,7 @@ from silo.api.wire import MergeEntry, MergeRequest
 from silo.bom.model import BomEntry, Extraction
 from silo.cli.common import read_assembly
 from silo.cli.main import main
-from silo.cli.register import proposals_for, register_all
+from silo.registering.on_disk import proposals_for, register_all
 from silo.workbench.commit.snapshot import Snapshot
 from silo.workbench.preview.rows import Kind, Preview, Row, ask, rows, summary, to_sync
 from silo.workbench.session.jobs import Control

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""Registering the components of files that no FreeCAD has open: from the command line, and by the demo."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from silo.bom.errors import DocumentError
+from silo.bom.findings import Finding
+from silo.bom.model import BomEntry, Extraction
+from silo.bom.naming import Proposal, propose_all
+from silo.bom_sync import resolve
+from silo.fcstd import check_stampable, stamp
+from silo.open_in_freecad import open_in_any
+from silo.registering.offer import Candidate, Control, Seen, State
+from silo.registering.orders import Order, carry_out
+from silo.registration import Journal, Registration, component_key, document_uid, unclear
+
+if TYPE_CHECKING:
+    from silo.api.client import SiloClient
+    from silo.vault.plan import Plan
+    from silo.vault.reading import Reading
+
+Ask = Callable[[Proposal, Sequence[Mapping[str, Any]]], Mapping[str, Any] | None]
+OPEN = (
+    "it is open in FreeCAD, and saving it there would undo the registration. Close it there, or register it "
+    "from there (Silo, Register Parts), then run this again; --even-if-open registers it all the same"
+)
+
+
+class _Nobody:
+    """Nobody looks on."""
+
+    def progress(self, detail: str = "", fraction: float | None = None) -> None:
+        return
+
+    def check(self) -> None:
+        return
+
+
+_NOBODY = _Nobody()
+
+
+def whole_folder(
+    plan: Plan, reading: Reading, base: str, *, hardware: bool = True
+) -> tuple[Extraction, frozenset[str]]:
+    """All components of a folder's assemblies, and the files that no assembly uses."""
+    from silo.vault.reading import Question
+
+    entries: dict[tuple[str, str], BomEntry] = {}
+    findings: list[Finding] = []
+    for node in (node for layer in plan.layers for node in layer):
+        found = plan.extraction(node, reading)
+        findings += found.findings
+        for entry in (*found.entries, found.assembly):
+            entries.setdefault(entry.key, replace(entry, children=()))
+    used = {path for path, _ in entries}
+    alone = [top for top in plan.tops if os.path.realpath(top) not in used and top not in plan.errors]
+    for answer in reading.ask_many(Question(top, None, hardware) for top in alone):
+        if isinstance(part := answer.found, Extraction):
+            head = part.assembly
+            entries.setdefault(head.key, replace(head, children=(), is_assembly=False))
+    unused = frozenset(path for path, _ in entries) - used
+    head = BomEntry(base, object_name="", is_assembly=True, level=0)
+    return Extraction(head, tuple(entries.values()), tuple(dict.fromkeys(findings))), unused
+
+
+def seen_on_disk(paths: Iterable[str], *, even_if_open: bool) -> dict[str, Seen]:
+    """How the files of components stand."""
+    return {path: Seen(_state(path, even_if_open)) for path in paths}
+
+
+def _state(path: str, even_if_open: bool) -> State:
+    if not os.path.isfile(path):
+        return State.MISSING
+    if not os.access(path, os.W_OK):
+        return State.READ_ONLY
+    return State.ELSEWHERE if not even_if_open and open_in_any().has_file(path) else State.READY
+
+
+def is_own(candidate: Candidate) -> bool:
+    """True where the look-alike is its own item, made by a run that was interrupted or undone."""
+    record = Journal().find(component_key(candidate.entry))
+    if record is None:
+        return False
+    return not record.finished or record.document_uid == document_uid(candidate.entry)
+
+
+def carry_out_on_disk(
+    orders: Sequence[Order],
+    client: SiloClient,
+    *,
+    schema: str,
+    ask: Ask = unclear,
+    even_if_open: bool = True,
+    done: list[Registration] | None = None,
+    control: Control = _NOBODY,
+) -> list[Registration]:
+    """Register, with the identities written into the files; ``done`` grows with each.
+
+    even_if_open
+        also files that a running FreeCAD has open; else they are left alone, and are an error.
+    """
+    results: list[Registration] = [] if done is None else done
+
+    def places(candidate: Candidate) -> list[tuple[str | None, str | None]]:
+        """(the object that the identity is for, the object that gets the property), each once."""
+        if candidate.article is not None:
+            return [(name, name) for name in candidate.article.objects]
+        name = candidate.entry.object_name
+        return [(name if candidate.shares_file else None, name or None)]
+
+    def write(candidate: Candidate, identity: str) -> None:
+        for own, item in places(candidate):
+            again = bool(candidate.same_as)
+            stamp(candidate.entry.doc_path, identity, object_name=own, item_object=item, replace=again)
+
+    def check(candidate: Candidate) -> None:
+        # Looked at anew for each file: people open files while a long run is under way.
+        if not even_if_open and open_in_any().has_file(candidate.entry.doc_path):
+            raise DocumentError(candidate.entry.doc_path, OPEN)
+        for own, item in places(candidate):
+            again = bool(candidate.same_as)
+            check_stampable(candidate.entry.doc_path, object_name=own, item_object=item, replace=again)
+
+    carry_out(
+        orders,
+        client,
+        Journal(),
+        write,
+        schema=schema,
+        control=control,
+        done=lambda _order, result: results.append(result),
+        check=check,
+        ask=lambda _order, proposal, items: ask(proposal, items),
+    )
+    return results
+
+
+def proposals_for(extraction: Extraction, client: SiloClient, schema: str) -> list[Proposal]:
+    """What to register: the components without an item, parts first, and the assembly itself last."""
+    wanted = resolve(extraction, client).unregistered
+    tree = (extraction.assembly, *extraction.entries)
+    return propose_all(wanted, tree, client.categories(schema)) if wanted else []
+
+
+def register_all(
+    proposals: Sequence[Proposal], client: SiloClient, *, schema: str, **more: Any
+) -> list[Registration]:
+    """Register these as they were proposed (:func:`carry_out_on_disk`)."""
+    orders = [Order.of(Candidate(one, State.READY)) for one in proposals]
+    return carry_out_on_disk(orders, client, schema=schema, **more)
