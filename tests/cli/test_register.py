@@ -294,10 +294,9 @@ def test_what_was_done_before_ctrl_c_is_known(gearbox: Path) -> None:
     """Its number is in the list that the report is made of, and in its file."""
     silo, done = Interrupted(), []
     extraction = read_assembly(str(gearbox))
+    proposals = proposals_for(extraction, silo, "kindred-rd")
+    orders = [Order.of(Candidate(one, State.READY)) for one in proposals]
     with pytest.raises(KeyboardInterrupt):
-        orders = [
-            Order.of(Candidate(one, State.READY)) for one in proposals_for(extraction, silo, "kindred-rd")
-        ]
         carry_out_on_disk(orders, silo, schema="kindred-rd", done=done)
     (first,) = done
     assert open_document(first.proposal.entry.doc_path).Meta["SiloUUID"] == first.item_id
