@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import tempfile
 import warnings
 from contextlib import suppress
 from typing import Any
@@ -37,9 +38,11 @@ CHECKS = (
 SKIPPED = {("GET", "/api/events")}
 EXAMPLES = 8
 
-SCHEMA = schemathesis.openapi.from_dict(
-    create_app(Settings(database_url="sqlite:///only-for-its-document.db")).openapi()
-)
+# A server makes its database's file, also where only its document is wanted.
+with tempfile.TemporaryDirectory() as _folder:
+    SCHEMA = schemathesis.openapi.from_dict(
+        create_app(Settings(database_url=f"sqlite:///{_folder}/silo.db")).openapi()
+    )
 OPERATIONS = {
     f"{operation.method.upper()} {operation.path}": operation
     for operation in (result.ok() for result in SCHEMA.get_all_operations())
