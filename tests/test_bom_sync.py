@@ -182,7 +182,7 @@ def test_unregistered_components_are_left_out_and_reported() -> None:
     assert "mount" in told[0].message
 
 
-def test_a_dry_run_tells_and_sends_nothing() -> None:
+def test_a_dry_run_reports_and_sends_nothing() -> None:
     """The preview has the same plan that a sync would carry out."""
     silo = silo_of("top", "bolt", "gearbox", "gear")
     outcome = bom_sync.sync(bom_sync.resolve(tree(), silo), silo, sync_id="s", dry_run=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""One path per file, on disks of both kinds: those that tell spellings apart, and those that do not."""
+"""One path per file, on disks of both kinds: those that distinguish spellings, and those that do not."""
 
 from __future__ import annotations
 

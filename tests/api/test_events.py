@@ -99,7 +99,7 @@ def test_events_come_and_the_connection_is_reported(
     )
 
 
-def test_after_a_loss_it_goes_on_where_it_stopped(
+def test_after_a_loss_it_continues_where_it_stopped(
     server: Any, client: SiloClient, stream: Callable[..., Any], answer: Any
 ) -> None:
     """Cut off, refused twice, then replayed from the mark: nothing lost, nothing twice."""
@@ -120,7 +120,7 @@ def test_after_a_loss_it_goes_on_where_it_stopped(
 def test_a_server_that_counts_anew_gives_a_reset_first(
     server: Any, client: SiloClient, stream: Callable[..., Any]
 ) -> None:
-    """What happened around its restart was never replayed: read again, then go on from the new count."""
+    """What happened around its restart was never replayed: read again, then continue from the new count."""
     server.on(EVENTS, stream(frame(500)), stream(frame(3), frame(4)), stream(stay=True))
     with Watch(client) as watch:
         said = [watch.event() for _ in range(4)]

@@ -70,7 +70,7 @@ def test_only_foreign_errors_are_translated() -> None:
         raise AttributeError("a mistake of ours")
 
 
-def test_a_wrapper_tells_its_reason() -> None:
+def test_a_wrapper_says_its_reason() -> None:
     """ "Max retries exceeded" is only the outside of it."""
     refused = urllib3.exceptions.NewConnectionError(None, "x")  # type: ignore[arg-type]
     outside = requests.exceptions.ConnectionError(

@@ -69,7 +69,7 @@ def test_one_refused_line_does_not_hold_up_the_others(old: Any, client: SiloClie
     assert f"PUT {BOM}/F01-0002" in old.paths()
 
 
-def test_what_breaks_off_is_an_error_and_goes_on_later(old: Any, client: SiloClient, answer: Any) -> None:
+def test_what_breaks_off_is_an_error_and_continues_later(old: Any, client: SiloClient, answer: Any) -> None:
     """The next run plans from the lines as they are then."""
     old.scripts[f"PUT {BOM}/F01-0002"].clear()
     old.on(f"PUT {BOM}/F01-0002", answer(drop=True))

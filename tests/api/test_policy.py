@@ -66,7 +66,7 @@ def test_every_error_has_its_verdict(kind: type[SiloError]) -> None:
 
 
 @pytest.mark.parametrize("kind", ["UnreachableError", "ServerFaultError", "WebPageError"])
-def test_a_plain_question_tells_one_entry_from_all(kind: str) -> None:
+def test_a_plain_question_distinguishes_one_entry_from_all(kind: str) -> None:
     """A 500, a cut answer or a proxy's page for one item: where the server answers, the others pass."""
     error = WebPageError("x") if kind == "WebPageError" else getattr(errors, kind)("x")
 

@@ -81,7 +81,9 @@ def test_a_revision_without_a_file_is_none_of_ours() -> None:
         ("a.kc", rev(2, file_size=123), {"r2": b"packed anew"}),
     ],
 )
-def test_where_nothing_tells_a_person_looks(name: str, revision: Revision, content: dict[str, bytes]) -> None:
+def test_where_nothing_decides_a_person_looks(
+    name: str, revision: Revision, content: dict[str, bytes]
+) -> None:
     """The file cannot be read, or the server packs it anew."""
     sent = SentFile(name, SENT.sha256, SENT.size, 1)
     with pytest.raises(MayHaveArrivedError, match="revision 2") as caught:

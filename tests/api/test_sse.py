@@ -99,7 +99,7 @@ def test_half_an_event_at_the_end_is_dropped() -> None:
 
 
 def test_a_bare_mark_moves_on_without_an_event() -> None:
-    """A server may say from where to go on."""
+    """A server may say from where to continue."""
     parser = SseParser()
     assert parser.feed(b": connected\nid: 41\nretry: 2000\n\n") == []
     assert parser.last_event_id == "41"

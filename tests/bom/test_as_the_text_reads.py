@@ -137,7 +137,7 @@ def test_anything_with_a_number_and_a_quantity_can_be_compared() -> None:
         assert diff_bom([local], remote).unchanged == [{"part_number": "A", "quantity": 4}]
 
 
-def test_a_diff_tells_what_it_leaves_to_people() -> None:
+def test_a_diff_reports_what_it_leaves_to_people() -> None:
     """A manual line of another quantity is a conflict finding, not a change; gone lines are one finding."""
     remote = [
         {"child_part_number": "A", "quantity": 6, "source": "manual"},

@@ -48,7 +48,7 @@ def test_copies_of_one_shape_or_one_label_are_one_article() -> None:
     [("M3x8001", "M3x8"), ("608ZZ", "608ZZ"), ("Body001", ""), ("ISO 4762", "ISO 4762"), ("Body", "")],
 )
 def test_the_stem_of_a_label(label: str, stem: str) -> None:
-    """Without the number by which FreeCAD tells copies apart."""
+    """Without the number by which FreeCAD distinguishes copies."""
     assert label_stem(label, {"M3x8", "Body", label}) == stem
 
 

@@ -56,7 +56,7 @@ def test_a_document_without_properties_or_meta() -> None:
 
 
 def test_a_document_with_plain_attributes() -> None:
-    """Without ``getPropertyByName``, the attribute tells."""
+    """Without ``getPropertyByName``, the attribute decides."""
 
     class PlainDocument:
         FileName = "/v/p.FCStd"

@@ -69,7 +69,7 @@ def test_a_link_into_its_own_file_is_construction_geometry() -> None:
 
 
 def test_one_document_by_two_objects_is_still_one_document() -> None:
-    """A reader may make several objects of one file; their path tells."""
+    """A reader may make several objects of one file; their path decides."""
     asm_doc, other_view = Doc("/v/top.FCStd"), Doc("/v/top.FCStd")
     found = extract(asm_doc.assembly(asm_doc.link("L1", other_view.body())))
     assert found.entries == ()

@@ -141,7 +141,7 @@ def test_the_summary_reads_as_the_specs_event() -> None:
     assert summary(plan.diff) == "BOM updated: 1 added, 1 quantity changed, 1 unreferenced"
 
 
-def test_the_summary_tells_conflicts_where_there_are_any() -> None:
+def test_the_summary_reports_conflicts_where_there_are_any() -> None:
     """Something for a person is never left out."""
     plan = plan_merge([want("P", 1)], [line("P", 7, "manual")])
     assert summary(plan.diff).endswith("0 unreferenced, 1 in conflict")

@@ -65,7 +65,7 @@ def test_an_element_of_an_array_of_a_link_array(top: Doc, lib: Doc, bolt: Any) -
     assert end(top.link("L", (top.array("Arr", lib.array("Inner", bolt, 3), 5), "1."))) == (bolt, 3)
 
 
-def test_only_the_named_element_of_an_array_tells_of_mirroring(top: Doc, bolt: Any) -> None:
+def test_only_the_named_element_of_an_array_reports_mirroring(top: Doc, bolt: Any) -> None:
     """One of two elements is mirrored; a link to the other is not."""
     array = top.array("Arr", bolt, 2, ScaleList=[(1.0, 1.0, 1.0), (-1.0, 1.0, 1.0)])
     assert [resolve_target(top.link(f"L{n}", (array, f"{n}."))).mirrored for n in (0, 1)] == [False, True]
@@ -99,7 +99,7 @@ def test_a_path_through_several_containers(top: Doc, lib: Doc) -> None:
 
 
 def test_a_path_through_links(top: Doc, lib: Doc, bolt: Any) -> None:
-    """A step may be a link to another file; the way goes on in its target."""
+    """A step may be a link to another file; the way continues in its target."""
     sub = Doc("/v/sub.FCStd")
     part = sub.part("Sub", sub.link("B", bolt))
     outer = lib.part("Part", lib.link("S", part))

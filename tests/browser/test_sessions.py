@@ -69,7 +69,7 @@ def test_what_was_typed_survives_the_login(api: Api, visit: Visit, user: str, sc
 
 
 def test_a_decision_survives_a_login_by_link(api: Api, visit: Visit) -> None:
-    """Who has no password logs in by a link in another tab, and goes on in the first."""
+    """Who has no password logs in by a link in another tab, and continues in the first."""
     parent, *gone = api.items(3)
     api.merge(parent, dict.fromkeys(gone, 1))
     api.merge(parent, {})

@@ -69,7 +69,7 @@ def serving(
 
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
-def test_it_tells_its_address_at_once_and_ends_cleanly(tmp_path: Path, how: signal.Signals) -> None:
+def test_it_says_its_address_at_once_and_ends_cleanly(tmp_path: Path, how: signal.Signals) -> None:
     """Also while somebody listens to its events; stopping a server is no failure."""
     with serving(tmp_path / "silo.db") as server:
         assert isinstance(server, Served)

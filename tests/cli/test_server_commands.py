@@ -18,7 +18,7 @@ from silo.api.config import config_path
 NOWHERE = "http://127.0.0.1:9"
 
 
-def test_register_tells_machines_what_became_of_each(run: Any, silo: Any, gearbox: Path) -> None:
+def test_register_reports_to_programs_what_became_of_each(run: Any, silo: Any, gearbox: Path) -> None:
     """Parts before assemblies, the top last; each with number, identity, type and category."""
     ran = run("register", gearbox, "--yes", "--json")
     assert ran.code == 0

@@ -226,7 +226,7 @@ def test_an_unknown_name_is_reported_the_same(api: Api, user: str) -> None:
     assert (known.status, known.body) == (unknown.status, unknown.body)
 
 
-def test_the_audit_list_tells_and_has_no_secrets(api: Api, user: str) -> None:
+def test_the_audit_list_says_all_and_has_no_secrets(api: Api, user: str) -> None:
     """Who did what to whom; newest first, in pages."""
     token = api.good("POST", "/api/auth/tokens", {"name": "audited"})["token"]
     entries = api.get("/api/admin/audit?limit=2")
@@ -241,7 +241,7 @@ def test_the_audit_list_tells_and_has_no_secrets(api: Api, user: str) -> None:
 
 
 def test_read_only_mode(strict: RunningServer) -> None:
-    """503 for every change, reading goes on, the mode is reported and announced; then all is as before."""
+    """503 for every change, reading continues, the mode is reported and announced; then all is as before."""
     with Api(strict.base_url, "silo_strict") as api:
         parent, child = api.items(2)
         api.merge(parent, {child: 1})

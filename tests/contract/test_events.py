@@ -174,7 +174,7 @@ def test_a_revoked_token_ends_its_stream(quick: RunningServer) -> None:
 
 
 def test_ids_survive_a_restart(kind: str, databases: Databases, tmp_path: Path) -> None:
-    """The log is in the database: ids go on, and a client replays across the restart."""
+    """The log is in the database: ids continue, and a client replays across the restart."""
     url = databases.new(kind)
     with (
         running_server(url, token="silo_quick", files_dir=tmp_path) as first,

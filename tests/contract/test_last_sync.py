@@ -92,7 +92,7 @@ def test_a_refused_merge_is_remembered_until_the_next_good_one(api: Api) -> None
 
 
 def test_a_dry_run_is_not_remembered(api: Api) -> None:
-    """It tells what it would leave out and changes nothing."""
+    """It reports what it would leave out and changes nothing."""
     (parent,) = api.items(1)
     assert merge(api, parent, [], left_out=[MISSING], dry_run=True)["left_out"] == [MISSING]
     assert last_sync(api, parent)["at"] is None

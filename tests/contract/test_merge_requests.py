@@ -21,7 +21,7 @@ def test_the_same_request_twice_gives_the_same_state(api: Api) -> None:
 
 
 def test_a_sync_id_gives_the_same_answer_again(api: Api) -> None:
-    """Idempotent by ``sync_id``: the first answer again, byte by byte, though the BOM went on since."""
+    """Idempotent by ``sync_id``: the first answer again, byte by byte, though the BOM changed since."""
     parent, a, b = api.items(3)
     body = merge_body({a: 1}, sync_id="sync-1")
     first = api.call("POST", bom(parent, "merge"), body)

@@ -196,7 +196,7 @@ def test_decisions_that_do_not_fit_are_reported_together_and_change_nothing(
     assert b in api.lines(parent)
 
 
-def test_history_tells_who_when_and_what(api: Api) -> None:
+def test_history_says_who_when_and_what(api: Api) -> None:
     """Every merge and every edit is a change with its lines before and after."""
     parent, a, b = api.items(3)
     api.merge(parent, {a: 1, b: 1})

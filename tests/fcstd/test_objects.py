@@ -268,7 +268,7 @@ def test_the_table_of_types_has_one_root() -> None:
 
 @pytest.mark.usefixtures("needs_symlinks")
 def test_the_same_file_is_the_same_document(tmp_path: Path) -> None:
-    """One file, one document object, whatever the path; so ``is`` tells parts apart."""
+    """One file, one document object, whatever the path; so ``is`` distinguishes parts."""
     part().save(tmp_path / "lib" / "part.FCStd")
     (tmp_path / "alias").symlink_to("lib")
     (tmp_path / "alias.FCStd").symlink_to("lib/part.FCStd")

@@ -147,7 +147,9 @@ def test_loose_parts_can_be_given_a_link(assemble: Fixture, compute: Fixture, co
     assert codes(report) == []
 
 
-def test_map_claims_in_order_and_tells_overlaps(assemble: Fixture, compute: Fixture, codes: Fixture) -> None:
+def test_map_claims_in_order_and_reports_overlaps(
+    assemble: Fixture, compute: Fixture, codes: Fixture
+) -> None:
     """The first link has it; the second is reported; a pattern without effect as well."""
     asm = assemble(("base/a", PART), ("arm/b", PART))
     links = link_map({"links": {"base": ["base", "arm/b"], "arm": ["arm/**", "wrist"], "empty": ["nothing"]}})

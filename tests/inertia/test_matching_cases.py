@@ -52,7 +52,7 @@ def test_case_24_duplicates_kept_apart_by_mass(assemble: Fixture, compute: Fixtu
 def test_case_25_undecidable_duplicates_are_ambiguous(
     assemble: Fixture, compute: Fixture, codes: Fixture
 ) -> None:
-    """Nothing tells them apart: in order of appearance, and both parts carry the warning."""
+    """Nothing distinguishes them: in order of appearance, and both parts carry the warning."""
     a, b = cube("Part 1", 0.01, key="a"), cube("Part 1", 0.02, key="b")
     report = compute(
         assemble(("l/a", a), ("l/b", b)), HEAD + "1,1,,,0.1000 kg,Part 1\n2,1,,,0.2000 kg,Part 1\n"

@@ -178,7 +178,7 @@ def test_the_bom_of_a_file_that_a_colleague_went_on_from_is_not_sent(vault: Vaul
     def hook(called: str) -> None:
         if called == "merge_bom":
             vault.silo.before = lambda _name: None
-            theirs(vault, b"went on", 2)
+            theirs(vault, b"went further", 2)
 
     vault.silo.before = hook
     vault.send()

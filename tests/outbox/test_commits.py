@@ -279,9 +279,9 @@ def test_a_file_of_another_name_is_not_sent_unasked(vault: Vault) -> None:
     vault.commit(vault.snapshot())
     vault.send()
     renamed(vault, b"a longer one")
-    vault.commit(vault.snapshot(), content=b"the original goes on")
+    vault.commit(vault.snapshot(), content=b"the original continues")
     vault.send(force=True)
-    assert vault.files() == [b"top file", b"the original goes on"]
+    assert vault.files() == [b"top file", b"the original continues"]
     (waiting,) = vault.waiting()
     assert waiting.state is State.HELD
     for word in ("TopLong.FCStd", vault.number, "whose file in Silo is Top.FCStd", "Same part", "Discard"):

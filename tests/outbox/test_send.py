@@ -388,7 +388,7 @@ def test_a_retry_after_mending_goes_through(outbox: Outbox, silo: FakeSilo) -> N
 
 
 def test_pauses_grow_and_keep_the_order(outbox: Outbox, silo: FakeSilo, clock: Clock) -> None:
-    """The second commit of an assembly waits for the first; others go on."""
+    """The second commit of an assembly waits for the first; others continue."""
     outbox.put(silo.base_url, TOP, bom=bom(1))
     outbox.put(silo.base_url, TOP, bom=bom(2))
     outbox.put(silo.base_url, OTHER, bom=bom(9))

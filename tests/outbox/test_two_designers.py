@@ -266,7 +266,7 @@ def test_no_edit_is_lost_without_a_choice(client: Client, block: int, tmp_path: 
         world.check()
         revisions += len(client.revisions(world.number))
         asked += len(world.chosen)
-    # The runs are no idle ones: people committed, were asked, and went on top of a colleague's revision.
+    # The runs are no idle ones: people committed, were asked, and committed on top of a colleague's revision.
     assert revisions > len(seeds)
     if LONG:
         assert asked > 1

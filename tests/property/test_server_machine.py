@@ -70,7 +70,7 @@ class Silo(RuleBasedStateMachine):
             return action(tx)
 
     def changed(self, before: Model) -> None:
-        """The model went on: count the version where a line changed, keep the snapshot."""
+        """The model changed: count the version where a line changed, keep the snapshot."""
         self.version += before != self.model
         with self.db.read() as tx:
             newest = history.list_changes(tx, get_item(tx, self.parent), 1)

@@ -143,7 +143,7 @@ def test_a_restore_into_a_running_server_resets_its_listeners(url: str, tmp_path
 
 
 def test_a_backup_while_many_write_is_one_moment(url: str, tmp_path: Path) -> None:
-    """Merges that change two BOMs' lines and uploads go on; in the backup all adds up."""
+    """Merges that change two BOMs' lines and uploads continue; in the backup all adds up."""
     settings = Settings(database_url=url, files_dir=tmp_path / "files")
     ending = threading.Event()
     with (

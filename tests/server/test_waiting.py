@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""While one waits, the others go on: foreign locks, locked rows, a frozen PostgreSQL, a database put back."""
+"""While one waits, the others continue: foreign locks, locked rows, a frozen PostgreSQL, another database."""
 
 from __future__ import annotations
 

@@ -361,7 +361,7 @@ def _processes(folder: Path, index: Path, count: int) -> Iterator[subprocess.Pop
 
 
 def test_two_processes_at_once_and_somebody_who_works(vault: Path, tmp_path: Path) -> None:
-    """Both end well, and the index tells the truth afterwards."""
+    """Both end well, and the index is true afterwards."""
     index = tmp_path / "index"
     running = list(_processes(vault, index, 2))
     number = 0

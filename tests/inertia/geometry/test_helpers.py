@@ -240,7 +240,7 @@ def test_nobody_waits_for_a_helper_that_is_not_ready() -> None:
 
 
 def test_an_error_here_ends_everything(helpers: Helpers) -> None:
-    """A cancelled reading does not go on."""
+    """A cancelled reading does not continue."""
 
     def done(number: int, total: int) -> None:
         raise KeyboardInterrupt
@@ -279,7 +279,7 @@ time.sleep(600)
             return
         threading.Event().wait(0.02)
     os.kill(pid, signal.SIGKILL)
-    raise AssertionError("the helper goes on alone")
+    raise AssertionError("the helper continues alone")
 
 
 def test_how_many_help() -> None:

@@ -55,7 +55,7 @@ def _box(watch: EditWatch) -> Owner:
 
 def Document() -> Owner:
     doc = Owner("Doc")
-    # An object of a document has no such thing, which tells the two apart.
+    # An object of a document has no such thing, which distinguishes the two.
     doc.objects["Box"] = Owner("Box", {"Length": 1.0}, doc)
     doc.Document = doc
     return doc

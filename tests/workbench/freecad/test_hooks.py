@@ -126,7 +126,7 @@ def test_a_save_counts_for_documents_of_silo(fork: Fork) -> None:
 
 
 def test_a_saved_copy_is_no_commit(fork: Fork) -> None:
-    """FreeCAD tells the same, with another file's name."""
+    """FreeCAD reports the same, with another file's name."""
     fork.save("Top", "/backup/Top.FCStd")
     assert fork.run() == []
 
@@ -172,7 +172,7 @@ def test_an_origin_that_comes_with_a_later_document_is_found(fork: Fork) -> None
 
 
 def test_an_origin_that_takes_no_attributes_is_left_alone(fork: Fork) -> None:
-    """One of C++; its command tells."""
+    """One of C++; its command shows it."""
 
     class Fixed:
         __slots__ = ()

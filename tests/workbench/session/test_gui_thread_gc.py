@@ -95,7 +95,7 @@ def test_who_switched_it_off_finds_it_off() -> None:
 
 
 def test_what_is_due_is_collected_in_the_gui_thread() -> None:
-    """Long work tells its progress there, so that garbage does not pile up meanwhile."""
+    """Long work reports its progress there, so that garbage does not pile up meanwhile."""
     ended: list[threading.Thread] = []
     with collection_off():
         Window(ended)

@@ -61,7 +61,7 @@ def joined_arrays(bodies: list[tuple[str, float, np.ndarray]]) -> list[tuple[flo
 def test_every_way_of_placing_is_as_freecad_places_it(version: str, tmp_path: Path, read_in: Any) -> None:
     """Links, chains, arrays, groups, mirrors, scales, sub-objects, sub-assemblies, rigid and flexible.
 
-    Built by FreeCAD, which also tells volume and centre of each leaf in the assembly's axes; ours are the
+    Built by FreeCAD, which also says volume and centre of each leaf in the assembly's axes; ours are the
     same to what its own integration and its rebuilt scaled shapes allow.
     """
     freecad = need(version)

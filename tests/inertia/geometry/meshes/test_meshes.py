@@ -243,7 +243,7 @@ def test_components_are_what_shares_no_vertex() -> None:
     assert len(components(three, most=2)) == 1
 
 
-def test_the_winding_number_tells_inside_from_outside() -> None:
+def test_the_winding_number_distinguishes_inside_from_outside() -> None:
     """1 inside, 0 outside, -1 inside of an inverted mesh."""
     body, turned = mesh_of(brick()), mesh_of(inside_out(brick()))
     assert winding_number(body, np.array([1.0, 2.0, 3.0])) == pytest.approx(1)
