@@ -131,3 +131,17 @@ def test_a_file_named_in_several_ways_is_one(tmp_path: Path, monkeypatch: pytest
         "v",
     ]
     assert documents_in(ways) == ["v/A.FCStd"]
+
+
+@pytest.mark.parametrize(
+    "words", ["watch --count", "log a.FCStd --limit", "pull A01-0001 --revision", "bom a --jobs"]
+)
+@pytest.mark.parametrize("count", ["0", "-1", "1,000", "1e3", "", "9" * 5000])
+def test_a_count_is_a_number_above_zero(
+    run: Any, capsys: pytest.CaptureFixture[str], words: str, count: str
+) -> None:
+    """Nothing is done, and the sentence names the option."""
+    with pytest.raises(SystemExit) as ended:
+        run(*words.split(), count)
+    assert ended.value.code == Exit.BAD_INPUT
+    assert f"argument {words.split()[-1]}" in capsys.readouterr().err

@@ -97,8 +97,13 @@ def a_path(text: str) -> Path:
 
 def job_count(text: str) -> int:
     """How many processes, as an argument."""
-    if not text.isascii() or not text.isdigit() or not 1 <= int(text) <= 512:
-        raise argparse.ArgumentTypeError(f"{text!r} is no number from 1 to 512")
+    return above_zero(text, most=512)
+
+
+def above_zero(text: str, most: int = 1_000_000_000) -> int:
+    """A count as an argument: a whole number, not 0 and not less."""
+    if not text.isascii() or not text.isdigit() or not 1 <= int(text[:20]) <= most:
+        raise argparse.ArgumentTypeError(f"{text[:50]!r} is no number from 1 to {most}")
     return int(text)
 
 

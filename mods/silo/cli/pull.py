@@ -30,7 +30,7 @@ def register(commands: Commands) -> None:
     parser.add_argument(
         "--revision",
         metavar="N",
-        type=int,
+        type=common.above_zero,
         help="this revision, with the linked files as they were then; else the newest of all",
     )
     parser.add_argument("--into", metavar="FOLDER", default=".", help="the project's folder (else this one)")
@@ -55,7 +55,9 @@ def register(commands: Commands) -> None:
         "silo-mod log TopAssembly.FCStd --bom",
     )
     log.add_argument("file", metavar="FILE", help="a FreeCAD file that is registered")
-    log.add_argument("--limit", metavar="N", type=int, default=20, help="the newest N revisions (20)")
+    log.add_argument(
+        "--limit", metavar="N", type=common.above_zero, default=20, help="the newest N revisions (20)"
+    )
     log.add_argument("--bom", action="store_true", help="what each revision changed in the BOM")
     common.add_server_options(log)
     common.add_json_option(log)
@@ -137,7 +139,7 @@ def run_log(args: argparse.Namespace) -> int:
         if item is None:
             raise InputError(f"{args.file}: this server has no item {identity}; is it the right server?")
         known = client.revisions(item.part_number)
-        shown = known[: max(args.limit, 1)]
+        shown = known[: args.limit]
         here = _here(Store(), sha256_of(path), identity, client.base_url, known)
         changes: dict[int, str] = {}
         if args.bom:

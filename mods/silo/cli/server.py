@@ -170,7 +170,7 @@ def _add_watch(commands: Commands) -> None:
         "silo-mod watch --item A01-0001",
     )
     parser.add_argument("--item", metavar="PART_NUMBER", help="only events of this item")
-    parser.add_argument("--count", type=int, metavar="N", help="end after N events")
+    parser.add_argument("--count", type=common.above_zero, metavar="N", help="end after N events")
     common.add_json_option(parser)
     common.add_server_options(parser)
     parser.set_defaults(run=run_watch, ends_with_its_reader=True)
