@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
 from typing import Any
 
 from inside import QtCore, QtGui, QtWidgets, tell, wait
@@ -26,6 +27,8 @@ def in_themes(one: Any) -> None:
     for name, sheet in (("light", before), ("dark", DARK), ("light again", before)):
         app.setStyleSheet(sheet)
         still()
+        # The boxes are made anew, which takes its time on a busy machine.
+        wait(lambda: any(widget.text().startswith("BOM Updated") for widget, _ in whole(one.dock)))
         tell(**{name: contrasts(one.dock)})
 
 
@@ -41,15 +44,19 @@ def contrasts(dock: Any) -> dict[str, float]:
     picture = dock.grab().toImage().convertToFormat(QtGui.QImage.Format.Format_RGB32)
     # FreeCAD 0.20 draws with as many pixels as the screen's resolution asks for.
     ratio = picture.width() / dock.width()
-    found: dict[str, float] = {}
+    return {
+        widget.text(): round(contrast(picture.copy(scaled(area, ratio))), 2) for widget, area in whole(dock)
+    }
+
+
+def whole(dock: Any) -> Iterator[tuple[Any, Any]]:
+    """Each text that is not scrolled out of sight, not even in part, and where in the dock it is."""
     for kind in (QtWidgets.QLabel, QtWidgets.QPushButton):
         for widget in dock.widget().findChildren(kind):
             area = QtCore.QRect(widget.mapTo(dock, QtCore.QPoint(0, 0)), widget.size())
-            # What is scrolled out in part shows something else.
-            whole = widget.visibleRegion().boundingRect() == widget.rect()
-            if widget.text() and whole and dock.rect().contains(area):
-                found[widget.text()] = round(contrast(picture.copy(scaled(area, ratio))), 2)
-    return found
+            is_whole = widget.visibleRegion().boundingRect() == widget.rect()
+            if widget.text() and is_whole and dock.rect().contains(area):
+                yield widget, area
 
 
 def scaled(area: Any, ratio: float) -> Any:
