@@ -37,6 +37,16 @@ def test_content_is_found_by_its_hash(tmp_path: Path) -> None:
         store.path_of("0" * 64)
 
 
+def test_content_that_somebody_reads_is_kept_again(tmp_path: Path) -> None:
+    """A download is under way; Windows then replaces no file, and need not: it is the same one."""
+    store = FileStore(tmp_path / "files")
+    first = store.keep("a.FCStd", io.BytesIO(b"content"))
+    with store.path_of(first.checksum).open("rb") as reading:
+        assert store.keep("b.FCStd", io.BytesIO(b"content")).checksum == first.checksum
+        assert reading.read() == b"content"
+    assert len([path for path in store.root.rglob("*") if path.is_file()]) == 1
+
+
 def test_an_upload_that_breaks_off_leaves_nothing(tmp_path: Path) -> None:
     """The reader fails in the middle: no half file."""
 
