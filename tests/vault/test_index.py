@@ -283,6 +283,35 @@ def test_facts_in_place_of_a_file_change_nothing(vault: Path, tmp_path: Path) ->
                 database.execute("DELETE FROM answers")
 
 
+def test_facts_of_another_state_of_a_file_are_not_mixed_with_it(vault: Path, tmp_path: Path) -> None:
+    """A file that is saved between the two steps of a run: what its facts do not say is not taken from it."""
+    odd_target().save(vault / "odd.FCStd")
+    facts = Session().read(Question(str(vault / "odd.FCStd"))).facts
+    doc = Doc("top").add("App::Part", "A", Group=locals_("Known", "Unknown"))
+    doc.link("Known", "odd.FCStd", "Body").link("Unknown", "odd.FCStd", "More29").save(vault / "top.FCStd")
+    part("odd", name="More29", uuid="new").save(vault / "odd.FCStd")
+    known = Session().ask(Question(str(vault / "top.FCStd")), lambda path: facts if "odd" in path else "")
+    plain = json.loads(known.answer)
+    assert [row["silo_uuid"] for row in plain["table"] if row["object_name"] == "Body"] == ["body"]
+    assert "being written just now" in plain["findings"][0]["message"]
+    assert plain["findings"][0]["severity"] == "error"
+    with Index(tmp_path / "index") as memory:
+        memory.remember(str(vault / "top.FCStd"), "question", known)
+    with Index(tmp_path / "index") as memory:
+        assert memory.recall(str(vault / "top.FCStd"), "question") is None, "the next run finds out anew"
+
+
+def test_facts_that_somebody_changed_in_the_index_are_not_there(vault: Path, tmp_path: Path) -> None:
+    """Each row has a checksum; what fails it is read from the file."""
+    index = tmp_path / "index"
+    indexed(vault, index)
+    with sqlite3.connect(index) as database:
+        done = database.execute("UPDATE facts SET facts = replace(facts, 'ua', 'ub')")
+        assert done.rowcount >= 2
+        database.execute("DELETE FROM answers")
+    assert indexed(vault, index)[0] == truth(vault)
+
+
 def test_only_what_changed_is_read_again(vault: Path, tmp_path: Path) -> None:
     """Of what an assembly links to the facts are known from before."""
     index = tmp_path / "index"

@@ -26,7 +26,7 @@ from silo.fcstd.properties import to_keep
 from silo.fcstd.values import Ref
 from silo.fcstd.xmltext import Shared, XmlText
 
-# Which objects of a file its facts tell of: what may be a component, and lies in nothing else.
+# Which objects of a file its facts describe: what may be a component, but no features of a body.
 _TARGETS = frozenset(Kind) - {Kind.NOTHING, Kind.FOLDER, Kind.LINK, Kind.ASSEMBLY_LINK, Kind.ELEMENT}
 _TARGETS_AT_MOST = 24
 
@@ -118,7 +118,7 @@ def facts_of(document: FcstdDocument) -> str:
         return ""
     try:
         survey = document.survey
-        targets = survey.of(_TARGETS, survey.grouped(_TARGETS))[:_TARGETS_AT_MOST]
+        targets = survey.of(_TARGETS, survey.grouped({Kind.LOCAL}))[:_TARGETS_AT_MOST]
         objects = {obj.Name: (obj.TypeId, *to_keep(obj.properties)) for obj, _ in targets}
         facts = Facts(
             content.digest,
