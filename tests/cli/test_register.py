@@ -181,6 +181,7 @@ def test_all_problems_of_a_table_are_reported_at_once(
     rows[1]["category"] = "F99"
     rows[2]["type"] = "screw"
     rows[3]["name"] = " "
+    rows[8]["name"] = "two\nlines"
     rows[4]["part_number"] = "M01-4711"
     rows[5]["file"] = "elsewhere.FCStd"
     rows.append(dict(rows[6]))
@@ -196,7 +197,8 @@ def test_all_problems_of_a_table_are_reported_at_once(
         assert word in done.err
     assert "line 9: " in done.err
     assert "has changed since" in done.err
-    assert "line 11: " in done.err
+    assert "one line of at most 200 characters" in done.err
+    assert "line 12: " in done.err
     assert silo.client.search_items() == []
 
 

@@ -49,3 +49,21 @@ def test_one_press_registers_the_screws(run: Any, silo: Any, engine: Path) -> No
         "failed": [],
         "unregistered": [],
     }
+
+
+def test_a_table_with_standard_parts_can_be_applied_twice(
+    run: Any, silo: Any, engine: Path, tmp_path: Path
+) -> None:
+    """They have a row by their designation, which is their name; the second time there is nothing to do."""
+    table = tmp_path / "plan.csv"
+    assert run("register", engine, "--plan", table).code == 0
+    text = table.read_text("utf-8-sig")
+    assert f",{SCREW},{SCREW},part," in text
+    table.write_text(text.replace(f",{SCREW},{SCREW},", f",{SCREW},A screw,"), "utf-8")
+    refused = run("register", engine, "--apply", table)
+    assert (refused.code, "called by its designation" in refused.err) == (2, True)
+    table.write_text(text, "utf-8")
+    assert run("register", engine, "--apply", table).code == 0
+    count = len(silo.client.search_items())
+    again = run("register", engine, "--apply", table)
+    assert (again.code, f"{count} of the table's components" in again.out) == (0, True)

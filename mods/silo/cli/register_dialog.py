@@ -119,7 +119,7 @@ class Dialog:
     def _changed(self, order: Order, what: str, text: str) -> Order:
         """The order with what was said; as it was where that is not possible, which is explained."""
         if what == "name":
-            if problem := wrong_name(text):
+            if problem := wrong_name(text, order.candidate):
                 _say(f"  {problem}")
                 return order
             return replace(order, name=text)

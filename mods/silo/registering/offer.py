@@ -131,7 +131,7 @@ class Offer:
     numbers
         category → the number that its next item would get.
     registered
-        key of a component → the number that it has.
+        key of a component (of a standard part: "" and its designation) → the number that it has.
     """
 
     candidates: tuple[Candidate, ...]
@@ -197,7 +197,7 @@ def offer(
     control.check()
     looked = _with_look_alikes(candidates, api, control, begun or {}, most)
     registered = {
-        entry.key: numbers[entry.silo_uuid.lower()]
+        (("", entry.standard) if entry.standard else entry.key): numbers[entry.silo_uuid.lower()]
         for entry in walk_entries(tree)
         if entry.silo_uuid and entry.silo_uuid.lower() in numbers
     }

@@ -16,7 +16,6 @@ from typing import Any
 
 from silo.bom.errors import InputError, NotFoundError
 from silo.bom.headers import plain_cell, safe_cell
-from silo.bom.naming import clean_name
 from silo.bom.paths import relative
 from silo.registering.offer import ITEM_TYPES, Candidate, Offer, Similar, State, fingerprint
 from silo.registering.orders import Order
@@ -188,8 +187,9 @@ def orders_of(rows: Sequence[Row], offer: Offer, base: str, api: Any, name: str)
             orders.append(_order(row, candidate, offer, api, told))
         elif candidate is None and row.key in registered and wanted:
             done += 1
-        elif candidate is None and wanted and not row.cells["standard"]:
-            told.append(f"{row.cells['file']}#{row.cells['object']} is no component here")
+        elif candidate is None and wanted:
+            what = row.cells["standard"] or f"{row.cells['file']}#{row.cells['object']}"
+            told.append(f"{what} is no component here")
         problems += [f"line {row.line}: {words}" for words in told]
     if problems:
         raise InputError(f"{name}: nothing was registered, for not all of it can be", problems)
@@ -205,7 +205,7 @@ def orders_of(rows: Sequence[Row], offer: Offer, base: str, api: Any, name: str)
 def _order(row: Row, candidate: Candidate, offer: Offer, api: Any, told: list[str]) -> Order | None:
     cells = row.cells
     before = len(told)
-    told += filter(None, [wrong_name(cells["name"])])
+    told += filter(None, [wrong_name(cells["name"], candidate)])
     if cells["type"] not in ITEM_TYPES:
         told.append(f"type: wanted {', '.join(ITEM_TYPES)}; got {cells['type']!r}")
     if cells["category"] not in offer.categories:
@@ -230,16 +230,18 @@ def _changed(before: str, candidate: Candidate) -> bool:
     return known and before != fingerprint(candidate.entry.doc_path)
 
 
-def wrong_name(name: str) -> str:
+def wrong_name(name: str, candidate: Candidate) -> str:
     """What is wrong with an item's name; "" where nothing is."""
     if not name:
         return "name: it is empty"
+    if candidate.entry.standard and name != candidate.entry.standard:
+        return f"name: a standard part is called by its designation, {candidate.entry.standard}"
     try:
         name.encode("utf-8")
     except UnicodeEncodeError:
         return f"name: {name!r} is no UTF-8; save the table as CSV (UTF-8)"
-    if len(name) > 200 or not clean_name(name):
-        return f"name: wanted at most 200 characters that can be seen, got {len(name)}"
+    if len(name) > 200 or not name.isprintable():
+        return f"name: wanted one line of at most 200 characters that can be seen, got {name[:50]!r}"
     return ""
 
 
