@@ -239,6 +239,14 @@ def test_nobody_waits_for_a_helper_that_is_not_ready() -> None:
     assert found == [0, 1, 2]
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is limited by other means, or not at all")
+def test_a_helper_has_a_share_of_the_memory(helpers: Helpers) -> None:
+    """So that all of them together keep to the limit of the reading."""
+    import resource
+
+    assert helpers.begin(resource.getrlimit, resource.RLIMIT_AS)()[0] == 4000 * 1024**2
+
+
 def test_an_error_here_ends_everything(helpers: Helpers) -> None:
     """A cancelled reading does not continue."""
 

@@ -10,17 +10,21 @@ from typing import Any
 import numpy as np
 import pytest
 from OCP.BRep import BRep_Builder
+from OCP.BRepAdaptor import BRepAdaptor_Curve2d
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakeWire
 from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder
 from OCP.BRepTools import BRepTools
-from OCP.gp import gp_Ax2, gp_Dir, gp_Pln, gp_Pnt, gp_Trsf
+from OCP.Geom2d import Geom2d_BezierCurve
+from OCP.Geom2dConvert import Geom2dConvert
+from OCP.gp import gp_Ax2, gp_Dir, gp_Pln, gp_Pnt, gp_Pnt2d, gp_Trsf
 from OCP.TopoDS import TopoDS_Compound, TopoDS_Shell, TopoDS_Solid
 
 from silo.bom.errors import DocumentError
 from silo.inertia.core import place
 from silo.inertia.geometry.graph import Child, Node
 from silo.inertia.geometry.kernel import occt
+from silo.inertia.geometry.kernel.closure import beside_edges
 from silo.inertia.geometry.step.read import lost_stretches
 from silo.inertia.geometry.step.xcaf import StepFile
 from silo.inertia.model import GeometryCode
@@ -320,3 +324,25 @@ def test_a_face_beside_its_own_edges_is_doubted(
     assert path.read_text() != text
     (part,) = read_in(path).prototypes.values()
     assert [p.code for p in part.problems] == ([code] if code else [])
+
+
+@pytest.mark.parametrize(("aside", "doubt"), [(0.0, 0.0), (1.0, 0.0075)])
+def test_points_that_lag_behind_along_an_edge_open_no_gap(aside: float, doubt: float, box: Any) -> None:
+    """An edge of 10 mm that runs at another pace in its face, 1.5 mm apart for equal t; or beside it."""
+    array = pytest.importorskip("OCP.collections")
+    (solid,) = occt.solids_of(box(10, 10, 10))
+    face = occt.faces_of(solid)[0]
+    edge = occt.edges_of(face)[0]
+    flat = BRepAdaptor_Curve2d(edge, face)
+    span = (flat.FirstParameter(), flat.LastParameter())
+    begin, end = (np.array([p.X(), p.Y()]) for p in map(flat.Value, span))
+    across = np.array([begin[1] - end[1], end[0] - begin[0]]) / 10
+    poles, knots = array.Array1_gp_Pnt2d(1, 3), array.Array1_double(1, 2)
+    for number, pole in enumerate((begin, begin + 0.2 * (end - begin) + aside * across, end), start=1):
+        poles.SetValue(number, gp_Pnt2d(*pole.tolist()))
+    for number, knot in enumerate(span, start=1):
+        knots.SetValue(number, knot)
+    spline = Geom2dConvert.CurveToBSplineCurve_s(Geom2d_BezierCurve(poles))
+    spline.SetKnots(knots)
+    BRep_Builder().UpdateEdge(edge, spline, face, 2.0)
+    assert beside_edges(solid, 1000.0) == pytest.approx(doubt, rel=0.2)

@@ -10,7 +10,7 @@ from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Curve2d, BRepAdaptor_Surface
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeSolid, BRepBuilderAPI_Sewing
 from OCP.BRepGProp import BRepGProp, BRepGProp_Domain, BRepGProp_Face, BRepGProp_Vinert
-from OCP.gp import gp_Pnt
+from OCP.gp import gp_Pnt, gp_Vec
 from OCP.GProp import GProp_GProps
 from OCP.ShapeAnalysis import ShapeAnalysis_Shell
 from OCP.Standard import Standard_Failure
@@ -67,19 +67,26 @@ def beside_edges(solid: Any, volume: float) -> float:
 
 
 def _gap_and_length(edge: Any, face: Any) -> tuple[float, float]:
-    """Mean distance [mm] of an edge's curve in space from its curve in the face, and its rough length."""
+    """Mean distance [mm] of an edge's curve in the face from its curve in space, and its rough length.
+
+    Distance across the curve: points that lag behind along it open no gap.
+    """
     if BRep_Tool.Degenerated_s(edge):
         return 0.0, 0.0
-    surface, flat, curve = (
-        BRepAdaptor_Surface(face, False),
-        BRepAdaptor_Curve2d(edge, face),
-        BRepAdaptor_Curve(edge),
-    )
-    ends = np.linspace(curve.FirstParameter(), curve.LastParameter(), 9).tolist()
-    there = np.array([xyz(curve.Value(t)) for t in ends])
-    here = np.array([xyz(surface.Value(uv.X(), uv.Y())) for uv in map(flat.Value, ends)])
-    length = np.linalg.norm(np.diff(there, axis=0), axis=1).sum()
-    return float(np.linalg.norm(there - here, axis=1).mean()), float(length)
+    try:
+        surface, flat = BRepAdaptor_Surface(face, False), BRepAdaptor_Curve2d(edge, face)
+        curve = BRepAdaptor_Curve(edge)
+    except (Standard_Failure, RuntimeError):  # a curve of it is missing, and the kernel's check says so
+        return 0.0, 0.0
+    rows = []
+    for t in np.linspace(curve.FirstParameter(), curve.LastParameter(), 9).tolist():
+        point, slope, uv = gp_Pnt(), gp_Vec(), flat.Value(t)
+        curve.D1(t, point, slope)
+        rows.append((xyz(point), xyz(slope), xyz(surface.Value(uv.X(), uv.Y()))))
+    there, slopes, here = np.array(rows).swapaxes(0, 1)
+    along = slopes / np.maximum(np.linalg.norm(slopes, axis=1, keepdims=True), 1e-300)
+    gaps = np.linalg.norm(np.cross(here - there, along), axis=1)
+    return float(gaps.mean()), float(np.linalg.norm(np.diff(there, axis=0), axis=1).sum())
 
 
 def closed_shells(shapes: list[Any]) -> list[Any]:
