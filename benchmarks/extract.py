@@ -9,6 +9,9 @@ tests' own writer. Two kinds of parts: one box (6 kB of XML, the least there is)
 turn, so that none runs in another's warm memory; the time is taken inside, after the imports. Shown are
 medians.
 
+With the kind ``screws`` the top holds as many standard parts as the others hold links, of 50 designations,
+and no part file is there: what a fastener costs, against a link.
+
 bom        open the top file, choose the assembly, walk it: counts, identities, findings
 null       unpack every Document.xml involved with zipfile, and let expat parse it with no handler at all
 freecad    openDocument and the same walk, inside freecadcmd (its start-up not counted)
@@ -92,7 +95,7 @@ import FreeCAD
 folder, kind, parts, links = json.loads(os.environ["SILO_ARGS"])
 os.makedirs(folder + "/parts")
 made = []
-for number in range(parts):
+for number in range(0 if kind == "screws" else parts):
     if kind == "box" or number == 0:
         document = FreeCAD.newDocument(f"part{number}")
         if kind == "box":
@@ -108,15 +111,27 @@ for number in range(parts):
     document.saveAs(f"{folder}/parts/part{number:03d}.FCStd")
     if kind == "box":
         made.append(part)
-if kind != "box":
+if kind == "body":
     FreeCAD.closeDocument(document.Name)
     made = [FreeCAD.openDocument(f"{folder}/parts/part{n:03d}.FCStd").getObject("Body") for n in range(parts)]
 top = FreeCAD.newDocument("top")
 top.saveAs(folder + "/top.FCStd")
 assembly = top.addObject("App::Part", "Assembly")
 for number in range(links):
-    link = top.addObject("App::Link", f"Link{number:04d}")
-    link.LinkedObject = made[number % parts]
+    if kind == "screws":
+        link = top.addObject("Part::FeaturePython", f"Screw{number:04d}")
+        lengths = list(map(str, range(6, 56)))
+        for name, values in (("Type", ["ISO4762"]), ("Diameter", ["M4"]), ("Length", lengths)):
+            link.addProperty("App::PropertyEnumeration", name)
+            setattr(link, name, values)
+        link.Length = str(6 + number % 50)
+        for name in ("Thread", "LeftHanded", "MatchOuter", "Invert"):
+            link.addProperty("App::PropertyBool", name)
+        for name in ("Offset", "LengthCustom"):
+            link.addProperty("App::PropertyLength", name)
+    else:
+        link = top.addObject("App::Link", f"Link{number:04d}")
+        link.LinkedObject = made[number % parts]
     assembly.addObject(link)
 top.recompute()
 top.save()
@@ -148,6 +163,14 @@ def build(folder: Path, kind: str, parts: int, links: int) -> str:
     sys.path.insert(0, str(ROOT / "tests" / "support"))
     from fcstd_writer import Doc, locals_, part
 
+    if kind == "screws":
+        top = Doc("top")
+        names = [f"Screw{number:04d}" for number in range(links)]
+        for number, screw in enumerate(names):
+            made = {"Type": "ISO4762", "Diameter": "M4", "Length": str(6 + number % 50)}
+            top.add("Part::FeaturePython", screw, Thread=False, LeftHanded=False, Invert=False, **made)
+        top.add("App::Part", "Assembly", Group=locals_(*names)).save(folder / "top.FCStd")
+        return "the tests' writer"
     name = "Box" if kind == "box" else "Body"
     for number in range(parts):
         doc = part(name=name, uuid=f"00000000-0000-4000-8000-{number:012d}")
@@ -239,14 +262,21 @@ def main() -> None:
     parser.add_argument("--links", type=int, default=1000)
     parser.add_argument("--parts", type=int, default=200)
     parser.add_argument("--repeats", type=int, default=7)
-    parser.add_argument("--kinds", nargs="+", default=["box", "body"], choices=["box", "body"])
+    parser.add_argument(
+        "--kinds", nargs="+", default=["box", "body", "screws"], choices=["box", "body", "screws"]
+    )
     parser.add_argument("--data", type=Path, help="keep the data there, and use it again")
     args = parser.parse_args()
+    first: dict[str, float] = {}
     with tempfile.TemporaryDirectory() as temporary:
         for kind in args.kinds:
             folder = (args.data or Path(temporary)) / f"{kind}-{args.parts}-{args.links}"
             writer = "an earlier run" if folder.exists() else build(folder, kind, args.parts, args.links)
-            show(kind, writer, measure(folder / "top.FCStd", args.repeats))
+            found = measure(folder / "top.FCStd", args.repeats)
+            show(kind, writer, found)
+            first[kind] = found["bom"]["first"]
+    if {"box", "screws"} <= first.keys():
+        print(f"\na standard part costs {first['screws'] / first['box']:.2f} of a link to a part file")
 
 
 if __name__ == "__main__":

@@ -125,3 +125,30 @@ def test_an_instance_of_an_instance_is_compared_with_the_copies_it_shows(scene: 
     assert extract(scene.top.assembly(scene.top.assembly_link("I", middle, copies))).findings_of(
         FindingCode.STALE_ASSEMBLY_LINK
     )
+
+
+def test_two_equal_arrays_are_two(scene: Scene) -> None:
+    """Each copy stands for one of them; a single copy lacks the other."""
+    sub, top = Doc("/v/rows.FCStd"), Doc("/v/top.FCStd")
+    asm = sub.assembly(sub.array("One", scene.bolt, 4), sub.array("Two", scene.bolt, 4))
+    copies = [top.array(name, scene.bolt, 4) for name in ("C1", "C2")]
+    both = extract(top.assembly(top.assembly_link("Instance", asm, copies)))
+    assert both.findings_of(FindingCode.STALE_ASSEMBLY_LINK) == ()
+    one = extract(top.assembly(top.assembly_link("Half", asm, copies[:1]), name="Other"))
+    assert one.findings_of(FindingCode.STALE_ASSEMBLY_LINK)
+
+
+def test_an_array_by_way_of_another_link_is_known_by_its_part(scene: Scene) -> None:
+    """FreeCAD 1.1 copies it as an array of the part at the end of the chain."""
+    sub, top = Doc("/v/rows.FCStd"), Doc("/v/top.FCStd")
+    between = Doc("/v/between.FCStd").link("Between", scene.bolt)
+    asm = sub.assembly(sub.array("Row", between, 4))
+    found = extract(top.assembly(top.assembly_link("Instance", asm, [top.array("C", scene.bolt, 4)])))
+    assert found.findings_of(FindingCode.STALE_ASSEMBLY_LINK) == ()
+
+
+def test_an_old_copy_of_a_sub_assembly_is_no_part_of_ones_own(scene: Scene) -> None:
+    """What it stands for has left the assembly; it is reported, not counted."""
+    gone = scene.sub.assembly_link("Gone", Doc("/v/deep.FCStd").assembly())
+    (finding,) = scene.stale([*scene.copies(), scene.copy("Old", gone)])
+    assert "no longer there: Old" in finding.message

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from silo.bom import choose_assembly, extract
 from silo.bom.findings import FindingCode
 from silo.bom.model import Extraction
-from silo.bom.walk.standard import standard_uuid
+from silo.bom.walk.standard import designated, standard_uuid
 
 M4 = "ISO 4762 M4×16"
 
@@ -131,3 +131,28 @@ def test_an_array_that_a_cut_consumes_is_no_pieces_to_buy(operand: str) -> None:
     other = "Base" if operand == "Tool" else "Tool"
     cut = top.add("Part::Cut", "Cut", **{operand: array, other: top.body("Plate")})
     assert articles(extract(top.assembly(array, cut, top.screw("Bought")))) == {M4: 1}
+
+
+def test_a_boolean_in_a_body_consumes_what_it_holds() -> None:
+    """It lies in the Body, which keeps its features to itself; the screw lies in the assembly."""
+    top = Doc("/v/top.FCStd")
+    screw = top.screw("S")
+    boolean = top.add("PartDesign::Boolean", "Boolean", Group=[screw])
+    body = top.body("Plate", Group=[boolean])
+    assert articles(extract(top.assembly(body, screw, top.screw("Bought")))) == {M4: 1}
+
+
+def test_fragments_consume_their_objects() -> None:
+    """As Part's tools of Python make them: fragments, slices."""
+    top = Doc("/v/top.FCStd")
+    screw = top.screw("S")
+    made = {"Objects": [screw, top.body("Plate")], "Mode": "Standard", "Tolerance": 0.0}
+    fragments = top.add("Part::FeaturePython", "Fragments", **made)
+    assert articles(extract(top.assembly(screw, fragments, top.screw("Bought")))) == {M4: 1}
+
+
+def test_a_thread_of_one_start_is_an_ordinary_one() -> None:
+    """Rods have the property whether they have several starts or one."""
+    rod = {"Diameter": "M8", "Length": 100.0, "Pitch": 1.25}
+    assert designated("ThreadedRod", {**rod, "NumStarts": 1}) == designated("ThreadedRod", rod)
+    assert designated("ThreadedRod", {**rod, "NumStarts": 2}).endswith(" 2 starts")

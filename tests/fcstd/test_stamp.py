@@ -19,9 +19,8 @@ from silo.bom.errors import DocumentError
 from silo.bom.identity import identity_of
 from silo.fcstd import check_stampable, open_document, stamp
 from silo.fcstd.container import ContainerFile, FileState
-from silo.fcstd.edit import replace_file
+from silo.fcstd.edit import replace_file, replaced_entry
 from silo.fcstd.limits import Limits
-from silo.fcstd.rewrite import replaced_entry
 from silo.fcstd.stamp import _read_back
 from silo.platform import sync_folder
 

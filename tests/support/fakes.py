@@ -58,6 +58,7 @@ PARENT = {
     "Part::MultiFuse": "Part::Feature",
     "Part::Part2DObject": "Part::Feature",
     "PartDesign::Body": "Part::Feature",
+    "PartDesign::Boolean": "PartDesign::Feature",
     "PartDesign::CoordinateSystem": "Part::Datum",
     "PartDesign::Feature": "Part::Feature",
     "PartDesign::FeaturePython": "PartDesign::Feature",

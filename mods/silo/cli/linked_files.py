@@ -132,7 +132,7 @@ def _add_relink(commands: Commands) -> None:
 
 def run_relink(args: argparse.Namespace) -> int:
     """Mend the links; 2 where no link records OLD, or NEW does not hold what they want."""
-    from silo.fcstd.relink import Relinked, relink
+    from silo.fcstd.linked import Relinked, relink
 
     folder = os.path.dirname(os.path.realpath(args.top))
     paths = _documents(args.top)

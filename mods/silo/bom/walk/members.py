@@ -3,20 +3,64 @@
 
 Every object of the tree counts once, however many lists name it. What a link group, an array or a compound
 shows is counted through that; what lies in something suppressed or excluded is left out with it.
+
+The way to what is being read may lead back into itself, or not end (:class:`Way`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Set
-from typing import Any
+from collections.abc import Callable, Set
+from typing import Any, TypeVar
 
 from silo.bom.document import object_name
+from silo.bom.errors import DocumentError
 from silo.bom.identity import identity_of, own_identity
 from silo.bom.walk.arrays import elements, left_out_by
 from silo.bom.walk.counts import Key, KeyOf, Leaves, Member
 from silo.bom.walk.kinds import COMPONENTS, INLINE, REPEATERS, Kind, flattened, kind_of, sources
 from silo.bom.walk.notes import Notes
-from silo.bom.walk.way import Way
+
+T = TypeVar("T")
+
+# Groups that link to groups: a file does not need many of these, an attack does.
+_MAX_NESTING = 32
+
+
+class Way:
+    """What was entered and not yet left, the assembly first.
+
+    rings
+        the ways that led back into themselves: what lies on each.
+    damaged
+        True where an object on the way could not be read.
+    """
+
+    def __init__(self, notes: Notes) -> None:
+        self._notes = notes
+        self.open: dict[Key, Any] = {}
+        self.rings: list[dict[Key, Any]] = []
+        self.damaged = False
+
+    def guarded(self, key: Key, obj: Any, look: Callable[[], dict[Key, T]]) -> dict[Key, T] | None:
+        """Look at what an object shows, unless that leads back to where it came from."""
+        if key in self.open:
+            ring = list(self.open)[list(self.open).index(key) :]
+            self.rings.append({one: self.open[one] for one in ring})
+            return None
+        if len(self.open) > _MAX_NESTING:
+            self._notes.too_deep(obj, _MAX_NESTING)
+            return None
+        self.open[key] = obj
+        try:
+            return look()
+        except DocumentError as error:
+            # One damaged object must not hide the others; the finding blocks the BOM all the same.
+            self.damaged = True
+            self._notes.unreadable(obj, error)
+            return {}
+        finally:
+            del self.open[key]
+
 
 _COUNTABLE = COMPONENTS | REPEATERS | {Kind.ELEMENT, Kind.STANDARD}
 # What may have an identity of its own and is a component then.

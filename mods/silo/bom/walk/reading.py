@@ -27,10 +27,9 @@ from silo.bom.walk.consumed import consumed
 from silo.bom.walk.copies import own_parts, stale_copies
 from silo.bom.walk.counts import Contents, Count, Key, Leaves, Lost, Worth, add
 from silo.bom.walk.kinds import COMPONENTS, INLINE, REPEATERS, Kind, kind_of, sources
-from silo.bom.walk.members import DECLARABLE, Members
+from silo.bom.walk.members import DECLARABLE, Members, Way
 from silo.bom.walk.standard import STANDARD_PARTS
 from silo.bom.walk.targets import Target, is_assembly_link, is_link
-from silo.bom.walk.way import Way
 
 if TYPE_CHECKING:
     from silo.bom.walk.contents import Reader

@@ -248,11 +248,6 @@ def add_document_observer(observer: Any) -> None:
     FreeCAD.addDocumentObserver(observer)
 
 
-def remove_document_observer(observer: Any) -> None:
-    """Tell it no more."""
-    FreeCAD.removeDocumentObserver(observer)
-
-
 # --- the window ------------------------------------------------------------------------------------------
 
 

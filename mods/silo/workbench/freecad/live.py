@@ -212,11 +212,6 @@ class LinkInspector:
         return LinkProblem(FindingCode.BROKEN_LINK, file, name, "FreeCAD did not load it")
 
 
-def live_problem(link: Any) -> LinkProblem | None:
-    """Why a live link has no target; None where that is not known, or where it has one."""
-    return LinkInspector()(link)
-
-
 class _Owner:
     """The document that holds a link, as far as the reader of files needs it."""
 
