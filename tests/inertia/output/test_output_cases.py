@@ -127,7 +127,8 @@ def _read_sdf(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], dict[
     """Debian's libsdformat, the format's own reader, behind a small program; skipped, loudly, without it."""
     folder = tmp_path_factory.mktemp("sdf")
     flags: list[str] = []
-    for package in ("sdformat12", "sdformat13", "sdformat14", "sdformat"):
+    packages = ("sdformat12", "sdformat13", "sdformat14", "sdformat") if shutil.which("pkg-config") else ()
+    for package in packages:
         found = subprocess.run(["pkg-config", "--cflags", "--libs", package], capture_output=True, text=True)
         if found.returncode == 0:
             flags = found.stdout.split()
