@@ -27,6 +27,7 @@ from silo.registering.offer import Candidate, Offer, Similar, State
 from silo.registering.on_disk import carry_out_on_disk, proposals_for
 from silo.registering.orders import Order
 from silo.registering.table import ITEM_TYPES, read_table
+from silo.registration import Journal, component_key
 from silo.testing import FakeSilo
 
 CATEGORIES = {"A01": "Assembly", "F01": "Fastener, screw", "M01": "Machined part", "M06": "Machined frame"}
@@ -38,7 +39,7 @@ def candidate(name: str = "Bracket", **more: Any) -> Candidate:
 
 
 def talk(
-    *candidates: Candidate, answers: Iterable[str], own: bool = False
+    *candidates: Candidate, answers: Iterable[str | None], own: bool = False
 ) -> tuple[list[Any], list[str], str]:
     """Orders as (name, type, category, joined), the names left out, and what was asked."""
     silo = FakeSilo()
@@ -46,9 +47,9 @@ def talk(
     queue = iter(answers)
 
     found = Offer(candidates, CATEGORIES)
-    orders, left = Dialog(candidates, found, silo, "/v", lambda _one: own, lambda _: next(queue, None)).ask()
+    orders, left = Dialog(candidates, found, silo, "/v", lambda _one: own, lambda _: next(queue)).ask()
     rows = [(o.name, o.item_type, o.category, o.existing and o.existing.part_number) for o in orders]
-    assert next(queue, None) is None, "an answer was not asked for"
+    assert not list(queue), "an answer was not asked for"
     return rows, [one.proposal.name for one in left]
 
 
@@ -94,10 +95,14 @@ def test_a_probable_duplicate_is_not_taken_by_enter() -> None:
     assert talk(*copies, answers=["all", "n"])[1] == ["B"]
 
 
+def test_a_copy_that_stays_the_same_part_is_not_left_without_a_number() -> None:
+    """It has the number of the file that it was copied from."""
+    assert talk(candidate(same_as="M01-0001"), answers=["n"]) == ([], [])
+
+
 @pytest.mark.parametrize("end", ["q", "quit", None])
 def test_quitting_leaves_out_the_rest(end: str | None) -> None:
-    answers = ["y"] if end is None else ["y", end]
-    rows, left = talk(candidate("A"), candidate("B"), candidate("C"), answers=answers)
+    rows, left = talk(candidate("A"), candidate("B"), candidate("C"), answers=["y", end])
     assert ([row[0] for row in rows], left) == (["A"], ["B", "C"])
 
 
@@ -363,6 +368,16 @@ def test_a_lost_identity_comes_back_without_a_question(run: Any, silo: Any, gear
     done = run("register", gearbox, "--yes", "--json").json()
     assert ([row["found"] for row in done["registered"]], done["unregistered"]) == ([True], [])
     assert len(silo.client.search_items()) == 9
+
+
+def test_an_interrupted_registration_goes_on_without_a_question(run: Any, silo: Any, tmp_path: Path) -> None:
+    """Killed between the item and the file: the item of the same name is its own, no duplicate."""
+    path = part("Bracket", "Body").save(tmp_path / "Bracket.FCStd")
+    entry = read_assembly(str(path)).assembly
+    intent, _ = Journal().begin(component_key(entry), silo.client.base_url)
+    made = silo.client.create_item("kindred-rd", "M01", "Bracket", idempotency_key=intent.wanted)
+    (row,) = run("register", path, "--yes", "--json").json()["registered"]
+    assert (row["part_number"], row["found"]) == (made.part_number, True)
 
 
 def test_a_category_that_is_not_there_is_bad_input(run: Any, silo: Any, gearbox: Path) -> None:
