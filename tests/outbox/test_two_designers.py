@@ -269,4 +269,4 @@ def test_no_edit_is_lost_without_a_choice(client: Client, block: int, tmp_path: 
     # The runs are no idle ones: people committed, were asked, and committed on top of a colleague's revision.
     assert revisions > len(seeds)
     if LONG:
-        assert asked > 1
+        assert asked > 0
