@@ -192,6 +192,9 @@ def test_a_rational_spline_is_as_exact_as_the_circle_it_is() -> None:
     poles, weights, knots = quarter_arc()
     both = np.stack([poles, poles + np.array([0, 0, 2])], axis=1)
     side = Nurbs(both, np.stack([weights, weights], axis=1), knots, np.array([0.0, 0, 1, 1]), 2, 1)
+    drawn = Nurbs.drawn((poles, weights, knots, 2), np.array([0.0, 0.0, 2.0]), (0.0, 1.0))
+    u, v = np.linspace(0, 1, 7)[None], np.array([0.3])
+    np.testing.assert_allclose(drawn.at(u, v)[0], side.at(u, v)[0], rtol=1e-14)
 
     def arc(t: np.ndarray) -> np.ndarray:
         points: np.ndarray = side.at(t[:, None], np.zeros(len(t)))[0][:, 0, :2]
