@@ -81,8 +81,14 @@ def test_missing_files_and_folders_are_kept_apart(tmp_path: Path) -> None:
         read(tmp_path / "drawing.dwg")
 
 
-def test_what_the_kernel_complains_of_is_counted(box: Any, step_part: Any) -> None:
-    """An unresolved reference is printed by the kernel to standard output; here it is a problem."""
+def test_what_the_kernel_complains_of_is_counted(
+    box: Any, step_part: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An unresolved reference is printed by the kernel to standard output; here it is a problem.
+
+    Whether or not the user's Python writes its output at once.
+    """
+    monkeypatch.delenv("PYTHONUNBUFFERED", raising=False)
     path = step_part(box(1, 2, 3))
     text = path.read_text("ascii")
     path.write_text(

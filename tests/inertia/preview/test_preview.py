@@ -257,7 +257,8 @@ def test_letters_of_the_world_are_no_boxes() -> None:
 def test_text_that_no_font_has_is_drawn_all_the_same() -> None:
     """Control characters go, the rest is a box; nothing fails."""
     assert inked("a\x00\x1b[31mb") == inked("a[31mb")
-    assert inked("\U00012345") == inked("\U00012346") == inked("□") != inked("")
+    assert inked("\U00012345") == inked("\U00012346") in (inked("□"), inked("?"))
+    assert inked("\U00012345") != inked("")
     assert width_of("line\nbreak", 10) == width_of("line break", 10)
 
 

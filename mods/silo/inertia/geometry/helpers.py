@@ -153,7 +153,7 @@ class _Helper:
 
     def __init__(self, folder: Path, memory_mb: int) -> None:
         self._process = subprocess.Popen(
-            [sys.executable, "-c", _CODE, str(folder), str(memory_mb)],
+            [sys.executable, "-u", "-c", _CODE, str(folder), str(memory_mb)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

@@ -45,7 +45,9 @@ def run(path: Path, options: ReadOptions, result: Path, command: Sequence[str] =
         "processes": options.processes,
         "cpu_s": options.timeout_s,
     }
-    with tempfile.TemporaryFile() as errors, _child(command or [python(), "-c", _WORKER], errors) as process:
+    # -u: what the kernel prints is written at once, and not lost when the child ends itself.
+    command = command or [python(), "-u", "-c", _WORKER]
+    with tempfile.TemporaryFile() as errors, _child(command, errors) as process:
         answer = _talk(process, path, options, task)
         process.wait()
         if answer is None:

@@ -63,9 +63,10 @@ def _points(size: float) -> int:
 
 
 def _runs(text: str, points: int) -> Iterator[tuple[Font, str]]:
-    """Stretches of text that one font has. A letter that none has is shown as a box."""
+    """Stretches of text that one font has. A letter that none has is a box, or "?" without one."""
+    unknown = "□" if _font_for("□") is not None else "?"
     spaced = (" " if c.isspace() else c for c in unicodedata.normalize("NFC", text))
-    letters = (c if _font_for(c) is not None else "□" for c in spaced if c.isprintable())
+    letters = (c if _font_for(c) is not None else unknown for c in spaced if c.isprintable())
     for number, run in groupby(letters, key=_font_for):
         yield _font(number or 0, points), "".join(run)
 
