@@ -10,7 +10,7 @@ out in full could be exponentially larger. What a look-up adds (``also``,
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import MISSING, fields
 from typing import Any
 
 from silo.bom.errors import InputError
@@ -21,6 +21,8 @@ FORMAT = 1
 
 _ELSEWHERE = ("children", "instances", "also", "unregistered")
 _PLAIN_FIELDS = tuple(f.name for f in fields(BomEntry) if f.name not in _ELSEWHERE)
+# What an entry usually says is left out: a vault has tens of thousands of them to read every night.
+_USUAL = {f.name: f.default for f in fields(BomEntry) if f.name in _PLAIN_FIELDS and f.default is not MISSING}
 
 
 def to_plain(extraction: Extraction) -> dict[str, Any]:
@@ -52,6 +54,11 @@ def from_plain(data: Mapping[str, Any]) -> Extraction:
         raise InputError(f"this is no complete BOM snapshot: {error!r}") from error
 
 
+def whole_row(row: Mapping[str, Any]) -> dict[str, Any]:
+    """A row of the table with all its plain fields, also those that are not written."""
+    return {**_USUAL, **row}
+
+
 class _Table:
     """Rows of entries, children before parents."""
 
@@ -63,7 +70,8 @@ class _Table:
         if (number := self._known.get(id(entry))) is not None:
             return number
         children = [self.add(child) for child in entry.children]
-        row = {name: getattr(entry, name) for name in _PLAIN_FIELDS}
+        whole = {name: getattr(entry, name) for name in _PLAIN_FIELDS}
+        row = {name: value for name, value in whole.items() if name not in _USUAL or value != _USUAL[name]}
         self.rows.append({**row, "children": children, "instances": list(entry.instances)})
         self._known[id(entry)] = len(self.rows) - 1
         return len(self.rows) - 1

@@ -17,6 +17,7 @@ from silo.bom.errors import SiloError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.links import MAX_LEVELS
 from silo.bom.model import BomEntry, Extraction
+from silo.bom.snapshot import whole_row
 from silo.bom.walk.rings import Rings
 from silo.bom.walk.standard import standard_uuid
 from silo.fcstd.suggest import with_suggestions
@@ -124,7 +125,7 @@ def make_plan(
         if isinstance(error := _error(answer), SiloError):
             plan.errors[top] = error
             continue
-        head, _ = _rows(answer.plain)
+        head = whole_row(answer.plain["table"][answer.plain["assembly"]])
         plan._files.setdefault(head["doc_path"], top)
         if skip_parts and _is_part(answer.plain):
             plan.parts += 1
@@ -165,7 +166,7 @@ def _error(answer: Answer) -> SiloError | None:
 
 def _rows(plain: Mapping[str, Any]) -> tuple[Mapping[str, Any], list[Mapping[str, Any]]]:
     table = plain["table"]
-    return table[plain["assembly"]], [table[number] for number in plain["entries"]]
+    return whole_row(table[plain["assembly"]]), [whole_row(table[number]) for number in plain["entries"]]
 
 
 def _is_part(plain: Mapping[str, Any]) -> bool:
