@@ -350,12 +350,6 @@ def test_resolve_shows_what_has_no_number_on_every_level(run: Any, silo: Any, ge
     assert all(row["part_number"] and row["name"] for row in flat)
 
 
-def test_mass_does_not_pretend_to_leave_hardware_out(run: Any, gearbox: Path) -> None:
-    """The geometry has all that is there; an option without effect would be a lie."""
-    done = run("mass", gearbox, "--no-hardware")
-    assert (done.code, "--no-hardware" in done.err) == (2, True)
-
-
 @pytest.mark.usefixtures("needs_locks")
 def test_relink_leaves_alone_what_freecad_has_open(
     run: Any, gearbox: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
