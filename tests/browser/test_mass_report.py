@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, Page, expect
-from settled import box_of, picture_of
+from settled import box_of, measured, picture_of
 
 pytest.importorskip("OCP.BRep")
 
@@ -105,9 +105,9 @@ def test_tables_sort_and_filter_and_names_are_text(opened: Callable[..., Page]) 
     expect(page.locator("#warnings")).to_contain_text("<img src=x onerror=alert(1)></script>")
     assert page.locator("#warnings img").count() == 0
     colours = "(({color, backgroundColor}) => [color, backgroundColor])(getComputedStyle(document.body))"
-    light = page.evaluate(colours)
+    light = measured(page, colours)
     page.emulate_media(color_scheme="dark")
-    assert page.evaluate(colours) == ["rgb(230, 237, 243)", "rgb(18, 22, 27)"] != light
+    assert measured(page, colours) == ["rgb(230, 237, 243)", "rgb(18, 22, 27)"] != light
     page.set_viewport_size({"width": 390, "height": 800})
-    assert page.evaluate("document.documentElement.scrollWidth") == 390
+    assert measured(page, "document.documentElement.scrollWidth") == 390
     assert [word for word in page.said if not word.endswith("r.html")] == []

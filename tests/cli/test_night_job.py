@@ -130,6 +130,7 @@ def test_where_the_folder_takes_no_lock_the_report_says_what_that_means(
         assert run("sync", gearbox.parent).code == 2
 
 
+@pytest.mark.usefixtures("needs_symlinks")
 def test_a_lock_that_is_a_link_is_not_followed(tmp_path: Path) -> None:
     """Who may write into the vault must not choose which file of ours is emptied."""
     mine = tmp_path / "mine"

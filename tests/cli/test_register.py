@@ -107,6 +107,7 @@ def test_quitting_leaves_out_the_rest(end: str | None) -> None:
 
 
 @pytest.mark.usefixtures("needs_signals")
+@pytest.mark.usefixtures("needs_pty")
 def test_the_questions_on_a_terminal(silo: Any, gearbox: Path) -> None:
     """As a person meets them: on a terminal, with standard output elsewhere; Ctrl-C leaves all as it was."""
     before = gearbox.read_bytes()

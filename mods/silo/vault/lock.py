@@ -22,7 +22,7 @@ from typing import BinaryIO
 
 from silo.bom.errors import InputError
 from silo.folders import cache_folder
-from silo.platform import hold_lock
+from silo.platform import WINDOWS, hold_lock
 
 NAME = ".silo-sync.lock"
 _TRIES = 5
@@ -59,9 +59,9 @@ def only_job(folder: str) -> Iterator[str]:
         try:
             yield doubt
         finally:
-            if os.name == "posix":
+            if not WINDOWS:
                 path.unlink(missing_ok=True)  # before the lock ends: see _held
-    if os.name != "posix":
+    if WINDOWS:
         with suppress(OSError):
             path.unlink()
 
