@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from silo.bom.errors import InputError
 from silo.files import documents_in
 from silo.freecads import cache_folders, commands, exchange_folder, material_folders
 
@@ -108,7 +109,8 @@ def test_a_pattern_that_the_shell_left_alone_is_taken_here(tmp_path: Path) -> No
     assert documents_in([str(tmp_path / "*.FCStd")]) == names
     # A file whose name looks like a pattern is that file; a pattern that fits nothing is named in the error.
     assert documents_in([names[0]]) == names[:1]
-    assert documents_in([str(tmp_path / "*.stl")]) == [str(tmp_path / "*.stl")]
+    with pytest.raises(InputError, match=r"\*\.stl: there is no such"):
+        documents_in([str(tmp_path / "*.stl")])
 
 
 def test_cache_folders_of_each_platform(tmp_path: Path) -> None:
