@@ -117,14 +117,17 @@ def test_the_questions_on_a_terminal(silo: Any, gearbox: Path) -> None:
     words = [sys.executable, "-m", "silo.cli.main", "register", str(gearbox)]
     with subprocess.Popen(words, stdin=other, stdout=subprocess.PIPE, stderr=other) as job:
         os.close(other)
-        for answer in (b"F99\n", b""):
-            seen = b""
-            while b"/?] " not in seen:
-                seen += os.read(own, 4096)
-            os.write(own, answer)
-        assert b"'F99' is no answer" in seen
-        job.send_signal(signal.SIGINT)
-        assert job.communicate(timeout=60)[0] == b""
+        try:
+            for answer in (b"F99\n", b""):
+                seen = b""
+                while b"/?] " not in seen:
+                    seen += os.read(own, 4096)
+                os.write(own, answer)
+            assert b"'F99' is no answer" in seen
+            job.send_signal(signal.SIGINT)
+            assert job.communicate(timeout=60)[0] == b""
+        finally:
+            job.kill()
     os.close(own)
     assert job.returncode == 130
     assert gearbox.read_bytes() == before

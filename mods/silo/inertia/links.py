@@ -217,7 +217,7 @@ def link_map(data: Any, source: str = "the link map") -> LinkMap:
 
 
 def _link(name: Any, value: Any, problems: list[str]) -> Link:
-    if not isinstance(name, str) or not name.strip():
+    if not isinstance(name, str) or not name:
         problems.append(f"a link's name is a text, got {name!r}")
     given: dict[Any, Any] = value if isinstance(value, dict) else {"parts": value}
     parts = given.get("parts", [])

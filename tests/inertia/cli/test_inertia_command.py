@@ -396,8 +396,6 @@ def test_ctrl_c_is_a_plain_sentence(arm: Path) -> None:
         stdout=subprocess.PIPE,
         stderr=child,
         start_new_session=True,
-        # A shell that runs the tests in the background has it ignored, and children inherit that.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     os.close(child)
     # Its reader is halted early, so that the reading cannot be done before the signal comes.
