@@ -18,7 +18,7 @@ settings.register_profile("unhurried", deadline=None, suppress_health_check=[Hea
 settings.load_profile("unhurried")
 
 
-# A shell that runs the tests in the background ignores Ctrl-C for them, and their programs would inherit that.
+# A shell that runs tests in the background ignores Ctrl-C for them; their programs would inherit that.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 

@@ -123,7 +123,6 @@ def test_register_twice_creates_nothing_twice(run: Any, silo: Any, gearbox: Path
     assert len(silo.client.search_items()) == 9
 
 
-@pytest.mark.usefixtures("needs_locks")
 def test_a_mistake_in_the_sites_rules_is_said(
     run: Any, silo: Any, gearbox: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -138,6 +137,7 @@ def test_a_mistake_in_the_sites_rules_is_said(
     assert run("register", gearbox, "--yes").err == ""
 
 
+@pytest.mark.usefixtures("needs_locks")
 def test_register_leaves_alone_what_freecad_has_open(
     run: Any, silo: Any, gearbox: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -14,6 +14,7 @@ from silo_server.app import create_app
 from silo_server.bootstrap import prepare
 from silo_server.db.engine import Database
 from silo_server.run import RunningServer, running_server
+from silo_server.services.access.accounts import Role, list_users
 from silo_server.settings import Settings
 
 
@@ -118,6 +119,8 @@ def test_the_first_start_makes_an_admin_and_later_ones_do_not(tmp_path: Path) ->
     """A token without SILO_API_TOKEN is new at each start; the admin and the data are the same."""
     db = Database(Settings(database_url=f"sqlite:///{tmp_path / 'x.db'}"))
     first, second = prepare(db), prepare(db)
+    with db.read() as tx:
+        assert [(user.username, user.role) for user in list_users(tx)] == [("admin", Role.ADMIN)]
     db.close()
     assert first.username == second.username == "admin"
     assert first.token != second.token

@@ -19,6 +19,7 @@ from typing import Any
 from silo.api.address import canonical
 from silo.bom.errors import DocumentError, SiloError
 from silo.bom.snapshot import from_plain
+from silo.durable import remove_patiently
 from silo.outbox.database import insert
 from silo.outbox.entry import Commit, State
 from silo.outbox.store import Store
@@ -87,7 +88,7 @@ def of_commit_folder(store: Store, folder: Path) -> tuple[str, ...]:
         else:
             shutil.rmtree(place, ignore_errors=True)
     with suppress(OSError):
-        (folder / "lock.sqlite3").unlink(missing_ok=True)
+        remove_patiently(folder / "lock.sqlite3")
         folder.rmdir()
     return tuple(left)
 

@@ -22,7 +22,7 @@ from typing import BinaryIO
 
 from silo.bom.errors import InputError
 from silo.folders import cache_folder
-from silo.platform import WINDOWS, hold_lock
+from silo.platform import hold_lock
 
 NAME = ".silo-sync.lock"
 _TRIES = 5
@@ -59,11 +59,20 @@ def only_job(folder: str) -> Iterator[str]:
         try:
             yield doubt
         finally:
-            if not WINDOWS:
-                path.unlink(missing_ok=True)  # before the lock ends: see _held
-    if WINDOWS:
-        with suppress(OSError):
-            path.unlink()
+            removed = _remove(path)  # before the lock ends: see _held
+    if not removed:  # Windows deletes no file that is open
+        _remove(path)
+
+
+def _remove(path: Path) -> bool:
+    """Whether it is gone. One that stays holds nothing, so nobody waits for it."""
+    try:
+        os.unlink(path)
+    except FileNotFoundError:
+        pass
+    except OSError:
+        return False
+    return True
 
 
 def _who() -> str:

@@ -23,6 +23,7 @@ from silo.bom.links import extract
 from silo.bom.model import Extraction
 from silo.bom.naming import display_name
 from silo.bom.roots import choose_assembly
+from silo.durable import remove_patiently
 from silo.fcstd import Library
 from silo.fcstd.library import Contents
 from silo.folders import scratch_folder
@@ -75,7 +76,7 @@ class RevisionBoms:
             target = self._folder / f"{number}.FCStd"
             self.client.download_file(self.part_number, target, number, cancelled=self.cancelled)
             self._known[number] = bom_in(target, self.path)
-            target.unlink()
+            remove_patiently(target)
         return self._known[number]
 
     def change(self, older: int | None, newer: int) -> tuple[LineChange, ...]:

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import shutil
 import sqlite3
 import tempfile
@@ -30,7 +29,7 @@ from sqlalchemy import Connection, MetaData, Select, Table, column, func, insert
 from sqlalchemy.exc import SQLAlchemyError
 
 from silo.bom.errors import ConfigError
-from silo.durable import replacing, sync_folder
+from silo.durable import replace_patiently, replacing, sync_folder
 from silo.folders import scratch_folder
 from silo_server.clock import stamp, utc_now
 from silo_server.db.bulk import insert_rows
@@ -99,7 +98,7 @@ def back_up(settings: Settings, target: Path, report: Report = lambda _: None) -
             )
             with replacing(part / "manifest.json") as out:
                 out.write(json.dumps(asdict(made), indent=2).encode())
-            os.rename(part, target)
+            replace_patiently(part, target)
         finally:
             shutil.rmtree(part, ignore_errors=True)
         sync_folder(target.parent)

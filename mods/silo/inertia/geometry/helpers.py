@@ -26,6 +26,7 @@ from types import TracebackType
 from typing import IO, Any, Self, TypeAlias, TypeVar
 
 from silo import platform
+from silo.durable import remove_patiently
 from silo.folders import scratch_folder
 
 T = TypeVar("T")
@@ -223,7 +224,7 @@ class _Helper:
             return None
         path = Path(os.fsdecode(line[5:]))
         noise, value = pickle.loads(path.read_bytes())
-        path.unlink()
+        remove_patiently(path)
         if noise:
             os.write(1, noise)  # what the kernel complains of is read there
         return (value,)

@@ -134,7 +134,7 @@ class RevisionFlow:
 
     def _replace(self, path: str, content: Path | None, theirs: Theirs) -> None:
         """Theirs in the place of mine, of which a copy is kept. ``content`` None: theirs is there already."""
-        from silo.durable import replacing
+        from silo.durable import remove_patiently, replacing
         from silo.files import content_hash
 
         doc, outbox, kept = self._desk.find(path), self._session.outbox, None
@@ -152,7 +152,7 @@ class RevisionFlow:
                     shutil.copyfileobj(read, write)
             except OSError as error:
                 raise DocumentError(path, f"cannot be written ({error.strerror or error})") from error
-            content.unlink(missing_ok=True)
+            remove_patiently(content)
         if doc is not None:
             self._desk.close(doc)
         self._desk.open(path)

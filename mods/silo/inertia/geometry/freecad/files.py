@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from silo.bom.errors import DocumentError
+from silo.durable import remove_patiently
 from silo.fcstd import Library
 from silo.folders import scratch_folder
 from silo.inertia.core import is_rigid
@@ -114,7 +115,7 @@ def measured_files(files: Sequence[_File], eps: float, mesh_check: bool) -> Meas
         return error.reason
     finally:
         for file in files:
-            file.path.unlink(missing_ok=True)
+            remove_patiently(file.path)
 
 
 def _located(shape: Any, matrix: np.ndarray) -> Any:

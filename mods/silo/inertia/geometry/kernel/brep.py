@@ -16,6 +16,7 @@ from OCP.BRepTools import BRepTools
 from OCP.TopoDS import TopoDS_Compound, TopoDS_Iterator, TopoDS_Shape
 
 from silo.bom.errors import DocumentError
+from silo.durable import remove_patiently
 from silo.inertia.geometry.helpers import Helpers
 from silo.inertia.geometry.kernel.solids import measure
 from silo.inertia.geometry.measured import Measured, no_solid
@@ -87,7 +88,7 @@ def _measure_stored(path: Path, eps: float, mesh_check: bool) -> Measured:
     while stored.More():
         shapes.append(stored.Value())
         stored.Next()
-    path.unlink()
+    remove_patiently(path)
     return measure(shapes, eps=eps, mesh_check=mesh_check)
 
 
