@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,8 @@ import pytest
 from fcstd_writer import Doc, Local, Raw, Vector, XLink, container, locals_, part, save_xml
 
 from silo.bom.errors import DocumentError
+from silo.bom.links import extract
+from silo.bom.roots import choose_assembly
 from silo.bom.walk.kinds import Kind, Survey, survey_of
 from silo.fcstd import FcstdDocument, FcstdObject, Library, Limits, open_document
 
@@ -391,3 +394,65 @@ def test_a_comment_behind_the_part_that_was_read(tmp_path: Path) -> None:
     assert len(box.Document.Objects) == 301
     assert box.Document._xml.is_careful
     assert box is box.Document.getObject("Box")
+
+
+def _many_links(folder: Path, number: int) -> Path:
+    """An assembly with very many links to two parts, each link as short as it can be."""
+    for name in ("a", "b"):
+        part(uuid=f"u-{name}").save(folder / f"{name}.FCStd")
+    top = Doc("top")
+    names = [f"Link{count:05}" for count in range(number)]
+    for count, name in enumerate(names):
+        top.add("App::Link", name, LinkedObject=XLink(f"{'ab'[count % 2]}.FCStd", "Box"))
+    return top.add("App::Part", "Assembly", Group=locals_(*names)).save(folder / "top.FCStd")
+
+
+def test_a_large_file_keeps_little_of_each_link(tmp_path: Path) -> None:
+    """The text once, and a bound per link: what was read is given back, and read again when needed."""
+    number = 21_000
+    path = _many_links(tmp_path, number)
+    tracemalloc.start()
+    try:
+        document = open_document(path)
+        found = extract(choose_assembly(document))
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert [entry.quantity for entry in found.entries] == [number // 2, number // 2]
+    assert [entry.individual_links for entry in found.entries] == [number // 2, number // 2]
+    text = len(document._xml.text)
+    assert (peak - text) / number < 1250
+    first = document.getObject("Link00000")
+    assert first is not None
+    assert "properties" not in vars(first)
+    assert (first.Label, first.LinkedObject.Name) == ("Link00000", "Box")
+    assert first.LinkedObject.Document.FileName == str(tmp_path / "a.FCStd")
+
+
+def test_a_huge_text_is_not_unpacked_for_each_part_again(tmp_path: Path) -> None:
+    """A text above the bound on memory stays while the parts that it links to are read."""
+    path = _many_links(tmp_path, 200)
+    size = len(open_document(path)._xml.text)
+    with Library(limits=Limits(resident=size - 1)) as library:
+        document = library.open(path)
+        text = document._xml._text
+        assert [entry.quantity for entry in extract(choose_assembly(document)).entries] == [100, 100]
+        assert text is not None
+        assert document._xml._text is text
+        other = library.open(_many_links(tmp_path / "other", 200))
+        assert other._xml._text is not None
+        assert document._xml._text is None, "only one of them stays"
+        assert document.getObject("Link00001").LinkedObject.Name == "Box"  # type: ignore[union-attr]
+
+
+def test_a_text_longer_than_one_step_of_unpacking(tmp_path: Path) -> None:
+    """A large text is unpacked in several steps, and its length and checksum are looked at all the same."""
+    note = b"x" * ((1 << 24) - 300)
+    doc = Doc("long").add("Part::Box", "Box", Note="NOTE").add("Part::Box", "Last", Note="y" * 1000)
+    path = save_xml(tmp_path / "long.FCStd", doc.xml().encode().replace(b"NOTE", note))
+    with Library(limits=Limits(ratio=2000)) as library:
+        document = library.open(path)
+        assert len(document._xml.text) > 1 << 24
+        assert document.getObject("Last").Note == "y" * 1000  # type: ignore[union-attr]
+        document._xml.release()
+        assert len(document.getObject("Box").Note) == len(note)  # type: ignore[union-attr]

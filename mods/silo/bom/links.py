@@ -24,7 +24,6 @@ from silo.bom.findings import Finding, FindingCode, Place
 from silo.bom.identity import identity_findings, identity_of, walk_entries
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.roots import Whole, as_it_is, beside, loose_hardware
-from silo.bom.walk.arrays import is_array
 from silo.bom.walk.contents import Reader
 from silo.bom.walk.counts import Count, Key, Lost
 from silo.bom.walk.kinds import is_container, is_named_assembly
@@ -267,7 +266,7 @@ class _Walker:
     def _entry(self, counts: list[Count], level: int, children: tuple[BomEntry, ...]) -> BomEntry:
         target = counts[0].target
         entry = self.entry_for(target)
-        links = [count.shown for count in counts if count.link]
+        links = [count for count in counts if count.link]
         return replace(
             entry,
             level=level,
@@ -275,7 +274,7 @@ class _Walker:
             children=children,
             is_assembly=entry.is_assembly or self._is_assembly(target),
             consolidation_warning=len(links) > 1,
-            individual_links=sum(not is_array(link) for link in links),
+            individual_links=sum(not link.array for link in links),
             link_objects=len(links),
             instances=tuple(object_name(count.shown) for count in counts),
         )

@@ -6,7 +6,8 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-from collections.abc import Iterable, Mapping, Set
+from collections import deque
+from collections.abc import Collection, Mapping, Set
 from functools import cached_property
 from struct import Struct
 from typing import TYPE_CHECKING, Any, cast
@@ -34,6 +35,9 @@ _GEOMETRY = frozenset({Kind.LOCAL, Kind.NOTHING, Kind.FOLDER})
 _SAID_OF_ITSELF = ("SiloItemId", "SiloUUID", "Type")
 _BREP_TEXT = (b"CASCADE Topology", b"DBRep_DrawableShape")
 _MANY_OBJECTS = 20_000
+# Of so many objects a large document keeps what it has read. One with a long list, such as the assembly,
+# costs too much to be read twice.
+_READ_AT_MOST, _SHORT = 4096, 1 << 14
 _SIZE = Struct("<I")
 _DOUBLES, _FLOATS = Struct("<3d"), Struct("<3f")
 
@@ -97,6 +101,7 @@ class FcstdDocument:
         self.content, self.state = content, content.state
         self._table: Properties | None = None
         self._objects: dict[str, FcstdObject] = {}
+        self._read: deque[FcstdObject] = deque()
         self._targets: dict[tuple[str, str], FcstdObject | LinkProblem] = {}
         self.values: dict[bytes, Any] = {}
 
@@ -196,6 +201,13 @@ class FcstdDocument:
         """True where memory counts more than time."""
         return self.content.facts is None and len(self._xml.head.types) > _MANY_OBJECTS
 
+    def was_read(self, obj: FcstdObject, size: int) -> None:
+        """Note that an object was read. A large document unloads the one that was read longest ago."""
+        if self.is_large and size <= _SHORT:
+            self._read.append(obj)
+            if len(self._read) > _READ_AT_MOST:
+                self._read.popleft().unload()
+
     def complete(self) -> None:
         """Read the file to its end and check it. Raises DocumentError."""
         self._xml.complete()
@@ -242,9 +254,12 @@ class FcstdDocument:
             raise self._xml.error(f"does not hold the data of the object {obj.Name!r}")
         return Properties(self._xml, span, obj.TypeId)
 
-    def members(self, names: Iterable[str]) -> tuple[FcstdObject, ...]:
+    def members(self, names: Collection[str]) -> tuple[FcstdObject, ...]:
         """The objects of these names, without those that are not there."""
         types = self._xml.head.types
+        if len(names) > _MANY_OBJECTS:  # no second copy of each name
+            listed = {name: name for name in types}
+            names = [listed[name] for name in names if name in listed]
         return tuple(self.object_of(name, types[name]) for name in names if name in types)
 
     def resolve(self, ref: Ref) -> FcstdObject | None:

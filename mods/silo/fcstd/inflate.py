@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import zlib
+from io import BytesIO
 from typing import Any
 
 from silo.fcstd.container import STORED, Entry
@@ -12,6 +13,8 @@ from silo.fcstd.problem import FcstdError
 
 # Deflate cannot pack better than this, so so many packed bytes are safe to unpack in one go.
 _HIGHEST_RATIO = 1032
+# zlib joins what it unpacks in one step, so a large text in one step would be there twice.
+_LONGEST_STEP = 1 << 24
 
 
 class Inflater:
@@ -54,13 +57,15 @@ class Inflater:
         self._count(data)
         return data
 
-    def rest(self) -> bytes:
-        """All that is left."""
-        parts = []
-        while not self.finished:
+    def rest(self, end: int | None = None) -> bytes:
+        """All that is left, or what is left before a position."""
+        most = len(self._packed) + 1 if self._entry.method == STORED else _LONGEST_STEP
+        parts = BytesIO()
+        while not self.finished and (end is None or self.produced < end):
             # Some more than is promised, so that the end is met in this very step.
-            parts.append(self.step(max(self._entry.size - self.produced + 1, 1 << 16)))
-        return b"".join(parts)
+            left = max(self._entry.size - self.produced + 1, 1 << 16) if end is None else end - self.produced
+            parts.write(self.step(min(left, most)))
+        return parts.getvalue()
 
     def _stored(self, length: int) -> bytes:
         data, self._rest = self._rest[:length], self._rest[length:]

@@ -32,7 +32,7 @@ class Limits:
         files opened in one session.
     resident
         bytes of unpacked XML kept in memory by one session; beyond it the files that were not used for
-        longest are unpacked again when needed.
+        longest are unpacked again when needed. One text that is longer than this does not count.
     """
 
     document_xml: int = 256 * _MB

@@ -41,9 +41,9 @@ _KINDS: dict[str, type] = {
 
 
 @cache
-def _answer_of(type_id: str) -> Callable[[str], bool]:
+def _answer_of(ancestry: frozenset[str]) -> Callable[[str], bool]:
     """One bound method for all objects of a type: a file may have hundreds of thousands."""
-    return ancestors(type_id).__contains__
+    return ancestry.__contains__
 
 
 class FcstdObject:
@@ -53,10 +53,15 @@ class FcstdObject:
     Reading a property may raise DocumentError where the file turns out to be damaged.
     """
 
+    # What an object has before it is read; the rest is in its dictionary, which a large document takes back.
+    __slots__ = ("Document", "Name", "TypeId", "__dict__", "__weakref__", "ancestry", "isDerivedFrom")
+
     Name: str
     TypeId: str
     ancestry: frozenset[str]
     """The type and all that it is derived from."""
+    isDerivedFrom: Callable[[str], bool]
+    """As FreeCAD: the type of the object itself, never of a link's target; False for unknown names."""
     Document: FcstdDocument
     properties: Properties
     """The table of what the file holds, for those that want to see more than values."""
@@ -70,8 +75,8 @@ class FcstdObject:
         self.ancestry = ancestors(type_id)
         if not is_listed(type_id) and self._looks_like_a_link():
             self.ancestry = ancestors("App::Link") | {type_id}
-        # A walker asks this most of all; so the set itself answers, in place of the method below.
-        self.__dict__["isDerivedFrom"] = self.ancestry.__contains__
+        # A walker asks this most of all; so the set itself answers.
+        self.isDerivedFrom = _answer_of(self.ancestry)
 
     def _looks_like_a_link(self) -> bool:
         """A type that a later FreeCAD added, with the properties of a link array."""
@@ -81,10 +86,6 @@ class FcstdObject:
             return False
         numbers = self.properties.numbers
         return "LinkedObject" in numbers and "ElementCount" in numbers
-
-    def isDerivedFrom(self, type_name: str, /) -> bool:
-        """As FreeCAD: the type of the object itself, never of a link's target; False for unknown names."""
-        return type_name in self.ancestry
 
     @cached_property
     def Label(self) -> str:
@@ -130,10 +131,15 @@ class FcstdObject:
         if name not in properties.numbers:
             raise AttributeError(name)
         # The file does not change while it is open, so the next access need not come here.
-        value = mine[name] = self._value(name, properties.piece(name))
-        if self.Document.is_large:
-            properties.forget(mine)
+        piece = properties.piece(name)
+        value = mine[name] = self._value(name, piece)
+        if len(piece) > _REMEMBER_AT_MOST and self.Document.is_large:
+            properties.kept.pop(name, None)
         return value
+
+    def unload(self) -> None:
+        """Give back what was read of the object; it is read again when somebody asks."""
+        del self.__dict__
 
     def shape_key(self) -> str:
         """Something equal for equal shapes, wherever they are placed; "" where the object has no shape."""
@@ -148,8 +154,7 @@ class FcstdObject:
         for name, piece in properties.kept.items():
             if piece in known:
                 mine[name] = known[piece]
-        if self.Document.is_large:
-            properties.forget(mine)
+        self.Document.was_read(self, properties.size)
 
     def __repr__(self) -> str:
         return f"<{self.TypeId} {self.Name} of {self.Document.FileName}>"

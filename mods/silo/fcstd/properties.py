@@ -9,7 +9,7 @@ first.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from silo.fcstd import careful
@@ -73,8 +73,6 @@ class Shape(NamedTuple):
 
 
 _NOTHING = Shape.of((), b"")
-# One empty table for all that keep nothing any more.
-_NONE_KEPT: dict[str, bytes] = {}
 
 
 class Properties:
@@ -104,17 +102,17 @@ class Properties:
         self.names, self.numbers = shape.names, shape.numbers
         self.kept = {name: pieces[number] for name, number in shape.kept}
 
+    @property
+    def size(self) -> int:
+        """Bytes of the element."""
+        return self._end - self._begin
+
     def piece(self, name: str) -> bytes:
         """The bytes of a property that is one of ``names``. Equal bytes, equal value."""
         piece = self.kept.get(name)
         if piece is None:
             piece = (self._careful_cut()[1] if self._careful else self._cut())[self.numbers[name]]
         return piece
-
-    def forget(self, known: Container[str]) -> None:
-        """What is known needs no piece; it is cut out again if it does after all."""
-        left = {name: piece for name, piece in self.kept.items() if name not in known}
-        self.kept = left or _NONE_KEPT
 
     def value(self, name: str) -> Any:
         """The value, ABSENT where there is no such property or it has no plain value."""
@@ -186,6 +184,7 @@ class Kept(Properties):
         self, names: Sequence[str], pieces: Mapping[str, str], whole: Callable[[], Properties]
     ) -> None:
         self._careful, self._decode, self._whole = False, _utf8, whole
+        self._begin = self._end = 0
         self.names = tuple(names)
         self.numbers = dict.fromkeys(self.names, 0)
         self.kept = {name: piece.encode() for name, piece in pieces.items()}

@@ -66,10 +66,21 @@ class Shared:
         self._limit = resident_limit
         self._resident: dict[XmlText, int] = {}
         self._total = 0
+        self._huge: XmlText | None = None
 
     def hold(self, text: XmlText, size: int) -> None:
-        """Count ``size`` bytes for a text; the texts that grew longest ago give theirs back for it."""
-        self._total += size - self._resident.pop(text, 0)
+        """Count ``size`` bytes for a text; the texts that grew longest ago give theirs back for it.
+
+        One text that is longer than all may be together does not count. Each text that grows would push it
+        out, though the next object is read from it again.
+        """
+        self._total -= self._resident.pop(text, 0)
+        if size > self._limit:
+            if self._huge is not None and self._huge is not text:
+                self._huge.release()
+            self._huge = text
+            return
+        self._total += size
         self._resident[text] = size
         while self._total > self._limit and len(self._resident) > 1:
             oldest = next(iter(self._resident))
@@ -348,9 +359,7 @@ class XmlText:
         if self.is_careful:
             text = careful.as_utf8(self._inflater.rest())
         else:
-            text = b""
-            while len(text) < self._known:
-                text += self._inflater.step(self._known - len(text))
+            text = self._inflater.rest(self._known)
         return self._hold(text)
 
 

@@ -42,12 +42,15 @@ class Count:
         the component: a document object, or :class:`Lost`.
     link
         True where that object is itself an ``App::Link`` to the component.
+    array
+        True where that link is an array.
     """
 
     shown: Any
     target: Any
     quantity: int
     link: bool
+    array: bool
 
 
 @dataclass(slots=True)

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 from silo.bom.document import label_of, same_document
 from silo.bom.findings import FindingCode
-from silo.bom.walk.arrays import draft_count, elements
+from silo.bom.walk.arrays import draft_count, elements, is_array
 from silo.bom.walk.consumed import consumed
 from silo.bom.walk.copies import own_parts, stale_copies
 from silo.bom.walk.counts import Contents, Count, Key, Leaves, Lost, Worth, add
@@ -114,7 +114,7 @@ class Reading:
 
     def _counts(self, leaves: Leaves) -> list[Count]:
         return [
-            Count(obj, target, quantity * times, link=key in self._links)
+            Count(obj, target, quantity * times, link := key in self._links, array=link and is_array(obj))
             for key, (obj, kind, times) in leaves.items()
             for target, quantity in self._bought(key, obj, self._worth(key, obj, kind)).values()
         ]
