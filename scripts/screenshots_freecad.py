@@ -5,6 +5,9 @@ Run: ``.venv/bin/python scripts/screenshots_freecad.py [FOLDER] [STYLE]``. It ne
 newest of ``scripts/freecad-roots.sh --list`` is taken, or that of ``SILO_PICTURES_FREECAD`` (such as 1.0).
 With ``--tour`` it makes the animated ``addon-tour.gif`` instead: a commit after a colleague's.
 STYLE names a style sheet of FreeCAD, such as "FreeCAD Dark.qss", to look at the windows in another theme.
+FreeCAD 1.1 draws a theme's check marks from SVG files. Qt 6 reads those with its plugin libqsvg, which the
+root of FreeCAD 1.1 lacks: every box of such a picture looks empty, in FreeCAD's windows too. Our style has no
+part in it.
 """
 
 from __future__ import annotations

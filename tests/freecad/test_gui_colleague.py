@@ -132,6 +132,8 @@ def test_a_held_commit_is_decided_in_the_pane(day: Day) -> None:
     (reason,) = day.bob["held"]
     assert "committed revision 2 of" in reason
     assert {"Open theirs beside mine", "Take theirs", "Commit mine on top"} <= {*day.bob["held_buttons"]}
+    assert "Send now" not in day.bob["held_buttons"]
+    assert day.bob["held_difference"] == ["Plate: 1 → 0 by them, as before in yours"]
     assert day.bob["held_beside"] == day.bob["held_has"] == ["Bolts"]
     assert len(day.revisions("Held")) == 2
     # Hers, which his save replaced; what he committed; what he had open.

@@ -73,7 +73,7 @@ def test_a_refused_bom_stays_with_its_reason(told: dict[str, Any]) -> None:
     """The file is in Silo; the BOM waits for a person."""
     assert told["rejected"] == [[told["numbers"]["Gearbox"], False, True, "held"]]
     text = "\n".join(told["rejected_text"])
-    assert "1 thing waits to be sent" in text
+    assert "1 thing waits for your choice" in text
     assert told["numbers"]["Top"] in text
     assert "cycle" in text.lower() or "itself" in text.lower()
 

@@ -7,6 +7,7 @@ import errno
 import hashlib
 import os
 import stat
+import time
 from pathlib import Path
 from typing import Any
 
@@ -256,3 +257,21 @@ def test_commits_are_private(store: Store, document: Path) -> None:
     entry = store.add(commit(document))
     for path in (store.path, store.copies, store.copies / entry.copy):
         assert stat.S_IMODE(path.stat().st_mode) & 0o077 == 0
+
+
+def test_copies_of_replaced_files_are_kept_for_ninety_days(tmp_path: Path) -> None:
+    """Then whole days go; what is no folder of ours stays."""
+    file, now = tmp_path / "a.FCStd", [time.time()]
+    file.write_bytes(b"mine")
+    store = Store(tmp_path / "data" / "outbox.sqlite3", clock=lambda: now[0])
+    kept = store.keep_aside(str(file))
+    assert kept is not None
+    others = kept.parent.parent / "2001-01-01 by a person"
+    others.mkdir()
+    # Whatever its name, what was put there of late is not old.
+    restored = kept.parent.parent / "2001-01-01"
+    restored.mkdir()
+    for days, is_kept in ((0, True), (89, True), (92, False)):
+        now[0] = time.time() + days * 86400.0
+        store.sweep()
+        assert (kept.exists(), restored.exists(), others.exists()) == (is_kept, is_kept, True)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from silo.bom.errors import Exit, InputError, SiloError
 from silo.cli import common
 from silo.cli.common import Commands
+from silo.outbox.database import KEPT_ASIDE_DAYS
 
 if TYPE_CHECKING:
     from silo.api.wire import Revision
@@ -94,7 +95,7 @@ _MARKS = {
     "same": ("=", "dim", "up to date"),
     "updated": ("~", "yellow", "updated"),
     "edited": ("✗", "red", "has edits that are not in Silo; left alone (--overwrite replaces it)"),
-    "overwritten": ("~", "yellow", "replaced; your file is kept at"),
+    "overwritten": ("~", "yellow", f"replaced; your file is kept for {KEPT_ASIDE_DAYS} days at"),
     "open": ("✗", "red", "is open in FreeCAD; left alone (close it, or --even-if-open)"),
 }
 

@@ -13,7 +13,7 @@ import sqlite3
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,8 @@ from silo.durable import private_file, sync_folder
 VERSION = 3
 # What a saved file was made from is forgotten after two years.
 _REMEMBERED = 2 * 366 * 86400.0
+# A copy of a file that was replaced is kept for so long, or until a person deletes it.
+KEPT_ASIDE_DAYS = 90
 
 _TABLES = """
 CREATE TABLE entry (
@@ -241,12 +243,25 @@ class Origins(Database):
 
     def aside(self, path: str) -> Path:
         """A new place for a copy of a file; its folder is there. DocumentError where it cannot be made."""
-        folder = self.path.parent / "kept-aside" / time.strftime("%Y-%m-%d")
+        folder = self._kept_aside / time.strftime("%Y-%m-%d")
         try:
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         except OSError as error:
             raise DocumentError(str(folder), f"cannot be made ({error.strerror or error})") from error
         return folder / f"{time.strftime('%H%M%S')}-{time.monotonic_ns() % 10**6}-{os.path.basename(path)}"
+
+    @property
+    def _kept_aside(self) -> Path:
+        return self.path.parent / "kept-aside"
+
+    def forget_aside(self) -> None:
+        """Remove the copies of the days that are over :data:`KEPT_ASIDE_DAYS` ago; nothing else in there."""
+        limit = self.clock() - KEPT_ASIDE_DAYS * 86400.0
+        oldest = time.strftime("%Y-%m-%d", time.localtime(limit))
+        for folder in self._kept_aside.glob("[0-9][0-9][0-9][0-9]-[0-9][0-9]-[0-9][0-9]"):
+            with suppress(OSError):
+                if folder.name < oldest and folder.stat().st_mtime < limit and not folder.is_symlink():
+                    shutil.rmtree(folder, ignore_errors=True)
 
     def keep_aside(self, path: str) -> Path | None:
         """Keep a copy of a file that is about to be replaced; where it is, None where there is no file.

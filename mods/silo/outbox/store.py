@@ -273,8 +273,10 @@ class Store(Origins):
         return path
 
     def sweep(self) -> None:
-        """Remove files whose row is gone, and second names for which no commit came."""
+        """Remove files whose row is gone, second names for which no commit came, and what was kept aside long
+        ago."""
         self._make_ready()
+        self.forget_aside()
         with suppress(OSError):
             # Files first, then rows: a file's row was there before it.
             files = [*self.copies.iterdir()]

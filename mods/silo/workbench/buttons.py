@@ -73,7 +73,7 @@ class Buttons:
     def _same_part(self, action: Action) -> None:
         """These files are one part on purpose; the BOM is synced without the question."""
         commits = self._addon.commits
-        commits.decisions.accept(action.target, action.objects)
+        commits.accept(action.target, action.objects)
         doc = host.find_document(action.document)
         if doc is not None:
             commits.sync_only(doc)

@@ -163,6 +163,10 @@ def held(one: Any, doc: Any) -> None:
     one.commits.run(plan(doc, one.desk.documents).rows, "mine")
     wait(lambda: [entry for entry in one.session.shown.waiting if entry.newer] and settled())
     wait(lambda: "Take theirs" in buttons(one.dock))
+    said = wait(
+        lambda: [text.text() for text in one.dock.findChildren(QtWidgets.QLabel) if "by them" in text.text()]
+    )
+    tell(held_difference=said)
     picture(one.dock, "held")
     tell(held=[entry.reason for entry in one.session.shown.waiting], held_buttons=buttons(one.dock))
     press(one.dock, "Open theirs beside mine")

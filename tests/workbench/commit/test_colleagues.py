@@ -9,9 +9,12 @@ from typing import Any
 
 import pytest
 from desk import Document, Office
+from fcstd_writer import Doc as File
+from fcstd_writer import locals_, part
 
 from silo.api.files import Origin
 from silo.bom.changes import ThreeLines
+from silo.bom.errors import ServerFaultError
 from silo.bom.model import BomEntry
 from silo.outbox.entry import UNKNOWN, Commit, State
 from silo.outbox.send import send_all
@@ -20,6 +23,8 @@ from silo.workbench.commit.flow import CommitFlow
 from silo.workbench.commit.opened import Opened, stamp_of
 from silo.workbench.commit.plan import Plan
 from silo.workbench.commit.theirs import Choice, Theirs, line_words
+from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone
+from silo.workbench.pane.waiting import rows
 
 
 @pytest.fixture(name="flow")
@@ -157,6 +162,60 @@ def test_without_the_dialog_it_waits_in_the_pane(office: Office, flow: CommitFlo
     (held,) = office.session.shown.waiting
     assert (held.state, held.newer["revision_number"]) == (State.HELD, 2)
     assert office.files("Plate") == [b"one", b"one less"]
+
+
+def assembly(identity: str, bolts: int) -> bytes:
+    doc = File("Top", meta={"SiloUUID": identity}).link("Bolts", "Bolt.FCStd", "Box", ElementCount=bolts)
+    return doc.add("App::Part", "Assembly", Type="Assembly", Group=locals_("Bolts")).bytes()
+
+
+def test_the_pane_has_the_difference_of_a_held_commit(office: Office, flow: CommitFlow) -> None:
+    """Base, theirs and mine, found by a worker; a server that has no time costs the details alone."""
+    bolt, top = office.document("Bolt"), office.document("Top")
+    Path(bolt.FileName).write_bytes(part("Bolt", uuid=bolt.identity).bytes())
+    top.content, top.parts = assembly(top.identity, 6), {bolt: 6}
+    flow.start(top)
+    office.settle()
+    colleague(office, "Top", assembly(top.identity, 4), 1)
+    edit(top, assembly(top.identity, 8))
+    top.parts = {bolt: 8}
+    download, office.silo.download_file = office.silo.download_file, lost  # type: ignore[method-assign]
+    flow.start(top)
+    office.settle()
+    (held,) = office.session.shown.waiting
+    assert (held.newer["revision_number"], office.session.shown.theirs) == (2, {})
+    office.silo.download_file = download  # type: ignore[method-assign]
+    office.session.tick()
+    office.settle()
+    (row,) = rows([held], office.silo.base_url, office.session.shown.theirs)
+    assert row.details == ("Bolt: 6 → 4 by them, 8 by you",)
+    office.session.discard(held.id)
+    office.settle()
+    assert office.session.shown.theirs == {}
+    assert office.bugs == []
+
+
+def lost(*_: object, **__: object) -> None:
+    raise ServerFaultError("no time")
+
+
+def test_an_answer_reaches_older_boxes(office: Office, flow: CommitFlow) -> None:
+    """Given in Register Parts, or in another box; other files and other identities still ask."""
+
+    def asking(key: str, identity: str, *files: str) -> Entry:
+        same = Action(Do.SAME, "Same part", identity, objects=files)
+        return Entry(key, "x", 1.0, lines=(Line("2 files", Tone.WARNING, (same,)),))
+
+    office.session.add(asking("asked", "ID", "/v/a", "/v/b"))
+    office.session.add(asking("more", "ID", "/v/a", "/v/b", "/v/c"))
+    office.session.add(asking("other", "other", "/v/a", "/v/b"))
+    flow.accept("id", ["/v/a", "/v/b"])
+    boxes = office.session.shown.activity.entries
+    assert {box.key: bool(box.lines[0].actions) for box in boxes} == {
+        "asked": False,
+        "more": True,
+        "other": True,
+    }
 
 
 def test_a_file_that_somebody_replaced_is_asked_about_also_offline(office: Office, flow: CommitFlow) -> None:

@@ -163,3 +163,40 @@ def test_gathering_loses_nothing(told: list[tuple[int, Batch | None]]) -> None:
     assert [one.when for one in shown] == sorted((one.when for one in shown), reverse=True)
     counts = [int(one.title.split()[0]) if one.key.startswith("batch:") else 1 for one in shown]
     assert sum(counts) == len(entries)
+
+
+def asking(key: str, when: float, *files: str, document: str = "/v/Top.FCStd") -> Entry:
+    question = Line(
+        "2 files carry the same Silo identity",
+        Tone.WARNING,
+        (Action(Do.SAME, "Same part", "ID", document, files), Action(Do.DECIDE, "New part…")),
+    )
+    other = Line("a link is broken", Tone.ERROR, (Action(Do.SHOW, "Show"),))
+    return Entry(key, "x", when, lines=(question, other), document=document)
+
+
+def buttons(activity: Activity, key: str) -> list[str]:
+    box = activity.get(key)
+    assert box is not None
+    return [action.text for line in box.lines for action in line.actions]
+
+
+def test_only_the_newest_box_of_an_assembly_asks() -> None:
+    """It has all questions that are open; boxes of other assemblies, and newer ones, keep theirs."""
+    other = asking("other", 1, "/v/a", document="/v/Other.FCStd")
+    activity = Activity().extend([asking("old", 1, "/v/a", "/v/b"), other, asking("late", 9, "/v/a")])
+    activity = activity.add(Entry("new", "x", 2, document="/v/Top.FCStd"))
+    assert buttons(activity, "old") == ["Show"]
+    assert buttons(activity, "other") == buttons(activity, "late") == ["Same part", "New part…", "Show"]
+    # A colleague's event says nothing of this computer's files.
+    assert buttons(activity.add(entry("event", 10)), "late") == ["Same part", "New part…", "Show"]
+
+
+def test_an_answer_takes_the_buttons_of_its_question_alone() -> None:
+    """Of each box that asks it."""
+    activity = Activity().extend(
+        [asking("one", 1, "/v/a", "/v/b"), asking("two", 2, "/v/c", document="/v/X")]
+    )
+    done = activity.answered(lambda asked: "/v/a" in asked.objects)
+    assert buttons(done, "one") == ["Show"]
+    assert buttons(done, "two") == ["Same part", "New part…", "Show"]

@@ -8,10 +8,13 @@ from pathlib import Path
 
 import pytest
 
+from silo.bom.changes import ThreeLines
+from silo.bom.model import BomEntry
 from silo.outbox.entry import Commit, Entry, State
 from silo.outbox.store import Store
+from silo.workbench.commit.theirs import of_held
 from silo.workbench.pane.activity import Do
-from silo.workbench.pane.waiting import meant_for_another, rows
+from silo.workbench.pane.waiting import can_send, heading, meant_for_another, rows
 
 HERE = "https://silo.example.com"
 
@@ -84,3 +87,29 @@ def test_a_held_commit_has_the_choices_of_the_dialog(entry: Entry) -> None:
     assert [a.do for a in row.actions] == [Do.RETRY, Do.SAVE_COPY, Do.DISCARD]
     (row,) = rows([replace(held, server="http://old.example:80")], HERE)
     assert [a.do for a in row.actions] == [Do.SEND_HERE, Do.SAVE_COPY, Do.DISCARD]
+
+
+def test_send_now_is_there_only_where_something_can_be_sent(entry: Entry) -> None:
+    """What is held waits for a person, and what is meant for another address or no server for settings."""
+    held, away = replace(entry, state=State.HELD), replace(entry, server="http://old.example")
+    keeping = replace(entry, state=State.KEEPING, server="")
+    assert can_send([held, entry], HERE)
+    assert can_send([keeping], HERE)
+    assert not can_send([held, away], HERE)
+    assert not can_send([entry], "")
+    assert heading([entry], HERE) == "1 thing waits to be sent"
+    assert heading([held], HERE) == "1 thing waits for your choice"
+    assert heading([held, away], HERE) == "2 things wait for your choice"
+    assert heading([held, entry, entry], HERE) == "3 things wait to be sent, 1 of them for your choice"
+
+
+def test_a_held_commit_shows_what_each_changed(entry: Entry) -> None:
+    """In the words of the dialog, where it is known by now."""
+    newer = {"revision_number": 2, "created_by": "alice", "comment": "less"}
+    held = replace(entry, state=State.HELD, newer=newer)
+    bolt = BomEntry("Bolt.FCStd", label="Bolt", quantity=6)
+    theirs = replace(of_held(held), base=1, lines=(ThreeLines(bolt, None, bolt),))
+    (row,) = rows([held], HERE, {held.id: theirs})
+    assert row.details == ("Bolt: 6 → 0 by them, as before in yours",)
+    for known in ({}, {held.id: None}):
+        assert rows([held], HERE, known)[0].details == ()

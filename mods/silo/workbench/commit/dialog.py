@@ -12,7 +12,7 @@ from typing import Any
 
 from silo.workbench.commit.desk import Answer
 from silo.workbench.commit.plan import Plan, Row, State
-from silo.workbench.commit.theirs import Choice, Theirs, choice_texts, line_words
+from silo.workbench.commit.theirs import Choice, Theirs, choice_texts, line_texts
 from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QShortcut, QtCore, QtGui, QtWidgets
 from silo.workbench.pane.activity import Tone
@@ -216,11 +216,7 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
             when = time.strftime("%Y-%m-%d %H:%M", time.localtime(theirs.when)) if theirs.when else ""
             said = plain(theirs.comment, 160) or translate("Silo", "(no comment)")
             told.append(" · ".join(filter(None, (when, said))))
-        lines = [line_words(line, known=theirs.base is not None) for line in theirs.lines]
-        if len(lines) > _MOST_LINES:
-            more = translate("Silo", "… and {n} more lines").replace("{n}", str(len(lines) - _MOST_LINES))
-            lines = [*lines[:_MOST_LINES], more]
-        return told + lines
+        return told + line_texts(theirs, _MOST_LINES)
 
     def _chose(self, number: int, box: Any) -> None:
         mine = Choice(box.currentData()) is Choice.ON_TOP

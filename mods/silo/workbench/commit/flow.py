@@ -15,7 +15,7 @@ from __future__ import annotations
 import os
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -77,6 +77,14 @@ class CommitFlow:
         if taken.extraction is None:
             return taken
         return replace(taken, extraction=self.decisions.without_accepted(taken.extraction))
+
+    def accept(self, identity: str, files: Iterable[str]) -> None:
+        """A person says that these files are one part; the boxes of the pane ask no more."""
+        same = set(files)
+        self.decisions.accept(identity, same)
+        self._session.answered(
+            lambda asked: asked.target.lower() == identity.lower() and same.issuperset(asked.objects)
+        )
 
     def has_identity(self, doc: Any) -> bool:
         """True for a document that belongs to Silo."""
@@ -140,9 +148,11 @@ class CommitFlow:
         asked, documents = self._asked(planned), {row.path: row.document for row in planned.rows}
 
         def question(client: Any, control: Any) -> dict[str, Theirs]:
+            from silo.vault.revisions import top_of
+
             def mine(path: str) -> Assembly | None:
                 taken = self._session.in_gui(lambda: self._desk.snapshot(documents[path]), control)
-                return mine_of(taken)
+                return top_of(taken.extraction) if taken.extraction is not None else None
 
             return look(client, self._session.outbox, asked, mine, control.cancelled)
 
@@ -279,13 +289,6 @@ def commit_of(
         allow_missing=allow_missing,
         remark=taken.problem,
     )
-
-
-def mine_of(taken: Snapshot) -> Assembly | None:
-    """The BOM of a snapshot, for comparing; None for a part."""
-    if taken.extraction is None:
-        return None
-    return Assembly(taken.extraction.assembly, tuple(taken.extraction.entries))
 
 
 def not_in_silo(taken: Snapshot) -> Entry:

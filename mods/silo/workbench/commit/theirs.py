@@ -6,7 +6,9 @@ The look belongs in a worker; what it finds are values.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
@@ -19,7 +21,10 @@ from silo.workbench.words import plain, quantity, translate
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
+    from silo.api.revisions import Standing
+    from silo.api.transport import Cancel
     from silo.outbox.entry import Entry
+    from silo.outbox.store import Store
 
 
 class Choice(StrEnum):
@@ -109,6 +114,15 @@ def line_words(line: ThreeLines, *, known: bool = True) -> str:
     return text.replace("{name}", name)
 
 
+def line_texts(theirs: Theirs, most: int) -> list[str]:
+    """Its lines in words, and how many there are beyond ``most``."""
+    texts = [line_words(line, known=theirs.base is not None) for line in theirs.lines]
+    if len(texts) <= most:
+        return texts
+    more = translate("Silo", "… and {n} more lines").replace("{n}", str(len(texts) - most))
+    return [*texts[:most], more]
+
+
 @dataclass(frozen=True)
 class Asked:
     """A file to look at: its path, the identity of its item, and what the document was made from."""
@@ -123,7 +137,7 @@ def look(
     origins: Origins,
     asked: Iterable[Asked],
     mine: Callable[[str], Assembly | None],
-    cancelled: Any = None,
+    cancelled: Cancel | None = None,
 ) -> dict[str, Theirs]:
     """Path → what a colleague committed since, for the files where that is so. For a worker.
 
@@ -135,7 +149,10 @@ def look(
     found: dict[str, Theirs] = {}
     for one in files:
         item = items.get(one.identity)
-        if item is not None and (theirs := _one(client, origins, one, item.part_number, mine)) is not None:
+        if (
+            item is not None
+            and (theirs := _one(client, origins, one, item.part_number, mine, cancelled)) is not None
+        ):
             found[one.path] = theirs
     return found
 
@@ -146,28 +163,71 @@ def _one(
     one: Asked,
     part_number: str,
     mine: Callable[[str], Assembly | None],
+    cancelled: Cancel | None,
 ) -> Theirs | None:
     from silo.api.revisions import is_newest, standing
-    from silo.vault.revisions import RevisionBoms
 
     origin = one.base.settle(origins)
     if is_newest(origin, client.revisions(part_number, newest=1)):
         return None
     known = getattr(origins, "known_revision", lambda *_: None)(client.base_url, origin, one.identity)
     stands = standing(client.revisions(part_number), origin, known)
-    newest = stands.newer
-    if newest is None:
+    if stands.newer is None:
         return None
     lines: tuple[ThreeLines, ...] = ()
+    with suppress(SiloError):  # the question stands without its details
+        lines = _lines(client, part_number, one.path, stands, mine(one.path), cancelled)
+    return _theirs(one.path, part_number, stands, lines)
+
+
+def look_held(
+    client: SiloClient, outbox: Store, entry: Entry, cancelled: Cancel | None = None
+) -> Theirs | None:
+    """The newest revision that a held commit would undo, with the BOM base → theirs → mine; None for a part,
+    and where nothing would be undone any more. For a worker.
+
+    Raises SiloError where the server or a file does not answer.
+    """
+    from silo.api.revisions import standing
+    from silo.bom.snapshot import from_plain
+    from silo.vault.revisions import top_of
+
+    extraction = outbox.bom(entry.id)[0]
+    if not extraction:
+        return None
     try:
-        my_bom = mine(one.path)
-        if my_bom is not None:
-            with RevisionBoms(client, part_number, one.path) as boms:
-                lines = boms.three(stands, my_bom)
-    except SiloError:
-        pass  # the question stands without its details
+        mine = top_of(from_plain(json.loads(extraction)))
+    except ValueError:
+        return None  # sending it says so
+    known = outbox.known_revision(client.base_url, entry.origin, entry.identity)
+    stands = standing(client.revisions(entry.part_number), entry.origin, known)
+    if stands.newer is None:
+        return None
+    lines = _lines(client, entry.part_number, entry.path, stands, mine, cancelled)
+    return _theirs(entry.path, entry.part_number, stands, lines)
+
+
+def _lines(
+    client: SiloClient,
+    part_number: str,
+    path: str,
+    stands: Standing,
+    mine: Assembly | None,
+    cancelled: Cancel | None,
+) -> tuple[ThreeLines, ...]:
+    from silo.vault.revisions import RevisionBoms
+
+    if mine is None:
+        return ()
+    with RevisionBoms(client, part_number, path, cancelled) as boms:
+        return boms.three(stands, mine)
+
+
+def _theirs(path: str, part_number: str, stands: Standing, lines: tuple[ThreeLines, ...]) -> Theirs:
+    newest = stands.newer
+    assert newest is not None  # the callers looked
     return Theirs(
-        one.path,
+        path,
         part_number,
         newest.revision_number,
         newest.created_by or "",

@@ -7,7 +7,7 @@ fields of an entry hold no control characters and are never longer than can be r
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
@@ -99,6 +99,8 @@ class Entry:
     part_of
         what many of these boxes say together, for one box in their place (:func:`gathered`); "" where a box
         has something of its own to say.
+    document
+        the assembly whose BOM was looked at, with all questions about it: older boxes ask no more.
     """
 
     key: str
@@ -113,12 +115,31 @@ class Entry:
     also: str = ""
     icon: str = ""
     part_of: Batch | None = None
+    document: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "title", plain(self.title))
         object.__setattr__(self, "who", plain(self.who, 60))
         if len(self.lines) > MOST_LINES:
             object.__setattr__(self, "lines", shortened(self.lines))
+
+    def without_questions(self, is_answered: Callable[[Action], bool] = lambda _same: True) -> Entry:
+        """Without the buttons of the questions about copied identities that have their answer.
+
+        is_answered
+            says so of a *Same part*.
+        """
+        answered = [
+            any(action.do is Do.SAME and is_answered(action) for action in line.actions)
+            for line in self.lines
+        ]
+        if not any(answered):
+            return self
+        lines = (
+            replace(line, actions=()) if done else line
+            for line, done in zip(self.lines, answered, strict=True)
+        )
+        return replace(self, lines=tuple(lines))
 
 
 def gathered(entries: Iterable[Entry]) -> tuple[Entry, ...]:
@@ -196,6 +217,11 @@ class Activity:
         if any(e.rank > entry.rank and entry.key in (e.key, e.also) for e in related):
             return self
         rest = tuple(e for e in self.entries if e.key not in mine) if related else self.entries
+        if entry.document:
+            rest = tuple(
+                e.without_questions() if e.document == entry.document and e.when <= entry.when else e
+                for e in rest
+            )
         place = next((i for i, e in enumerate(rest) if e.when <= entry.when), len(rest))
         return replace(self, entries=(*rest[:place], entry, *rest[place:])[: self.most])
 
@@ -205,6 +231,10 @@ class Activity:
         for entry in entries:
             state = state.add(entry)
         return state
+
+    def answered(self, is_answered: Callable[[Action], bool]) -> Activity:
+        """Without the buttons of questions that have their answer (:meth:`Entry.without_questions`)."""
+        return replace(self, entries=tuple(e.without_questions(is_answered) for e in self.entries))
 
     def remove(self, key: str) -> Activity:
         """Without the entry of this key."""

@@ -12,9 +12,9 @@ from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QtCore, QtWidgets
 from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone
 from silo.workbench.pane.banner import Banner
-from silo.workbench.pane.waiting import Row, host_of, meant_for_another, rows
+from silo.workbench.pane.waiting import Row, can_send, heading, host_of, meant_for_another, rows
 from silo.workbench.session.shown import Shown
-from silo.workbench.words import counted, plain, translate
+from silo.workbench.words import plain, tip, translate
 
 OnAction = Callable[[Action], None]
 
@@ -169,6 +169,8 @@ class WaitingWidget(QtWidgets.QFrame):  # type: ignore[misc]
 
     # More of them would push the news out of sight; all of them are sent all the same.
     MOST = 4
+    # Lines of a BOM difference; the pointer over "… and more" shows the rest.
+    MOST_DETAILS = 3
 
     def __init__(self, on_action: OnAction) -> None:
         super().__init__()
@@ -186,10 +188,8 @@ class WaitingWidget(QtWidgets.QFrame):  # type: ignore[misc]
         self.setVisible(bool(shown.waiting))
         if not shown.waiting:
             return
-        one = translate("Silo", "{n} thing waits to be sent")
-        many = translate("Silo", "{n} things wait to be sent")
-        self._layout.addWidget(widgets.label(counted(len(shown.waiting), one, many), bold=True))
-        ordered = rows(shown.waiting, shown.server.url)
+        self._layout.addWidget(widgets.label(heading(shown.waiting, shown.server.url), bold=True))
+        ordered = rows(shown.waiting, shown.server.url, shown.theirs)
         for row in ordered[: self.MOST]:
             self._row(row)
         left = len(ordered) - self.MOST
@@ -197,19 +197,30 @@ class WaitingWidget(QtWidgets.QFrame):  # type: ignore[misc]
             self._layout.addWidget(
                 widgets.label(translate("Silo", "… and {n} more").replace("{n}", str(left)), Tone.QUIET)
             )
-        send = [Action(Do.RETRY, translate("Silo", "Send now"))]
+        send = []
+        if can_send(shown.waiting, shown.server.url):
+            send.append(Action(Do.RETRY, translate("Silo", "Send now")))
         if len(away := meant_for_another(shown.waiting, shown.server.url)) > 1:
             text = translate("Silo", "Send all {n} of another address to {host}").replace(
                 "{n}", str(len(away))
             )
             text = text.replace("{host}", host_of(shown.server.url))
             send.append(Action(Do.SEND_HERE, text, target=",".join(map(str, away))))
-        self._layout.addLayout(buttons(send, self._on_action))
+        if send:
+            self._layout.addLayout(buttons(send, self._on_action))
 
     def _row(self, row: Row) -> None:
         what = f"{row.title} · {row.what} · {_clock(row.since)}"
         self._layout.addWidget(widgets.label(what, Tone.ERROR if row.urgent else Tone.PLAIN))
         if row.reason:
             self._layout.addWidget(widgets.label(row.reason, Tone.QUIET))
+        for text in row.details[: self.MOST_DETAILS]:
+            self._layout.addWidget(widgets.label(text, Tone.WARNING))
+        if left := row.details[self.MOST_DETAILS :]:
+            more = widgets.label(
+                translate("Silo", "… and {n} more").replace("{n}", str(len(left))), Tone.QUIET
+            )
+            more.setToolTip(tip("; ".join(row.details)))
+            self._layout.addWidget(more)
         if row.actions:
             self._layout.addLayout(buttons(row.actions, self._on_action))

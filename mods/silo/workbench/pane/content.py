@@ -18,6 +18,11 @@ from silo.workbench.words import translate
 FIRST, MORE = 40, 60
 
 
+def _waits(shown: Shown) -> object:
+    """What is drawn of what waits."""
+    return shown.waiting, shown.server, shown.theirs
+
+
 class Pane(QtWidgets.QWidget):  # type: ignore[misc]
     """The content of the dock: connection, work in progress, what waits, and the boxes, newest first."""
 
@@ -68,7 +73,7 @@ class Pane(QtWidgets.QWidget):  # type: ignore[misc]
         before, self._shown = self._shown, shown
         self._banner.draw(banner(shown))
         self._busy.draw(shown)
-        if before is None or (before.waiting, before.server) != (shown.waiting, shown.server):
+        if before is None or _waits(before) != _waits(shown):
             self._waiting.draw(shown)
         today = time.strftime("%Y-%m-%d")
         if before is None or before.activity is not shown.activity or today != self._day:

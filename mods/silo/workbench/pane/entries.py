@@ -46,6 +46,7 @@ def of_sent(sent: Sent, page: Page, now: float | None = None) -> Entry:
         rank=1,
         icon="silo-bom" if sent.status in (Status.MERGED, Status.BLOCKED) else "silo-commit",
         part_of=_batch_of(sent, tone),
+        document=sent.resolved.assembly.doc_path if sent.resolved is not None else "",
     )
 
 

@@ -5,14 +5,20 @@ Pure."""
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 from silo.api.address import canonical
 from silo.outbox.entry import ASKED, Entry, State
 from silo.workbench.pane.activity import Action, Do
-from silo.workbench.words import plain, translate
+from silo.workbench.words import counted, plain, translate
+
+if TYPE_CHECKING:
+    from silo.workbench.commit.theirs import Theirs
+
+_MOST_TEXTS = 40
 
 
 @dataclass(frozen=True)
@@ -23,6 +29,8 @@ class Row:
         a person has to look at it.
     since
         seconds since 1970.
+    details
+        the BOM base → theirs → mine, for a commit that is held because of a colleague's.
     """
 
     title: str
@@ -31,13 +39,39 @@ class Row:
     reason: str = ""
     urgent: bool = False
     actions: tuple[Action, ...] = ()
+    details: tuple[str, ...] = ()
 
 
-def rows(entries: Iterable[Entry], server_url: str) -> tuple[Row, ...]:
+def rows(
+    entries: Iterable[Entry], server_url: str, theirs: Mapping[int, Theirs | None] | None = None
+) -> tuple[Row, ...]:
     """The entries, those first that a person has to look at."""
     here = canonical(server_url) if server_url else ""
-    made = [_row(entry, here) for entry in entries]
+    made = [_row(entry, here, (theirs or {}).get(entry.id)) for entry in entries]
     return tuple(sorted(made, key=lambda row: not row.urgent))
+
+
+def can_send(entries: Iterable[Entry], server_url: str) -> bool:
+    """True where *Send now* would send something: not all waits for a person, an address or settings."""
+    here = canonical(server_url) if server_url else ""
+    return bool(here) and any(
+        entry.state is not State.HELD and entry.server in ("", here) for entry in entries
+    )
+
+
+def heading(entries: Sequence[Entry], server_url: str) -> str:
+    """How many things wait, and for whom."""
+    urgent = sum(row.urgent for row in rows(entries, server_url))
+    one, many = (
+        translate("Silo", "{n} thing waits to be sent"),
+        translate("Silo", "{n} things wait to be sent"),
+    )
+    if urgent == len(entries):
+        one = translate("Silo", "{n} thing waits for your choice")
+        many = translate("Silo", "{n} things wait for your choice")
+    elif urgent:
+        many += translate("Silo", ", {urgent} of them for your choice").replace("{urgent}", str(urgent))
+    return counted(len(entries), one, many)
 
 
 def meant_for_another(entries: Iterable[Entry], server_url: str) -> tuple[int, ...]:
@@ -46,7 +80,7 @@ def meant_for_another(entries: Iterable[Entry], server_url: str) -> tuple[int, .
     return tuple(entry.id for entry in entries if here and entry.server not in ("", here))
 
 
-def _row(entry: Entry, here: str) -> Row:
+def _row(entry: Entry, here: str, theirs: Theirs | None) -> Row:
     away = bool(here and entry.server not in ("", here))
     text = entry.reason
     if away:
@@ -57,6 +91,11 @@ def _row(entry: Entry, here: str) -> Row:
     elif entry.state is State.KEEPING and not text:
         text = translate("Silo", "Its file is being copied.")
     urgent = away or entry.state is State.HELD
+    details: list[str] = []
+    if theirs is not None and theirs.lines:
+        from silo.workbench.commit.theirs import line_texts  # late: FreeCAD's start waits for this module
+
+        details = line_texts(theirs, _MOST_TEXTS)
     return Row(
         title=plain(" ".join(filter(None, (entry.part_number, entry.label or entry.file_name))), 80),
         what=_what(entry),
@@ -64,6 +103,7 @@ def _row(entry: Entry, here: str) -> Row:
         reason=plain(text, 400),
         urgent=urgent,
         actions=tuple(_actions(entry, here, away=away)) if urgent or entry.reason else (),
+        details=tuple(details),
     )
 
 

@@ -122,7 +122,7 @@ class RegisterFlow:
                 files.setdefault(identity, []).append(row.candidate.entry.doc_path)
         for identity, paths in files.items():
             if len(set(paths)) > 1:
-                self._commits.decisions.accept(identity, paths)
+                self._commits.accept(identity, paths)
 
     # -- registering ------------------------------------------------------------------------------------
 
@@ -179,6 +179,9 @@ class RegisterFlow:
         """Upload the files that have an item now, and sync the assembly's BOM with the new lines."""
         if not registered:
             return
+        # A copy that became a part of its own is no question any more.
+        own = {candidate.entry.doc_path for candidate in registered}
+        self._session.answered(lambda asked: not own.isdisjoint(asked.objects))
         registered_now = translate("Silo", "Registered")
 
         def comment(file: str) -> str:

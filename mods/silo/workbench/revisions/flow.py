@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from silo.bom.errors import DocumentError, SiloError
 from silo.folders import cache_folder
+from silo.outbox.database import KEPT_ASIDE_DAYS
 from silo.workbench.commit.opened import Base
 from silo.workbench.commit.theirs import Choice, Theirs
 from silo.workbench.pane.activity import Entry, Line, Tone
@@ -156,7 +157,8 @@ class RevisionFlow:
         if doc is not None:
             self._desk.close(doc)
         self._desk.open(path)
-        text = translate("Silo", "Yours is kept at {path}").replace("{path}", str(kept)) if kept else ""
+        told = translate("Silo", "Yours is kept for {n} days at {path}")
+        text = told.replace("{n}", str(KEPT_ASIDE_DAYS)).replace("{path}", str(kept)) if kept else ""
         title = translate("Silo", "Took {who}'s revision {n}: {name}") if theirs.revision else ""
         title = title or translate("Silo", "Took the file on disk: {name}")
         for key, value in (("{who}", theirs.who), ("{n}", str(theirs.revision)), ("{name}", _name(path))):

@@ -18,7 +18,7 @@ from silo.bom.errors import ConfigError, SiloError
 from silo.outbox.entry import Commit, State
 from silo.outbox.entry import Entry as Waiting
 from silo.outbox.store import Store
-from silo.workbench.pane.activity import Entry
+from silo.workbench.pane.activity import Action, Entry
 from silo.workbench.session.colleagues import Colleagues, Newer
 from silo.workbench.session.jobs import Busy, Control, Deliver, Job, Worker
 from silo.workbench.session.shown import Listener, Shown
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from silo.api.client import SiloClient
     from silo.outbox.report import Sent
     from silo.workbench.commit.opened import Base
+    from silo.workbench.commit.theirs import Theirs
     from silo.workbench.session.online import Online
 
 
@@ -71,6 +72,7 @@ class Session:
         self._online: Online | None = None
         self._live = False
         self._colleagues = Colleagues()
+        self._comparing = False
 
     # -- the server -------------------------------------------------------------------------------------
 
@@ -115,7 +117,8 @@ class Session:
         server, waiting = result
         for entry in waiting:
             self._colleagues.sending(entry.identity)
-        self._show(server=server, waiting=waiting)
+        self._show(server=server, theirs={})
+        self._waits(waiting)
         if waiting and server.configured:
             self.send(force=False)
 
@@ -183,7 +186,8 @@ class Session:
     def _sent_all(self, result: Any) -> None:
         report, waiting = result
         self._colleagues.sent(entry.identity for entry in waiting if entry.state is not State.HELD)
-        self._show(waiting=waiting, newer=self._colleagues.newer)
+        self._show(newer=self._colleagues.newer)
+        self._waits(waiting)
         stopped = report.stopped_by if report is not None else None
         if stopped is not None and stopped.code != "cancelled":
             self._show(reason=str(stopped), connection=self._connection_after(stopped))
@@ -246,11 +250,45 @@ class Session:
             return self.outbox.entries()
 
         def done(waiting: tuple[Waiting, ...]) -> None:
-            self._show(waiting=waiting)
+            self._waits(waiting)
             if send:
                 self.send(force=True)
 
         self._disk.submit(Job(translate("Silo", "Outbox"), run, done=done, failed=self.problem))
+
+    def _waits(self, waiting: tuple[Waiting, ...]) -> None:
+        """Show what waits; a worker finds out what the colleagues changed for whom commits are held."""
+        asked = {entry.id: entry for entry in waiting if entry.newer and entry.path}
+        known = {number: found for number, found in self.shown.theirs.items() if number in asked}
+        self._show(waiting=waiting, theirs=known)
+        left = [entry for number, entry in asked.items() if number not in known]
+        if not left or self._comparing:
+            return
+
+        def compare(client: SiloClient, control: Control) -> dict[int, Theirs | None]:
+            from silo.api.address import canonical
+            from silo.workbench.commit.theirs import look_held
+
+            here = canonical(client.base_url)
+            return {
+                entry.id: look_held(client, self.outbox, entry, control.cancelled)
+                if entry.server == here
+                else None
+                for entry in left
+            }
+
+        def done(found: dict[int, Theirs | None]) -> None:
+            self._comparing = False
+            # Decided meanwhile, and perhaps held again because of a third revision.
+            still = {entry.id for entry in self.shown.waiting if entry in left}
+            new = {number: theirs for number, theirs in found.items() if number in still}
+            self._show(theirs={**self.shown.theirs, **new})
+
+        def failed(_error: SiloError) -> None:
+            self._comparing = False  # the question stands without its details; asked again with the next look
+
+        self._comparing = True
+        self.ask(translate("Silo", "Comparing with Silo"), compare, done, failed)
 
     # -- anything else that asks the server -------------------------------------------------------------
 
@@ -347,6 +385,10 @@ class Session:
     def add(self, entry: Entry) -> None:
         """Show one more box."""
         self._show(activity=self.shown.activity.add(entry))
+
+    def answered(self, is_answered: Callable[[Action], bool]) -> None:
+        """Questions of the boxes have their answer (:meth:`Entry.without_questions`)."""
+        self._show(activity=self.shown.activity.answered(is_answered))
 
     def _busy(self, busy: Busy | None) -> None:
         self._show(busy=busy)

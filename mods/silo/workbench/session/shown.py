@@ -16,6 +16,7 @@ from silo.workbench.settings.server import Server
 if TYPE_CHECKING:
     # It brings pydantic with it, which only a worker may import (start-up time).
     from silo.outbox.report import Sent
+    from silo.workbench.commit.theirs import Theirs
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,9 @@ class Shown:
 
     waiting
         all that is in the outbox, oldest first.
+    theirs
+        id in the outbox → what a colleague's revision changed, for commits that are held because of one; None
+        where there is nothing to compare.
     newer
         UUID of an item → the newest commit of it that another FreeCAD has made since this one runs.
     presence
@@ -35,6 +39,7 @@ class Shown:
     reason: str = ""
     busy: Busy | None = None
     waiting: tuple[Waiting, ...] = ()
+    theirs: Mapping[int, Theirs | None] = field(default_factory=dict)
     activity: Activity = field(default_factory=Activity)
     newer: Mapping[str, Newer] = field(default_factory=dict)
     presence: tuple[str, ...] = ()
