@@ -12,6 +12,7 @@ from silo.bom.errors import ReadOnlyError, SiloError
 from silo.registering.orders import Order
 from silo.registration import Journal
 from silo.workbench.commit.flow import CommitFlow
+from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone
 from silo.workbench.register.flow import RegisterFlow
 
 
@@ -40,7 +41,12 @@ def orders(office: Office) -> list[Order]:
 
 
 def test_from_the_offer_to_the_bom(office: Office, flow: RegisterFlow, top: Document) -> None:
-    """Items, identities in the files, the files in Silo, and the assembly's BOM."""
+    """Items, identities in the files, the files in Silo, and the assembly's BOM; older boxes do not ask any
+    more about what is a part of its own now."""
+    plate = next(part.FileName for part in top.parts if part.Label == "Plate")
+    for key, file in (("asked", plate), ("other", "/v/b")):
+        same = Action(Do.SAME, "Same part", "id", objects=(file, "/v/a"))
+        office.session.add(Entry(key, "x", 1.0, lines=(Line("2 files", Tone.WARNING, (same,)),)))
     flow.start(top)
     office.settle()
     (window,) = office.desk.registers
@@ -56,6 +62,9 @@ def test_from_the_offer_to_the_bom(office: Office, flow: RegisterFlow, top: Docu
     }
     assert all(doc.identity for doc in top.parts)
     assert "M01" in window.numbers
+    boxes = {box.key: box for box in office.session.shown.activity.entries}
+    assert not boxes["asked"].lines[0].actions
+    assert boxes["other"].lines[0].actions
 
 
 def test_no_unsaved_edits_are_left(office: Office, flow: RegisterFlow, top: Document) -> None:

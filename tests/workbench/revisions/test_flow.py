@@ -105,6 +105,8 @@ def test_taking_theirs_ends_the_held_commit_and_keeps_mine(day: Day) -> None:
     assert day.held is None
     assert day.office.files("Plate") == [b"one", b"theirs"]
     assert day.boxes()[0] == "Took alice's revision 2: Plate.FCStd"
+    (where,) = day.office.session.shown.activity.entries[0].lines
+    assert where.text.startswith("Yours is kept for 90 days at ")
 
 
 def test_a_third_persons_file_is_kept_as_well(day: Day) -> None:

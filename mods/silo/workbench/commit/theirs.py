@@ -184,16 +184,17 @@ def look_held(
     client: SiloClient, outbox: Store, entry: Entry, cancelled: Cancel | None = None
 ) -> Theirs | None:
     """The newest revision that a held commit would undo, with the BOM base → theirs → mine; None for a part,
-    and where nothing would be undone any more. For a worker.
+    for another server's, and where nothing would be undone any more. For a worker.
 
     Raises SiloError where the server or a file does not answer.
     """
+    from silo.api.address import canonical
     from silo.api.revisions import standing
     from silo.bom.snapshot import from_plain
     from silo.vault.revisions import top_of
 
     extraction = outbox.bom(entry.id)[0]
-    if not extraction:
+    if not extraction or entry.server != canonical(client.base_url):
         return None
     try:
         mine = top_of(from_plain(json.loads(extraction)))

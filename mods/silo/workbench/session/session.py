@@ -186,8 +186,7 @@ class Session:
     def _sent_all(self, result: Any) -> None:
         report, waiting = result
         self._colleagues.sent(entry.identity for entry in waiting if entry.state is not State.HELD)
-        self._show(newer=self._colleagues.newer)
-        self._waits(waiting)
+        self._waits(waiting, newer=self._colleagues.newer)
         stopped = report.stopped_by if report is not None else None
         if stopped is not None and stopped.code != "cancelled":
             self._show(reason=str(stopped), connection=self._connection_after(stopped))
@@ -256,32 +255,24 @@ class Session:
 
         self._disk.submit(Job(translate("Silo", "Outbox"), run, done=done, failed=self.problem))
 
-    def _waits(self, waiting: tuple[Waiting, ...]) -> None:
+    def _waits(self, waiting: tuple[Waiting, ...], **more: Any) -> None:
         """Show what waits; a worker finds out what the colleagues changed for whom commits are held."""
         asked = {entry.id: entry for entry in waiting if entry.newer and entry.path}
         known = {number: found for number, found in self.shown.theirs.items() if number in asked}
-        self._show(waiting=waiting, theirs=known)
+        self._show(waiting=waiting, theirs=known, **more)
         left = [entry for number, entry in asked.items() if number not in known]
         if not left or self._comparing:
             return
 
         def compare(client: SiloClient, control: Control) -> dict[int, Theirs | None]:
-            from silo.api.address import canonical
             from silo.workbench.commit.theirs import look_held
 
-            here = canonical(client.base_url)
-            return {
-                entry.id: look_held(client, self.outbox, entry, control.cancelled)
-                if entry.server == here
-                else None
-                for entry in left
-            }
+            return {entry.id: look_held(client, self.outbox, entry, control.cancelled) for entry in left}
 
         def done(found: dict[int, Theirs | None]) -> None:
             self._comparing = False
             # Decided meanwhile, and perhaps held again because of a third revision.
-            still = {entry.id for entry in self.shown.waiting if entry in left}
-            new = {number: theirs for number, theirs in found.items() if number in still}
+            new = {entry.id: found[entry.id] for entry in left if entry in self.shown.waiting}
             self._show(theirs={**self.shown.theirs, **new})
 
         def failed(_error: SiloError) -> None:

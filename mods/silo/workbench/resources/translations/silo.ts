@@ -253,11 +253,6 @@
         </message>
         <message>
             <location filename="../../commit/dialog.py" />
-            <source>… and {n} more lines</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../commit/dialog.py" />
             <location filename="../../commit/theirs.py" />
             <location filename="../../pane/banner.py" />
             <source>Somebody</source>
@@ -426,6 +421,11 @@
         <message>
             <location filename="../../commit/theirs.py" />
             <source>{name}: {base} → {mine} by you, as before in theirs</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../commit/theirs.py" />
+            <source>… and {n} more lines</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -741,16 +741,6 @@ They are installed in {folder}.</source>
         </message>
         <message>
             <location filename="../../pane/boxes.py" />
-            <source>{n} thing waits to be sent</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/boxes.py" />
-            <source>{n} things wait to be sent</source>
-            <translation type="unfinished" />
-        </message>
-        <message>
-            <location filename="../../pane/boxes.py" />
             <source>Send now</source>
             <translation type="unfinished" />
         </message>
@@ -881,6 +871,31 @@ They are installed in {folder}.</source>
             <location filename="../../pane/entries.py" />
             <location filename="../../preview/dialog.py" />
             <source>View in Silo →</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>{n} thing waits to be sent</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>{n} things wait to be sent</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>{n} thing waits for your choice</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>{n} things wait for your choice</source>
+            <translation type="unfinished" />
+        </message>
+        <message>
+            <location filename="../../pane/waiting.py" />
+            <source>, {urgent} of them for your choice</source>
             <translation type="unfinished" />
         </message>
         <message>
@@ -1075,6 +1090,7 @@ They are installed in {folder}.</source>
         </message>
         <message>
             <location filename="../../preview/flow.py" />
+            <location filename="../../session/session.py" />
             <source>Comparing with Silo</source>
             <translation type="unfinished" />
         </message>
@@ -1601,7 +1617,7 @@ They are installed in {folder}.</source>
         </message>
         <message>
             <location filename="../../revisions/flow.py" />
-            <source>Yours is kept at {path}</source>
+            <source>Yours is kept for {n} days at {path}</source>
             <translation type="unfinished" />
         </message>
         <message>
