@@ -38,6 +38,7 @@ def edit(page: Page, case: Case, child: str) -> Locator:
     """The open form of a line."""
     page.goto(case.path)
     page.get_by_role("link", name=f"Edit {child}").click()
+    page.wait_for_url("**edit=*")  # loaded: until then the first field may still take the focus
     return page.locator("#edit")
 
 

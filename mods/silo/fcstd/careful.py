@@ -24,6 +24,10 @@ class Malformed(ValueError):
     """The XML is not well-formed, or not one that may be read; the text says what, for people."""
 
 
+class Refused(Malformed):
+    """Nothing is wrong with the XML, and FreeCAD reads it: it has what no file of FreeCAD has."""
+
+
 @dataclass(slots=True)
 class Head:
     """What stands before the data of the objects. ``types`` is in document order."""
@@ -69,7 +73,7 @@ class _Walk:
 
 
 def _refuse_doctype(*_: object) -> None:
-    raise Malformed("has a document type (DOCTYPE), which FreeCAD does not write; it is not read")
+    raise Refused("has a document type (DOCTYPE), which FreeCAD does not write; it is not read")
 
 
 def as_utf8(raw: bytes) -> bytes:

@@ -53,6 +53,8 @@ def story() -> None:
         RUNS.get(name, nothing)(one)
         wait(settled)
         done[name] = {"known": name in RUNS, "changed": difference(before, states())}
+    # The group of a document is filled in turns.
+    wait(lambda: all("SiloState" in doc.getObject(name).PropertiesList for name in ("P", "B")))
     tell(
         done=done, shown={obj.Name: shown_in_editor(obj) for obj in (doc.getObject("P"), doc.getObject("B"))}
     )

@@ -133,7 +133,7 @@ def same_part(one: Any, top: Any) -> None:
     # The box of the first question may still be there, below.
     wait(lambda: "Bracket3.FCStd" in "".join(labels(one.dock)))
     min(buttons(one.dock, "Same part"), key=height).click()
-    wait(lambda: newest(one) != asked and settled())
+    wait(lambda: "identity" not in newest(one) and settled())
     tell(same=[asked, newest(one)])
     Gui.runCommand("Origin_Commit")
     wait(lambda: newest(one).startswith("Committed") and settled())

@@ -122,8 +122,9 @@ def unregistered(one: Any) -> None:
     wait(lambda: found.rows)
     found.register_button.click()
     wait(lambda: all(row.finished for row in found.rows) and settled())
-    wait(lambda: boxes("BOM Updated: ") and settled())
-    tell(numbers={row.component(): row.result.part_number for row in found.rows})
+    numbers = {row.component(): row.result.part_number for row in found.rows}
+    wait(lambda: boxes(f"BOM Updated: {numbers['New.FCStd']}") and settled())
+    tell(numbers=numbers)
     found.close()
 
 

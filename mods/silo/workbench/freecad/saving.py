@@ -88,6 +88,7 @@ def damage(path: str, name: str = "") -> FcstdError | None:
     """
     from silo.bom.findings import FindingCode
     from silo.fcstd import Library
+    from silo.fcstd.careful import Refused
     from silo.fcstd.container import FileState
     from silo.fcstd.limits import ANY_SIZE
     from silo.fcstd.problem import FcstdError
@@ -105,7 +106,8 @@ def damage(path: str, name: str = "") -> FcstdError | None:
             elif (found := document.getObject(name)) is not None:
                 document.check(found)
     except FcstdError as error:
-        return None if error.finding is FindingCode.MISSING_FILE else error
+        sound = error.finding is FindingCode.MISSING_FILE or isinstance(error.__cause__, Refused)
+        return None if sound else error
     except OSError:
         return None
     if len(_SOUND) >= _REMEMBERED:
