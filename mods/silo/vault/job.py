@@ -107,18 +107,18 @@ class Job:
         several = [self._meant(one, lines) for one in several]
         with ThreadPoolExecutor(self.senders, "silo-merge") as pool:
             asked = []
-            for one in several:
-                number = one.assembly.part_number
-                first = self._sent.get(number or "")
-                # Copies of one file are one item, and one merge.
-                if first is None or blocking(one):
-                    first = pool.submit(self._sync, one, lines)
-                    if number is not None and not blocking(one):
-                        self._sent[number] = first
-                asked.append(first)
             try:
+                for one in several:
+                    number = one.assembly.part_number
+                    first = self._sent.get(number or "")
+                    # Copies of one file are one item, and one merge.
+                    if first is None or blocking(one):
+                        first = pool.submit(self._sync, one, lines)
+                        if number is not None and not blocking(one):
+                            self._sent[number] = first
+                    asked.append(first)
                 found = [future.result() for future in asked]
-            except BaseException:  # Ctrl-C; the senders end what is under way
+            except BaseException:  # Ctrl-C, also while the first are sent; the senders end what is under way
                 self.stopped = self.stopped or CancelledError("the job was stopped")
                 self.stop.set()
                 raise
