@@ -66,7 +66,8 @@ from pathlib import Path
 from silo.files import documents_in
 from silo.vault.index import Index
 from silo.vault.plan import make_plan
-from silo.vault.reading import Question, Reading, pool_of
+from silo.vault.pool import pool_of
+from silo.vault.reading import Question, Reading
 
 def main():
     folder, index, jobs, dask = sys.argv[1], sys.argv[2], int(sys.argv[3]), sys.argv[4] or None

@@ -26,7 +26,8 @@ from silo.testing import FakeSilo
 from silo.vault.index import Index
 from silo.vault.job import Job
 from silo.vault.plan import make_plan
-from silo.vault.reading import Pool, Question, Reading, pool_of, work
+from silo.vault.pool import Pool, pool_of
+from silo.vault.reading import Question, Reading, work
 
 
 def write(folder: Path, silo: FakeSilo | None, assemblies: dict[int, dict[int, int]], parts: int = 4) -> None:

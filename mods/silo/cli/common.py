@@ -111,7 +111,8 @@ def above_zero(text: str, most: int = 1_000_000_000) -> int:
 def reading_of(args: argparse.Namespace) -> Iterator[Reading]:
     """What reads files, as the options say."""
     from silo.vault.index import Index, default_path
-    from silo.vault.reading import Reading, pool_of
+    from silo.vault.pool import pool_of
+    from silo.vault.reading import Reading
 
     given = getattr(args, "index", None)
     path = None if getattr(args, "no_index", False) else given or default_path()

@@ -48,10 +48,8 @@ class FileSurvey(Survey):
     def __init__(self, document: FcstdDocument, xml: XmlText) -> None:
         self._document, self._xml = document, xml
         types = xml.head.types
-        known = {
-            type_id: kind_by_type(ancestors(type_id)) for type_id in set(types.values()) if is_listed(type_id)
-        }
         self._types = set(types.values())
+        known = {type_id: kind_by_type(ancestors(type_id)) for type_id in self._types if is_listed(type_id)}
         self._kinds = {
             name: known.get(type_id) or kind_of(document.object_of(name, type_id))
             for name, type_id in types.items()

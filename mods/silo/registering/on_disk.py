@@ -14,7 +14,7 @@ from silo.bom.model import BomEntry, Extraction
 from silo.bom.naming import Proposal, propose_all
 from silo.bom_sync import resolve
 from silo.fcstd import check_stampable, stamp
-from silo.open_in_freecad import open_in_any
+from silo.open_in_freecad import OpenInFreecad, open_in_any
 from silo.registering.offer import Candidate, Control, Seen, State
 from silo.registering.orders import Order, carry_out
 from silo.registration import Journal, Registration, component_key, document_uid, unclear
@@ -70,15 +70,16 @@ def whole_folder(
 
 def seen_on_disk(paths: Iterable[str], *, even_if_open: bool) -> dict[str, Seen]:
     """How the files of components stand."""
-    return {path: Seen(_state(path, even_if_open)) for path in paths}
+    opened = None if even_if_open else open_in_any()
+    return {path: Seen(_state(path, opened)) for path in paths}
 
 
-def _state(path: str, even_if_open: bool) -> State:
+def _state(path: str, opened: OpenInFreecad | None) -> State:
     if not os.path.isfile(path):
         return State.MISSING
     if not os.access(path, os.W_OK):
         return State.READ_ONLY
-    return State.ELSEWHERE if not even_if_open and open_in_any().has_file(path) else State.READY
+    return State.ELSEWHERE if opened is not None and opened.has_file(path) else State.READY
 
 
 def is_own(candidate: Candidate) -> bool:

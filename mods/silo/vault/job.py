@@ -15,7 +15,6 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from itertools import islice
 from typing import Any
 
 from silo.api.policy import ends_run
@@ -36,7 +35,7 @@ from silo.bom_sync import (
     sync,
 )
 from silo.vault.plan import Node, Plan
-from silo.vault.reading import Reading
+from silo.vault.reading import Reading, grouped
 
 _AT_ONCE = 500  # assemblies whose BOMs are in memory at one time
 _SENDERS = 4
@@ -82,7 +81,7 @@ class Job:
         left = Counter(node.top for node in self.plan.nodes.values())
         done: dict[str, list[Outcome]] = {}
         for layer in self.plan.layers:
-            for nodes in _pieces(layer, _AT_ONCE):
+            for nodes in grouped(layer, _AT_ONCE):
                 for node, outcome in zip(nodes, self._outcomes(nodes, known), strict=True):
                     done.setdefault(node.top, []).append(outcome)
                     left[node.top] -= 1
@@ -189,9 +188,3 @@ def _as_the_first(one: Resolved, first: Outcome) -> Outcome:
 def _endless(one: Resolved) -> bool:
     """Nobody can allow an assembly that contains itself."""
     return any(finding.code in (FindingCode.CYCLE, FindingCode.TOO_DEEP) for finding in one.findings)
-
-
-def _pieces(nodes: Iterable[Node], size: int) -> Iterator[list[Node]]:
-    left = iter(nodes)
-    while piece := list(islice(left, size)):
-        yield piece

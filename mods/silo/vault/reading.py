@@ -13,19 +13,16 @@ from __future__ import annotations
 
 import json
 import os
-import signal
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor
+from concurrent.futures import CancelledError, Future
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import islice
-from multiprocessing import get_all_start_methods, get_context, parent_process
-from typing import Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 from uuid import uuid4
 
 from silo.bom.errors import DocumentError, InputError, SiloError
@@ -39,14 +36,15 @@ from silo.fcstd.locate import Found, Locator
 from silo.vault.answers import Known, engine
 from silo.vault.index import Index
 
+if TYPE_CHECKING:
+    from silo.vault.pool import Pool
+
 T = TypeVar("T")
 CHUNK = 64
 # Questions that are worked on together; of the files of others an assembly has no facts yet.
 _TOGETHER = 20_000
 # Bytes of assemblies' files that are kept from the first step to the second.
 _HELD = 48 << 20
-# A worker process costs some 0.3 s to start; reading a file some milliseconds.
-_WORTH_A_POOL = 128
 _TRIES = 3
 _WORKER_LOST = (BrokenProcessPool, CancelledError)
 
@@ -209,93 +207,6 @@ def _work(session: Session, questions: Sequence[Question], supplies: Supplies | 
     return Done(found, session.contents.reads - reads, time.thread_time() - begin)
 
 
-# --- where the work is done -----------------------------------------------------------------------------
-
-
-class Pool:
-    """Makes executors for the work, and another one where that broke.
-
-    alone
-        makes one for a single question that may end its process.
-    worth
-        so many files are read here before others are called in: they take a moment to start.
-    chunk
-        questions that travel together.
-    """
-
-    def __init__(
-        self,
-        make: Callable[[], Executor],
-        jobs: int,
-        *,
-        alone: Callable[[], Executor] | None = None,
-        worth: int = _WORTH_A_POOL,
-        chunk: int = CHUNK,
-    ) -> None:
-        self.jobs, self.worth, self.chunk = jobs, worth, chunk
-        self.alone = alone or (lambda: _processes(1))
-        self._make = make
-        self._run = str(uuid4())
-        self._executor: Executor | None = None
-
-    def submit(self, questions: Sequence[Question], supplies: Supplies | None) -> Future[Done]:
-        """Have questions worked on."""
-        if self._executor is None:
-            self._executor = self._make()
-        return self._executor.submit(work, questions, supplies, self._run)
-
-    def renew(self) -> None:
-        """Give up an executor that lost its workers."""
-        if self._executor is not None:
-            self._executor.shutdown(wait=False, cancel_futures=True)
-            self._executor = None
-
-
-@contextmanager
-def pool_of(jobs: int, dask: str | None = None, *, worth: int = _WORTH_A_POOL) -> Iterator[Pool | None]:
-    """Processes of this machine, or a Dask cluster at an address; None for one job."""
-    if dask is not None:
-        with _dask_client(dask) as client:
-            workers = sum(client.nthreads().values())
-            yield Pool(client.get_executor, max(1, workers), worth=worth)
-        return
-    pool = Pool(lambda: _processes(jobs), jobs, worth=worth) if jobs > 1 else None
-    try:
-        yield pool
-    finally:
-        if pool is not None:
-            pool.renew()
-
-
-def _processes(jobs: int) -> ProcessPoolExecutor:
-    # Never by fork: a library may have threads that hold locks.
-    context = get_context("forkserver" if "forkserver" in get_all_start_methods() else "spawn")
-    return ProcessPoolExecutor(jobs, context, initializer=_begin_worker)
-
-
-def _begin_worker() -> None:
-    """Ctrl-C is the parent's affair; and no worker outlives a parent that was killed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if (parent := parent_process()) is not None:
-
-        def watch() -> None:
-            parent.join()
-            os._exit(1)
-
-        threading.Thread(target=watch, daemon=True).start()
-
-
-def _dask_client(address: str) -> Any:
-    try:
-        from dask.distributed import Client
-    except ImportError as error:
-        raise InputError("--dask needs the extra: pip install 'silo-mod[dask]'") from error
-    try:
-        return Client(address, timeout=10, set_as_default=False)
-    except (OSError, ValueError) as error:
-        raise InputError(f"no Dask scheduler answers at {address}: {error}") from error
-
-
 # --- the job --------------------------------------------------------------------------------------------
 
 
@@ -341,9 +252,9 @@ class Reading:
 
     def ask_many(self, questions: Iterable[Question]) -> Iterator[Answer]:
         """The answers in the order of the questions."""
-        for some in _grouped(questions, _TOGETHER):
+        for some in grouped(questions, _TOGETHER):
             known: dict[int, Known] = {}
-            for numbers in _grouped(range(len(some)), CHUNK):
+            for numbers in grouped(range(len(some)), CHUNK):
                 asked = [(some[number].path, some[number].name) for number in numbers]
                 for number, found in zip(numbers, self.index.recall_all(asked), strict=True):
                     if found is not None:
@@ -359,7 +270,7 @@ class Reading:
         pool = self._pool if self._pool is not None and len(left) >= self._pool.worth else None
         size = CHUNK if pool is None else pool.chunk
         contents, linked, held = dict[str, Content](), dict[int, tuple[str, ...]](), 0
-        chunks = (_Chunk([some[number] for number in group], None) for group in _grouped(left, size))
+        chunks = (_Chunk([some[number] for number in group], None) for group in grouped(left, size))
         for number, first in zip(left, self._worked_on(chunks, pool), strict=True):
             if first.facts:
                 self.index.remember_facts(os.path.realpath(some[number].path), first.facts)
@@ -370,7 +281,7 @@ class Reading:
                 if first.content is not None and held < _HELD:  # else it is read again
                     contents[first.content.xml.path] = first.content
                     held += first.content.size
-        walks = (self._walk(some, group, linked, contents) for group in _grouped(linked, size))
+        walks = (self._walk(some, group, linked, contents) for group in grouped(linked, size))
         for number, first in zip(list(linked), self._worked_on(walks, pool), strict=True):
             assert first.known is not None  # since supplies were given
             known[number] = self._remembered(some[number], first.known)
@@ -448,7 +359,8 @@ def _succeeded(future: Future[Any]) -> bool:
     return future.done() and not future.cancelled() and future.exception() is None
 
 
-def _grouped(several: Iterable[T], size: int) -> Iterator[list[T]]:
+def grouped(several: Iterable[T], size: int) -> Iterator[list[T]]:
+    """Lists of ``size``; the last one may be shorter."""
     left = iter(several)
     while group := list(islice(left, size)):
         yield group

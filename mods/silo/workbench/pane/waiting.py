@@ -46,22 +46,21 @@ def rows(
     entries: Iterable[Entry], server_url: str, theirs: Mapping[int, Theirs | None] | None = None
 ) -> tuple[Row, ...]:
     """The entries, those first that a person has to look at."""
-    here = canonical(server_url) if server_url else ""
+    here = _address(server_url)
     made = [_row(entry, here, (theirs or {}).get(entry.id)) for entry in entries]
     return tuple(sorted(made, key=lambda row: not row.urgent))
 
 
 def can_send(entries: Iterable[Entry], server_url: str) -> bool:
     """True where *Send now* would send something: not all waits for a person, an address or settings."""
-    here = canonical(server_url) if server_url else ""
-    return bool(here) and any(
-        entry.state is not State.HELD and entry.server in ("", here) for entry in entries
-    )
+    here = _address(server_url)
+    return bool(here) and not all(_is_urgent(entry, here) for entry in entries)
 
 
 def heading(entries: Sequence[Entry], server_url: str) -> str:
     """How many things wait, and for whom."""
-    urgent = sum(row.urgent for row in rows(entries, server_url))
+    here = _address(server_url)
+    urgent = sum(_is_urgent(entry, here) for entry in entries)
     one, many = (
         translate("Silo", "{n} thing waits to be sent"),
         translate("Silo", "{n} things wait to be sent"),
@@ -76,12 +75,26 @@ def heading(entries: Sequence[Entry], server_url: str) -> str:
 
 def meant_for_another(entries: Iterable[Entry], server_url: str) -> tuple[int, ...]:
     """Entries that wait for another address than the one in use."""
-    here = canonical(server_url) if server_url else ""
-    return tuple(entry.id for entry in entries if here and entry.server not in ("", here))
+    here = _address(server_url)
+    return tuple(entry.id for entry in entries if _is_away(entry, here))
+
+
+def _address(server_url: str) -> str:
+    """The address in use, as entries have theirs; "" for none."""
+    return canonical(server_url) if server_url else ""
+
+
+def _is_away(entry: Entry, here: str) -> bool:
+    return bool(here) and entry.server not in ("", here)
+
+
+def _is_urgent(entry: Entry, here: str) -> bool:
+    """It waits for a person, not for the server."""
+    return entry.state is State.HELD or _is_away(entry, here)
 
 
 def _row(entry: Entry, here: str, theirs: Theirs | None) -> Row:
-    away = bool(here and entry.server not in ("", here))
+    away, urgent = _is_away(entry, here), _is_urgent(entry, here)
     text = entry.reason
     if away:
         meant = translate("Silo", "It is meant for {there}, which is not the server in use.")
@@ -90,7 +103,6 @@ def _row(entry: Entry, here: str, theirs: Theirs | None) -> Row:
         text = translate("Silo", "A newer commit of it has arrived since; this one would undo it.")
     elif entry.state is State.KEEPING and not text:
         text = translate("Silo", "Its file is being copied.")
-    urgent = away or entry.state is State.HELD
     details: list[str] = []
     if theirs is not None and theirs.lines:
         from silo.workbench.commit.theirs import line_texts  # late: FreeCAD's start waits for this module
