@@ -100,9 +100,7 @@ def sync_top(top: str, found: Extraction | SiloError, api: SyncApi, options: Opt
     if options.skip_parts and not found.blocked and _is_library(found):
         return TopResult(top, base, skipped="only parts of its own, and no item: a library of parts")
     try:
-        whole = resolve(found, api)
-        broken = [one for one in assemblies(whole) if any(entry.missing for entry in one.entries)]
-        whole = suggest_by_identity(whole, [(one, server_lines(one, api)) for one in broken])
+        whole = ask_for_moved(resolve(found, api), api)
         outcomes = tuple(_outcomes(whole, api, options))
     except SiloError as error:
         return TopResult(top, base, error=error)
@@ -127,6 +125,16 @@ def _identities_before(
     return found
 
 
+def _lacks_files(one: Resolved) -> bool:
+    return any(entry.missing for entry in one.entries)
+
+
+def ask_for_moved(whole: Resolved, api: SyncApi) -> Resolved:
+    """:func:`suggest_by_identity`, with the lines that the server has of assemblies that lack files."""
+    lacking = [one for one in assemblies(whole) if _lacks_files(one)]
+    return suggest_by_identity(whole, [(one, server_lines(one, api)) for one in lacking])
+
+
 def suggest_by_identity(
     whole: Resolved,
     compared: Sequence[tuple[Resolved, Iterable[Mapping[str, Any]]]],
@@ -139,7 +147,7 @@ def suggest_by_identity(
     candidates
         UUIDs → the files that may carry one of them; None: any file of the project.
     """
-    lacking = [(one, lines) for one, lines in compared if any(entry.missing for entry in one.entries)]
+    lacking = [(one, lines) for one, lines in compared if _lacks_files(one)]
     known = _identities_before(lacking)
     if not known:
         return whole

@@ -8,13 +8,13 @@ import os
 from collections.abc import Mapping
 from dataclasses import replace
 
-from silo.batch import suggest_by_identity
+from silo.batch import ask_for_moved
 from silo.bom.errors import Exit, InputError, SiloError
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.paths import relative
 from silo.bom.report import base_of, bom_json, flat_json
 from silo.bom.resolve import consolidation_findings
-from silo.bom_sync import assemblies, resolve, server_lines
+from silo.bom_sync import resolve
 from silo.cli import common
 from silo.cli.common import Commands
 
@@ -52,10 +52,7 @@ def run(args: argparse.Namespace) -> int:
     if args.resolve:
         with common.client_of(args) as client:
             common.reach(client, extraction)
-            resolved = resolve(extraction, client)
-            broken = [one for one in assemblies(resolved) if any(e.missing for e in one.entries)]
-            compared = [(one, server_lines(one, client)) for one in broken]
-            resolved = suggest_by_identity(resolved, compared)
+            resolved = ask_for_moved(resolve(extraction, client), client)
         known = {entry.key: entry for entry in resolved.unresolved}
         head = _whole(replace(resolved.assembly, children=resolved.entries), known)
         extraction = Extraction(resolved.assembly, head.children, resolved.findings)
