@@ -18,6 +18,7 @@ from server_testing import Api, bom
 
 import silo_server
 from silo.bom.errors import BusyError, RejectedError
+from silo.bom.headers import Role
 from silo_server.db.bulk import insert_rows
 from silo_server.db.engine import Database
 from silo_server.db.tables import bom_lines, items
@@ -141,6 +142,29 @@ def test_a_file_that_is_no_bom_is_not_read_to_its_end() -> None:
         imports.read_csv(b"Part number,Quantity\n" + b"A,1\n" * 21 + b'"never closed', 20)
     late = b"x\n" * (imports.HEADER_WITHIN - 1) + b"Part number,Quantity\nA,1\n"
     assert imports.read_csv(late, 20)[0][1]["part_number"] == "A"
+
+
+@pytest.mark.parametrize(
+    ("header", "differ", "agree"),
+    [
+        ("PN,Qty,Quantity", "A,4,8", ("A,4,4", "A,,4")),
+        ("Part number,Qty,PN", "A,4,B", ("A,4,A",)),
+        ("PN,Qty,Notes,Remarks", "A,4,ours,theirs", ("A,4,ours,ours",)),
+        ("PN,Quantity (pcs),Quantity (m)", "A,,0.4", ("A,4,",)),
+    ],
+)
+def test_two_columns_of_one_meaning_that_differ_are_refused(
+    header: str, differ: str, agree: tuple[str, ...]
+) -> None:
+    """Neither is taken in silence; a person's choice of columns is, and so is what says the same twice."""
+    data = f"A title\n{header}\n{differ}\n".encode()
+    with pytest.raises(RejectedError, match=r"both mean the .* in row 3 they say") as caught:
+        imports.read_csv(data, 20)
+    assert len(caught.value.problems) == 1
+    layout = imports.Layout(",", 1, {Role.PART_NUMBER: 0, Role.QUANTITY: 1})
+    assert imports.read_csv(data, 20, layout)[0][1]["part_number"] == "A"
+    for row in agree:
+        assert len(imports.read_csv(f"A title\n{header}\n{row}\n".encode(), 20)) == 1
 
 
 def test_guesses_that_come_at_once_are_all_counted(url: str, tmp_path: Path) -> None:

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
@@ -107,6 +108,52 @@ def find_roles(header: Sequence[str], roles: Collection[Role]) -> dict[Role, int
         if found is not None and found[0] in roles:
             best[found[0]] = min(best.get(found[0], (len(_ROLE_OF), 0)), (found[1], index))
     return {role: index for role, (_, index) in best.items()}
+
+
+def second_columns(
+    header: Sequence[str], roles: Collection[Role], at: Mapping[Role, int]
+) -> list[tuple[Role, int]]:
+    """The columns that mean what another one is used for (``at``)."""
+    found = ((alias(normal(cell)), index) for index, cell in enumerate(header))
+    return [(of[0], i) for of, i in found if of and of[0] in roles and at.get(of[0], i) != i]
+
+
+@dataclass(frozen=True, slots=True)
+class Clash:
+    """Two columns of one meaning that differ in a row: index of that row, and both texts."""
+
+    role: Role
+    ours: str
+    other: str
+    row: int
+    used: str
+    unused: str
+
+
+def find_clashes(
+    header: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    at: Mapping[Role, int],
+    seconds: Iterable[tuple[Role, int]],
+    is_empty: Callable[[str], bool] = lambda text: not text,
+) -> list[Clash]:
+    """One for each of the ``seconds`` that says something else than the used column (``at``)."""
+    return [
+        Clash(role, header[at[role]].strip(), header[index].strip(), number, used, unused)
+        for role, index in seconds
+        for number, used, unused in _differences(rows, at[role], index, is_empty)
+    ]
+
+
+def _differences(
+    rows: Sequence[Sequence[str]], used: int, other: int, is_empty: Callable[[str], bool]
+) -> list[tuple[int, str, str]]:
+    """The first row in which the columns differ, if any."""
+    for number, cells in enumerate(rows):
+        ours, theirs = (plain_cell(cells[i].strip()) if i < len(cells) else "" for i in (used, other))
+        if not is_empty(theirs) and theirs != ours:
+            return [(number, ours, theirs)]
+    return []
 
 
 def missing_columns(header: Sequence[str], at: Mapping[Role, int], needed: Sequence[Role]) -> str:

@@ -74,6 +74,13 @@ def test_a_second_material_column_is_reported(bom: Bom, header: str) -> None:
     assert BomCode.FILE in codes(table)
 
 
+@pytest.mark.parametrize("header", ["Qty,Quantity", "Menge,Anzahl", "Quantity (pcs),Quantity (m)"])
+def test_a_second_quantity_column_is_reported(bom: Bom, header: str) -> None:
+    """Totals are divided by it."""
+    assert codes(bom(f"Name,Material,Total mass,{header}\nlid,steel,8 kg,4,4\n")) == []
+    assert BomCode.FILE in codes(bom(f"Name,Material,Total mass,{header}\nlid,steel,8 kg,4,8\n"))
+
+
 @pytest.mark.parametrize(("mark", "told"), [("\t", True), ("|", True), (";", True), (",", False)])
 def test_a_lone_point_before_three_digits(bom: Bom, mark: str, told: bool) -> None:
     """ "1.234 kg" is reported where the delimiter does not tell the country: 1.2 kg here is 1.2 t there."""

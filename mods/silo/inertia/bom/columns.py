@@ -126,7 +126,7 @@ class Columns:
     """Where each role is (column index), and the units that the headers of the mass columns state.
 
     others
-        columns that mean a mass or a material as well, and lost to the one that is used.
+        columns that mean a quantity, a mass or a material as well, and lost to the one that is used.
     exact
         masses are written in full (Silo's own export does so): a short one was not rounded.
     strange
@@ -155,7 +155,7 @@ class Columns:
 
 
 _MASSES = (Role.MASS, Role.TOTAL_MASS)
-_ONE_ONLY = (*_MASSES, Role.MATERIAL)
+_ONE_ONLY = (*_MASSES, Role.MATERIAL, Role.QUANTITY)
 _SILOS_OWN = {"part number", "total quantity", "unreferenced since"}
 
 

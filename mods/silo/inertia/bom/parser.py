@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from silo.bom.errors import InputError
-from silo.bom.headers import Role
+from silo.bom.headers import Role, find_clashes
 from silo.bom.numbers import LARGEST_QUANTITY, Mark, read_count
 from silo.inertia.bom.masscolumn import MassReader
 from silo.inertia.bom.masses import is_empty, unit_factor
@@ -190,20 +190,15 @@ def _missing_columns(sheet: Sheet) -> list[BomWarning]:
 
 def _second_columns(sheet: Sheet) -> Iterator[BomWarning]:
     """Columns that mean the same as one that is used, and say something else somewhere."""
-    for role, index in sheet.columns.others:
-        for row in sheet.rows:
-            here = row.cells[index].strip() if index < len(row.cells) else ""
-            used = sheet.columns.cell(row.cells, role)
-            if not is_empty(here) and here != used:
-                other, ours = sheet.header[index].strip(), sheet.header[sheet.columns.at[role]].strip()
-                yield BomWarning(
-                    BomCode.FILE,
-                    f"the columns “{ours}” and “{other}” both mean the {role.replace('_', ' ')}; “{ours}” "
-                    f"was used, though line {row.line} has “{used}” there and “{here}” in the other. "
-                    f"--column {role}={other} takes the other one",
-                    sheet.header_line,
-                )
-                break
+    cells = [row.cells for row in sheet.rows]
+    for one in find_clashes(sheet.header, cells, sheet.columns.at, sheet.columns.others, is_empty):
+        yield BomWarning(
+            BomCode.FILE,
+            f"the columns “{one.ours}” and “{one.other}” both mean the {one.role.replace('_', ' ')}; "
+            f"“{one.ours}” was used, though line {sheet.rows[one.row].line} has “{one.used}” there and "
+            f"“{one.unused}” in the other. --column {one.role}={one.other} takes the other one",
+            sheet.header_line,
+        )
 
 
 def _duplicates(rows: Sequence[BOMEntry]) -> list[BomWarning]:

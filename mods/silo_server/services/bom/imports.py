@@ -19,7 +19,7 @@ from typing import Any
 from sqlalchemy import select
 
 from silo.bom.errors import RejectedError
-from silo.bom.headers import Role, find_roles, missing_columns, plain_cell
+from silo.bom.headers import Role, find_clashes, find_roles, missing_columns, plain_cell, second_columns
 from silo.bom.numbers import Mark, common_mark, parse_number, read_quantity
 from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
@@ -82,7 +82,7 @@ def read_csv(data: bytes, max_rows: int, layout: Layout | None = None) -> list[R
     """
     refuse_workbook(data)
     text = _decode(data)
-    layout = layout or guess(text)
+    chosen, layout = layout is not None, layout or guess(text)
     missing = [role for role in NEEDED if role not in layout.columns]
     if missing:
         names = " and ".join(f"'{role.replace('_', ' ').capitalize()}'" for role in missing)
@@ -96,6 +96,8 @@ def read_csv(data: bytes, max_rows: int, layout: Layout | None = None) -> list[R
         raise TooLargeError(f"file: this server takes at most {max_rows} rows, got more")
     header, body = table[layout.header] if table else [], table[layout.header + 1 :]
     _refuse_flat(header, body, layout.columns[Role.PART_NUMBER])
+    if not chosen:
+        _refuse_clashes(header, body, layout)
     gap_column = _column(header, _INCOMPLETE)
     records = []
     for number, cells in enumerate(body, start=layout.header + 2):
@@ -173,6 +175,19 @@ def _refuse_flat(header: Sequence[str], body: Sequence[Sequence[str]], part_numb
             "file: this is a flat export, whose quantities are totals over all levels, not the lines of this "
             "BOM. Export “these lines” instead, change them, and import that"
         )
+
+
+def _refuse_clashes(header: Sequence[str], body: Sequence[Sequence[str]], layout: Layout) -> None:
+    """Which of two columns counts is a person's to say, not the order of the file."""
+    header = header[:MAX_COLUMNS]
+    seconds = second_columns(header, ROLES, layout.columns)
+    problems = [
+        f"the columns '{one.ours}' and '{one.other}' both mean the {one.role.replace('_', ' ')}, and in row "
+        f"{layout.header + 2 + one.row} they say {one.used[:40]!r} and {one.unused[:40]!r}"
+        for one in find_clashes(header, body, layout.columns, seconds)
+    ]
+    if problems:
+        raise RejectedError(f"file: {'; '.join(problems)}; choose one, or rename the other", problems)
 
 
 def _column(header: Sequence[str], name: str) -> int | None:
