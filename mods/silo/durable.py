@@ -14,13 +14,18 @@ from typing import BinaryIO
 from silo.platform import patiently, sync_folder
 
 __all__ = [
+    "Stamp",
     "private_file",
     "private_folder",
     "remove_patiently",
     "replace_patiently",
     "replacing",
+    "stamp_of",
     "sync_folder",
 ]
+
+Stamp = tuple[int, int, int]
+"""What changes when a file is written: its time in ns, its size, its number on the disk."""
 
 
 @contextmanager
@@ -68,6 +73,15 @@ def private_file(path: Path | str) -> None:
     """Make a file for its owner only, or close the one that is there to others. Raises OSError."""
     os.close(os.open(path, os.O_RDWR | os.O_CREAT, 0o600))
     _close_to_others(path)
+
+
+def stamp_of(path: Path | str | int) -> Stamp | None:
+    """The stamp of a file, by its path or as an open one; None where there is no file."""
+    try:
+        status = os.stat(path)
+    except OSError:
+        return None
+    return (status.st_mtime_ns, status.st_size, status.st_ino)
 
 
 def _close_to_others(path: Path | str) -> None:

@@ -4,17 +4,15 @@
 from __future__ import annotations
 
 import hashlib
-import sqlite3
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
+from silo.api.address import canonical
 from silo.api.files import Origin
 from silo.api.wire import Revision
-from silo.bom.errors import UnreachableError
+from silo.bom.errors import RejectedError, UnreachableError
 from silo.outbox.entry import UNKNOWN, Commit, Entry, State
-from silo.outbox.store import Store
 from silo.testing import FakeSilo
 
 if TYPE_CHECKING:
@@ -221,27 +219,162 @@ def test_saved_files_are_known_by_what_they_were_made_from(vault: Vault) -> None
     assert [outbox.origin_of(x) for x in ("aa", "bb", "cc")] == ["one", "one", "cc"]
 
 
-def test_an_outbox_of_before_is_taken_over(tmp_path: Path) -> None:
-    """Its entries ask nobody, as they did."""
-    path = tmp_path / "outbox.sqlite3"
-    store = Store(path)
-    entry = store.add(Commit(path="", taken_at=1.0, part_number="A", request="{}"))
-    with sqlite3.connect(path) as db:
-        for name in ("origin", "on_top_of", "newer", "place", "links"):
-            db.execute(f"ALTER TABLE entry DROP COLUMN {name}")
-        db.execute("DROP TABLE derived")
-        db.execute("DROP TABLE known")
-        db.execute("PRAGMA user_version = 2")
-    db.close()
-    (known,) = Store(path).entries()
-    assert (known.id, known.origin, known.newer, known.links) == (entry.id, "", {}, "")
-    Store(path).derived("aa", "bb")
-    assert Store(path).origin_of("aa") == "bb"
-
-
 @pytest.mark.parametrize("origin", ["", UNKNOWN])
 def test_the_first_file_of_an_item_passes(vault: Vault, origin: str) -> None:
     """There is nothing to undo."""
     mine(vault, b"one", origin)
     vault.send()
     assert (vault.waiting(), contents(vault)) == ((), [b"one"])
+
+
+def refuse_next_merge(vault: Vault) -> None:
+    def hook(called: str) -> None:
+        if called == "merge_bom":
+            vault.silo.before = lambda _name: None
+            raise RejectedError("Bolt is archived")
+
+    vault.silo.before = hook
+
+
+def test_a_bom_that_was_held_does_not_undo_a_colleagues(vault: Vault) -> None:
+    """Retry says "the part is there now", not "send it over what a colleague committed meanwhile"."""
+    entry = mine(vault, b"one", UNKNOWN)
+    refuse_next_merge(vault)
+    vault.send()
+    assert [one.file_left for one in vault.waiting()] == [False]
+    theirs(vault, b"one less", 1)
+    vault.outbox.retry(entry.id)
+    vault.send()
+    assert (vault.waiting(), vault.lines()) == ((), {})
+    assert "alice has committed revision 2 since" in vault.told[-1].entry.remark
+
+
+def test_a_held_bom_may_go_after_files_that_come_from_here(vault: Vault) -> None:
+    """Own files that were made from its file are no colleague's; with one between them they are."""
+    entry = mine(vault, b"one", UNKNOWN)
+    refuse_next_merge(vault)
+    vault.send()
+    for content, origin in ((b"two", b"one"), (b"three", b"two")):
+        vault.top.write_bytes(content)
+        vault.outbox.add(
+            Commit(
+                path=str(vault.top),
+                taken_at=2.0,
+                identity=vault.ids["Top"],
+                file=vault.top,
+                origin=sha(origin),
+            )
+        )
+        vault.send()
+    vault.outbox.retry(entry.id)
+    vault.send()
+    assert (vault.waiting(), vault.lines()) == ((), {"F01-0001": 3})
+
+
+def file_only(vault: Vault, content: bytes, origin: str) -> Entry:
+    vault.top.write_bytes(content)
+    return vault.outbox.add(
+        Commit(path=str(vault.top), taken_at=2.0, identity=vault.ids["Top"], file=vault.top, origin=origin)
+    )
+
+
+def test_the_bom_of_a_file_that_is_there_already_does_not_undo_a_colleagues(vault: Vault) -> None:
+    """The same file committed again makes no revision; its BOM is still that of the revision there is."""
+    file_only(vault, b"one", UNKNOWN)
+    vault.send()
+    mine(vault, b"one", sha(b"one"))
+
+    def hook(called: str) -> None:
+        if called == "merge_bom":
+            vault.silo.before = lambda _name: None
+            theirs(vault, b"one less", 1)
+
+    vault.silo.before = hook
+    vault.send()
+    assert (vault.waiting(), vault.lines()) == ((), {})
+    assert "alice has committed revision 2 since" in vault.told[-1].entry.remark
+
+
+def restored(vault: Vault, revision: int) -> None:
+    """The server is back at an older state: what came after this revision is gone."""
+    stored = next(s for s in vault.silo.items.values() if s.item.part_number == vault.number)
+    stored.revisions[:] = [one for one in stored.revisions if one.revision_number <= revision]
+    stored.files = {number: file for number, file in stored.files.items() if number <= revision}
+    stored.uploads.clear()
+
+
+def test_a_restored_server_gives_our_number_to_a_colleagues_file(vault: Vault) -> None:
+    """Revision 2 was ours once. The one that is there now is not, and sending would undo it."""
+    file_only(vault, b"one", UNKNOWN)
+    file_only(vault, b"two", sha(b"one"))
+    vault.send()
+    restored(vault, 1)
+    theirs(vault, b"one less", 1)
+    file_only(vault, b"three", sha(b"two"))
+    vault.send()
+    (held,) = vault.waiting()
+    assert (held.state, held.newer["revision_number"]) == (State.HELD, 2)
+    assert contents(vault) == [b"one", b"one less"]
+
+
+def test_our_own_upload_to_a_restored_server_is_no_colleagues(vault: Vault) -> None:
+    """Its answer was lost, and its number is below what the server had before it was restored."""
+    file_only(vault, b"one", UNKNOWN)
+    file_only(vault, b"two", sha(b"one"))
+    vault.send()
+    file_only(vault, b"three", sha(b"two"))
+
+    def lose(called: str) -> None:
+        if called == "upload_file":
+            raise UnreachableError("no answer")
+
+    vault.silo.before = lose
+    vault.send()
+    restored(vault, 0)
+    vault.silo.before, vault.silo.after = lambda _name: None, lose
+    vault.send(force=True)
+    vault.silo.after = lambda _name: None
+    vault.send(force=True)
+    assert (vault.waiting(), contents(vault)) == ((), [b"three"])
+
+
+def test_another_server_knows_nothing_of_the_old_ones_revisions(vault: Vault) -> None:
+    """Neither what was seen there, nor a comment on it, goes along."""
+    file_only(vault, b"one", UNKNOWN)
+    vault.send()
+    theirs(vault, b"one less", 1)
+    entry = file_only(vault, b"one other", sha(b"one"))
+    vault.send()
+    vault.outbox.retry(entry.id, "http://other.example")
+    (moved,) = vault.waiting()
+    assert (moved.server, moved.on_top_of, moved.base_revision, moved.comment) == (
+        canonical("http://other.example"),
+        None,
+        None,
+        "",
+    )
+    assert moved.newer == {}
+
+
+def test_a_copy_under_another_name_sends_neither_file_nor_bom_unasked(vault: Vault) -> None:
+    """ "Save As" copies the identity along: the copy's BOM is not that of the item."""
+    mine(vault, b"one", UNKNOWN)
+    vault.send()
+    copy = vault.folder / "Variant.FCStd"
+    copy.write_bytes(b"variant")
+    taken = vault.snapshot(vault.part("Bolt", 9))
+    vault.outbox.add(
+        Commit(
+            path=str(copy),
+            taken_at=9.0,
+            label="Top",
+            identity=vault.ids["Top"],
+            file=copy,
+            extraction=taken.extraction,
+            origin=sha(b"one"),
+        )
+    )
+    vault.send()
+    assert (contents(vault), vault.lines()) == ([b"one"], {"F01-0001": 3})
+    (held,) = vault.waiting()
+    assert (held.file_left, held.bom_left) == (True, True)

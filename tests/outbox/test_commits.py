@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import threading
 from typing import TYPE_CHECKING, Any
 
@@ -378,7 +379,8 @@ def held_bom(vault: Vault) -> None:
 def test_a_newer_commit_whose_bom_was_not_sent_makes_no_older_one_out_of_date(vault: Vault) -> None:
     """Its broken link held it back: the older BOM undoes nothing."""
     held_bom(vault)
-    vault.commit(vault.snapshot(vault.part("Bolt", 2), broken=True), content=b"two")
+    made_from = hashlib.sha256(b"top file").hexdigest()
+    vault.commit(vault.snapshot(vault.part("Bolt", 2), broken=True), content=b"two", origin=made_from)
     vault.send()
     (waiting,) = vault.waiting()
     assert not waiting.superseded

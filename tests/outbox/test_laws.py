@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from silo.api.wire import MergeEntry, MergeRequest
 from silo.bom.errors import ReadOnlyError, ServerFaultError, UnreachableError
+from silo.durable import Stamp
 from silo.outbox.entry import Commit, Entry, State, new_key
 from silo.outbox.send import send_all
 from silo.outbox.store import Store
@@ -56,9 +57,17 @@ class DyingStore(Store):
         super().update(entry_id, **values)
         self.fate.meet(local=True)
 
-    def arrived(self, entry: Entry, kind: str, revision: int | None = None, *, note: bool = True) -> None:
+    def arrived(
+        self,
+        entry: Entry,
+        kind: str,
+        revision: int | None = None,
+        *,
+        base: int | None = None,
+        note: bool = True,
+    ) -> None:
         self.fate.meet(local=True)
-        super().arrived(entry, kind, revision, note=note)
+        super().arrived(entry, kind, revision, base=base, note=note)
         self.fate.meet(local=True)
 
     def stage(self, commit: Commit, server: str = "") -> None:
@@ -70,9 +79,9 @@ class DyingStore(Store):
         super().finish(key, source)
         self.fate.meet(local=True)
 
-    def _copied(self, source: Path, copy: Path) -> tuple[str, int]:
+    def _copied(self, source: Path, copy: Path, stamp: Stamp | None) -> tuple[str, int]:
         self.fate.meet(local=True)
-        found = super()._copied(source, copy)
+        found = super()._copied(source, copy, stamp)
         self.fate.meet(local=True)
         return found
 

@@ -189,7 +189,7 @@ def test_a_newer_outbox_is_not_touched(outbox: Outbox) -> None:
     db = sqlite3.connect(outbox.path)
     db.execute("PRAGMA user_version = 99")
     db.close()
-    with pytest.raises(InputError, match="newer silo-mod"):
+    with pytest.raises(InputError, match="another version of silo-mod"):
         Outbox(outbox.path).entries()
 
 

@@ -7,7 +7,10 @@ import errno
 import hashlib
 import os
 import stat
+import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +18,7 @@ import pytest
 
 from silo.bom.errors import DocumentError, InputError
 from silo.bom.model import BomEntry, Extraction
+from silo.durable import Stamp, stamp_of
 from silo.outbox.database import OutboxError
 from silo.outbox.entry import Commit, State, new_key
 from silo.outbox.send import send_all
@@ -119,10 +123,10 @@ class Moody(Store):
 
     error: OSError | None = None
 
-    def _copied(self, source: Path, copy: Path) -> tuple[str, int]:
+    def _copied(self, source: Path, copy: Path, stamp: Stamp | None) -> tuple[str, int]:
         if self.error is not None:
             raise self.error
-        return super()._copied(source, copy)
+        return super()._copied(source, copy, stamp)
 
     def verified(self, entry: Any) -> Path:
         if self.error is not None:
@@ -275,3 +279,38 @@ def test_copies_of_replaced_files_are_kept_for_ninety_days(tmp_path: Path) -> No
         now[0] = time.time() + days * 86400.0
         store.sweep()
         assert (kept.exists(), restored.exists(), others.exists()) == (is_kept, is_kept, True)
+
+
+def test_what_is_written_after_the_commit_is_no_part_of_it(store: Store, document: Path) -> None:
+    """Without a second name (another disk) the document itself is copied, in its own time: not a later save
+    of it, and not a colleague's file that has come into its place."""
+    for name, write in (("saved", Path.write_bytes), ("replaced", replaced)):
+        made = replace(commit(document), stamp=stamp_of(document))
+        store.stage(made)
+        write(document, f"{name} later".encode())
+        with pytest.raises(DocumentError, match=r"written again since the commit.*commit it again"):
+            store.finish(made.key, document, stamp=made.stamp)
+        assert store.entries() == ()
+        store.sweep()
+        assert list(store.copies.iterdir()) == []
+    entry = store.add(replace(commit(document), stamp=stamp_of(document)))
+    assert entry.sha256 == hashlib.sha256(b"replaced later").hexdigest()
+
+
+def replaced(path: Path, content: bytes) -> None:
+    part = path.with_suffix(".part")
+    part.write_bytes(content)
+    part.replace(path)
+
+
+def test_several_programs_may_make_the_outbox_at_once(tmp_path: Path) -> None:
+    """Two FreeCADs that commit for the first time in the same moment."""
+    path, start = tmp_path / "outbox.sqlite3", threading.Barrier(8)
+
+    def first(number: int) -> None:
+        start.wait()
+        Store(path).stage(Commit("", float(number), part_number="A", request="{}"))
+
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(first, range(8)))
+    assert len(Store(path).entries()) == 8

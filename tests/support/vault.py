@@ -97,6 +97,7 @@ class Vault:
         comment: str = "",
         sync_bom: bool = True,
         allow_missing: bool = False,
+        origin: str = "",
     ) -> Entry:
         """Put a commit into the outbox; ``content`` None sends no file."""
         self.clock += 1
@@ -111,6 +112,7 @@ class Vault:
             file=Path(snapshot.path) if content is not None else None,
             extraction=snapshot.extraction if sync_bom else None,
             allow_missing=allow_missing,
+            origin=origin,
         )
         return self.outbox.add(commit)
 

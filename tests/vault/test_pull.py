@@ -12,7 +12,7 @@ from fcstd_writer import Doc, locals_, part
 from hypothesis import given
 from hypothesis import strategies as st
 
-from silo.bom.errors import DocumentError, NotFoundError
+from silo.bom.errors import DocumentError, NotFoundError, ServerFaultError
 from silo.bom.links import extract
 from silo.bom.model import Extraction
 from silo.bom.roots import choose_assembly
@@ -296,3 +296,90 @@ def test_relative_places_are_kept_whatever_the_folders(
     assert not any(".." in one.split("/") for one in places)
     for position, where in zip(positions, places, strict=True):
         assert posixpath.relpath(where, posixpath.dirname(places[0]) or ".") == position
+
+
+def test_a_file_below_is_that_of_the_tops_time(project: Project, tmp_path: Path) -> None:
+    """A nut that was committed again between the bolt that links to it and the arm above both."""
+    project.commit()
+    nut = project.folder / "work" / "vendor" / "Nut.FCStd"
+    before = nut.read_bytes()
+    part("Nut, greased", uuid=project.ids["Nut"]).save(nut)
+    project.commit("Nut")
+    project.write(bolts=6)
+    project.commit("Arm")
+    then = nut.read_bytes()
+    part("Nut, rusty", uuid=project.ids["Nut"]).save(nut)
+    project.commit("Nut")
+    for revision, content in ((1, before), (2, then)):
+        into = tmp_path / f"at {revision}"
+        assert project.pull(into, revision=revision).complete
+        assert (into / "vendor/Nut.FCStd").read_bytes() == content
+
+
+def test_a_file_that_is_not_what_was_committed_is_refused(project: Project, tmp_path: Path) -> None:
+    """Damaged in the server's store, or by a server that lies: nothing is written, nothing is learned."""
+    project.commit()
+    files = project.stored("Plate").files
+    files[1] = files[1][:-100]
+    learned: list[str] = []
+    with pytest.raises(ServerFaultError, match="revision 1, is not the one that was committed"):
+        project.pull(tmp_path / "into", learn=lambda sha256, _item, _number: learned.append(sha256))
+    assert not (tmp_path / "into").exists()
+    assert learned == []
+
+
+@pytest.mark.usefixtures("needs_symlinks")
+def test_no_folder_is_made_outside(project: Project, tmp_path: Path) -> None:
+    """A link that leads out is noticed before anything is made behind it."""
+    assembly(project.ids["Arm"], ("Plate", "parts/new/Plate.FCStd", 0)).save(project.arm)
+    (project.arm.parent / "parts" / "new").mkdir()
+    (project.arm.parent / "parts" / "Plate.FCStd").rename(project.arm.parent / "parts/new/Plate.FCStd")
+    plate = project.arm.parent / "parts/new/Plate.FCStd"
+    project.store.add(Commit(path=str(plate), taken_at=1.0, identity=project.ids["Plate"], file=plate))
+    project.commit("Arm")
+    elsewhere, other = tmp_path / "elsewhere", tmp_path / "other"
+    elsewhere.mkdir()
+    other.mkdir()
+    (other / "parts").symlink_to(elsewhere)
+    with pytest.raises(DocumentError, match="leads out of"):
+        project.pull(other)
+    assert list(elsewhere.iterdir()) == []
+
+
+@pytest.mark.usefixtures("needs_symlinks")
+def test_a_link_to_a_file_stays_a_link(project: Project, tmp_path: Path) -> None:
+    """The file is replaced where it is; a second path of it sees the same."""
+    project.commit()
+    into = tmp_path / "into"
+    project.pull(into)
+    plate, real = into / "robot/arm/parts/Plate.FCStd", into / "library" / "Plate-1.FCStd"
+    real.parent.mkdir()
+    plate.rename(real)
+    plate.symlink_to(real)
+    part("Plate, thicker", uuid=project.ids["Plate"]).save(project.path("arm/parts/Plate.FCStd"))
+    project.commit("Plate")
+    assert states(project.pull(into), into)["robot/arm/parts/Plate.FCStd"] is State.UPDATED
+    assert plate.is_symlink()
+    assert real.read_bytes() == project.path("arm/parts/Plate.FCStd").read_bytes()
+
+
+@pytest.mark.usefixtures("needs_symlinks")
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_two_files_that_are_one_on_this_disk(project: Project, tmp_path: Path, *, overwrite: bool) -> None:
+    """By a link here, elsewhere by case or Unicode form: the second does not replace the first."""
+    arm = project.arm.parent
+    for folder, name in (("a", "Plate"), ("b", "Nut")):
+        (arm / folder).mkdir()
+        part(name, uuid=project.ids[name]).save(arm / folder / "P.FCStd")
+        path = arm / folder / "P.FCStd"
+        project.store.add(Commit(path=str(path), taken_at=1.0, identity=project.ids[name], file=path))
+    assembly(project.ids["Arm"], ("A", "a/P.FCStd", 0), ("B", "b/P.FCStd", 0)).save(project.arm)
+    project.commit("Arm")
+    into = tmp_path / "into"
+    (into / "a").mkdir(parents=True)
+    (into / "b").symlink_to(into / "a")
+    pulled = project.pull(into, overwrite=overwrite, keep=project.store.keep_aside)
+    assert (into / "a/P.FCStd").read_bytes() == (arm / "a/P.FCStd").read_bytes()
+    (lost,) = pulled.lost
+    assert (lost.path, not pulled.complete) == ("b/P.FCStd", True)
+    assert "has the same place on this disk" in lost.reason

@@ -10,15 +10,13 @@ import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from silo.api.transport import Cancel
 from silo.api.wire import Revision
-from silo.bom.errors import ConflictError, NewerRevisionError, NotFoundError
+from silo.bom.errors import ConflictError, NewerRevisionError, NotFoundError, ServerFaultError
+from silo.durable import remove_patiently
 from silo.folders import scratch_folder
-
-if TYPE_CHECKING:
-    from silo.api.wire import Revision
 
 
 @dataclass(frozen=True)
@@ -73,12 +71,18 @@ def standing(
     """How a file that was made from ``origin`` (a SHA-256) stands.
 
     known
-        the number of that revision, for a server that keeps no checksums.
+        the number of that revision, for a server that keeps no checksums. Else the checksum decides: a server
+        that was restored from a backup gives the same numbers to other files.
     seen
         the newest revision that a person has seen and decided about.
     """
     files = sorted((r for r in revisions if has_file(r)), key=lambda r: r.revision_number)
-    mine = [r for r in files if checksum_of(r) == origin or r.revision_number in (known, seen)]
+    mine = [
+        r
+        for r in files
+        if r.revision_number == seen
+        or (checksum_of(r) == origin if checksum_of(r) else r.revision_number == known)
+    ]
     # What a person saw may be gone from the list, or have no file: the newest up to it then.
     mine += [r for r in files if seen is not None and r.revision_number <= seen]
     base = max(mine, key=lambda r: r.revision_number, default=None)
@@ -124,6 +128,31 @@ class Downloads(Protocol):
         *,
         cancelled: Cancel | None = None,
     ) -> str: ...
+
+
+def download_revision(
+    client: Downloads,
+    part_number: str,
+    path: Path,
+    revision: int,
+    checksum: str,
+    *,
+    cancelled: Cancel | None = None,
+) -> str:
+    """Fetch a revision's file to ``path``; gives its SHA-256.
+
+    Raises ServerFaultError where it is not the file that was committed (``checksum``; "" where the server
+    names none): it was damaged in the store or on the way.
+    """
+    found = client.download_file(part_number, path, revision, cancelled=cancelled)
+    if checksum and found != checksum:
+        remove_patiently(path)
+        raise ServerFaultError(
+            f"the file of {part_number}, revision {revision}, is not the one that was committed: its SHA-256 "
+            f"is {found[:12]}…, wanted {checksum[:12]}…. Nothing was written; the server's administrator can "
+            "check its files"
+        )
+    return found
 
 
 class MayHaveArrivedError(ConflictError):

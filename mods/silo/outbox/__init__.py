@@ -2,5 +2,5 @@
 """The outbox: the one durable queue of commits that are not in Silo yet.
 
 :mod:`entry` draws the states, :mod:`store` keeps them on disk (in :mod:`database`), :mod:`send` brings them
-to the server and :mod:`report` says how that went, :mod:`takeover` reads what older versions left.
+to the server and :mod:`report` says how that went.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The outbox's SQLite file: its tables, its transactions, its lock, and how an older one becomes today's.
+"""The outbox's SQLite file: its tables, its transactions, its lock, and what is remembered of files.
 
 Every transaction is on disk when it returns. Methods open the file for themselves, so any thread and
 process may call them. Standard library only.
@@ -69,8 +69,6 @@ CREATE TABLE sent (
     entry_id INTEGER NOT NULL,             -- the newest entry that arrived
     PRIMARY KEY (server, item, kind)
 );
-"""
-_ORIGINS = """
 CREATE TABLE derived (
     sha256 TEXT PRIMARY KEY,               -- a file that was saved, and not committed
     origin TEXT NOT NULL,                  -- the committed file that it was made from
@@ -83,13 +81,6 @@ CREATE TABLE known (
     revision INTEGER NOT NULL,
     PRIMARY KEY (server, sha256, item)
 );
-"""
-_SINCE_2 = """
-ALTER TABLE entry ADD COLUMN origin TEXT NOT NULL DEFAULT '';
-ALTER TABLE entry ADD COLUMN on_top_of INTEGER;
-ALTER TABLE entry ADD COLUMN newer TEXT NOT NULL DEFAULT '';
-ALTER TABLE entry ADD COLUMN place TEXT NOT NULL DEFAULT '';
-ALTER TABLE entry ADD COLUMN links TEXT NOT NULL DEFAULT '';
 """
 
 
@@ -170,9 +161,9 @@ class Database:
                 f"{self.path}: the outbox cannot be made ({error.strerror or error}). Nothing was kept for "
                 "sending; make room or mend the permissions, then commit again"
             ) from error
-        self._migrate()
+        self._make_tables()
 
-    def _migrate(self) -> None:
+    def _make_tables(self) -> None:
         with self._translated(), closing(self._connect(self.path)) as db:
             db.row_factory = sqlite3.Row
             if _version(db) == VERSION:
@@ -182,19 +173,16 @@ class Database:
             db.execute("PRAGMA synchronous = FULL")
             with _transaction(db):
                 version = _version(db)
-                if version > VERSION:
+                if version == VERSION:  # another process was quicker
+                    return
+                if version:
                     raise InputError(
-                        f"{self.path}: this outbox was written by a newer silo-mod; update this one"
+                        f"{self.path}: another version of silo-mod wrote this outbox (format {version}, "
+                        f"wanted {VERSION}). It may hold commits that are not in Silo yet: send them with "
+                        "that version, or move the file away"
                     )
-                if version == 1:
-                    db.execute("ALTER TABLE entry RENAME TO entry1")
-                    db.execute("ALTER TABLE sent RENAME TO sent1")
-                for statement in _statements(version):
+                for statement in filter(None, map(str.strip, _TABLES.split(";\n"))):
                     db.execute(statement)
-                if version == 1:
-                    from silo.outbox.takeover import of_first_outbox
-
-                    of_first_outbox(db)
                 db.execute(f"PRAGMA user_version = {VERSION}")
 
 
@@ -288,12 +276,6 @@ def _transaction(db: sqlite3.Connection) -> Iterator[None]:
         db.execute("ROLLBACK")
         raise
     db.execute("COMMIT")
-
-
-def _statements(version: int) -> Iterator[str]:
-    """What makes a file of this version (0: a new one) one of today."""
-    for part in (_SINCE_2 if version == 2 else _TABLES, _ORIGINS):
-        yield from filter(None, map(str.strip, part.split(";\n")))
 
 
 def insert(db: sqlite3.Connection, row: dict[str, Any]) -> None:

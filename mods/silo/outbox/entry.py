@@ -27,6 +27,7 @@ from typing import Any
 from uuid import uuid4
 
 from silo.bom.model import Extraction
+from silo.durable import Stamp
 
 
 class State(StrEnum):
@@ -60,6 +61,9 @@ class Commit:
         seconds since 1970, UTC.
     file
         what to copy: the document, or a second name of it (:meth:`Store.hold`); None where only the BOM goes.
+    stamp
+        of the document at the commit, where it is copied itself: what is written into it later is no part of
+        the commit.
     extraction
         the BOM as it was at the commit; compared with the server's and merged when it is sent.
     request
@@ -83,6 +87,7 @@ class Commit:
     key: str = field(default_factory=new_key)
     comment: str = ""
     file: Path | None = None
+    stamp: Stamp | None = None
     properties: Mapping[str, Any] = field(default_factory=dict)
     extraction: Extraction | None = None
     request: str = ""

@@ -85,6 +85,10 @@ def send_all(
         return run.report
 
 
+class _OtherNameError(ConflictError):
+    """The file has another name than the item's: a person says whether it is the same part."""
+
+
 class _PassingError(SiloError):
     """This computer's disk did not answer; nothing is wrong with the entry."""
 
@@ -199,15 +203,16 @@ class _Run:
         if entry.file_left:
             try:
                 sent = self._send_file(sent)
-                entry = replace(entry, file_left=False)
+                entry = replace(sent.entry, file_left=False)
             except SiloError as error:
                 _refuse(error, refused)
                 if isinstance(error, MayHaveArrivedError):
                     # A person who presses Retry has looked at these revisions.
                     self.store.update(entry.id, base_revision=error.newest)
                 if isinstance(error, NewerRevisionError):
-                    # The BOM would undo the colleague's as the file would.
+                    # So that a person can look at it.
                     self.store.update(entry.id, newer=json.dumps(dict(error.revision)))
+                if isinstance(error, NewerRevisionError | _OtherNameError):
                     return sent
         if entry.bom_left:
             try:
@@ -236,13 +241,16 @@ class _Run:
     def _send_file(self, sent: Sent) -> Sent:
         entry = sent.entry
         mine: Revision | None = None
+        # The newest one decides it nearly always; an item may have hundreds.
+        newest = self._revisions(sent.part_number, newest=1)
+        if is_newest(entry.sha256, newest):
+            number = newest[0].revision_number
+            self._learn(entry, newest[0])
+            self.store.arrived(entry, "file", number)
+            # The BOM is the BOM of that revision, also where this commit did not make it.
+            arrived = number if entry.base_revision is not None else None
+            return replace(sent, entry=replace(entry, revision=number), revision=arrived)
         if entry.base_revision is None:
-            # The newest one decides it nearly always; an item may have hundreds.
-            newest = self._revisions(sent.part_number, newest=1)
-            if is_newest(entry.sha256, newest):
-                self._learn(entry, newest[0])
-                self.store.arrived(entry, "file")
-                return sent
             known = self._revisions(sent.part_number)
             self._check_name(entry, known)
             base = self._base(entry, known)
@@ -261,8 +269,9 @@ class _Run:
             base = self._base(entry, self._revisions(sent.part_number)) if mine is None else None
         revision = mine or self._upload(entry, base)
         self._learn(entry, revision)
-        self.store.arrived(entry, "file", revision.revision_number)
-        return replace(sent, revision=revision.revision_number)
+        number = revision.revision_number
+        self.store.arrived(entry, "file", number, base=revision.base_revision)
+        return replace(sent, entry=replace(entry, revision=number), revision=number)
 
     def _learn(self, entry: Entry, revision: Revision) -> None:
         self.store.learn(entry.server, entry.sha256, entry.identity, revision.revision_number)
@@ -324,7 +333,7 @@ class _Run:
         before = other_name(entry.file_name, known) if entry.identity else ""
         if before and entry.renamed != SAME_PART:
             self.store.update(entry.id, renamed=ASKED)
-            raise ConflictError(
+            raise _OtherNameError(
                 f"{entry.file_name} carries the identity of {entry.part_number}, whose file in Silo is "
                 f"{before}. Is it the same part under a new name? Press Same part. Is it a copy that became "
                 "a new part? Press Discard, then choose Register Parts and in it: new part"
@@ -342,7 +351,7 @@ class _Run:
                 self.store.arrived(entry, "bom", note=decided.status is Status.UNCHANGED)
                 return sent
             request = merge_request(resolved, entry.key).model_dump_json(by_alias=True, exclude_none=True)
-        wanted = self._named(entry, request, sent.revision)
+        wanted = self._named(entry, request)
         # As it is sent now it is sent again: the server knows a merge by its sync_id and its content.
         self.store.update(entry.id, request=wanted.model_dump_json(by_alias=True, exclude_none=True))
         try:
@@ -357,7 +366,7 @@ class _Run:
         self.store.arrived(entry, "bom")
         return replace(sent, status=Status.MERGED, result=result, sync_id=wanted.sync_id or "")
 
-    def _named(self, entry: Entry, request: str, revision: int | None) -> MergeRequest:
+    def _named(self, entry: Entry, request: str) -> MergeRequest:
         """The request with its name and its document, where it does not have them yet."""
         try:
             wanted = MergeRequest.model_validate_json(request)
@@ -369,7 +378,7 @@ class _Run:
                 file=Path(entry.path).name, folder=project_folder(entry.path), sha256=entry.sha256 or None
             )
         if document is not None and document.revision is None:
-            document = document.model_copy(update={"revision": revision})
+            document = document.model_copy(update={"revision": entry.revision})
         return wanted.model_copy(update={"sync_id": wanted.sync_id or entry.key, "document": document})
 
 

@@ -30,7 +30,7 @@ from typing import Any
 from silo.api.address import canonical
 from silo.bom.errors import ConflictError, DocumentError, InputError
 from silo.bom.snapshot import to_plain
-from silo.durable import remove_patiently, replacing
+from silo.durable import Stamp, remove_patiently, replacing, stamp_of
 from silo.files import content_hash
 from silo.folders import data_folder
 from silo.outbox.database import Origins, insert
@@ -98,13 +98,15 @@ class Store(Origins):
         with self.transaction() as db:
             insert(db, row)
 
-    def finish(self, key: str, source: Path | None = None, origin: str = "") -> str:
+    def finish(
+        self, key: str, source: Path | None = None, origin: str = "", stamp: Stamp | None = None
+    ) -> str:
         """Make the copy of a staged commit's file; what is held under a second name is read rather than
         ``source``.
 
         Where the disk does not take it, a commit with a second name stays and is tried again later. One
         without is forgotten and :class:`DocumentError` says so: nothing could be sent that is surely what was
-        committed.
+        committed. So it is where ``source`` has no longer the ``stamp`` that it had at the commit.
 
         ``origin`` replaces that of the commit: the commit before it may have been copied only now. Returns
         the file's SHA-256, "" where there is no copy of it.
@@ -113,13 +115,13 @@ class Store(Origins):
             return ""
         self._finishing.add(key)
         try:
-            self._finish(key, source, origin)
+            self._finish(key, source, origin, stamp)
         finally:
             self._finishing.discard(key)
         entry = self.by_key(key)
         return entry.sha256 if entry is not None else ""
 
-    def _finish(self, key: str, source: Path | None, origin: str) -> None:
+    def _finish(self, key: str, source: Path | None, origin: str, stamp: Stamp | None) -> None:
         entry = self.by_key(key)
         if entry is None or not entry.file_left or entry.sha256:
             return
@@ -131,7 +133,7 @@ class Store(Origins):
             self.update(entry.id, state=State.HELD, reason=text)
             return
         try:
-            sha256, size = self._copied(content, copy)
+            sha256, size = self._copied(content, copy, stamp if content is source else None)
         except OSError as error:
             told = f"cannot be copied for sending ({error.strerror or error})"
             if held is not None or content is copy:
@@ -147,7 +149,7 @@ class Store(Origins):
     def add(self, commit: Commit, server: str = "") -> Entry:
         """Both at once: on disk with its copy when it returns."""
         self.stage(commit, server)
-        self.finish(commit.key, commit.file)
+        self.finish(commit.key, commit.file, stamp=commit.stamp)
         entry = self.by_key(commit.key)
         if entry is None:
             raise InputError(f"{commit.path}: discarded while it was kept")
@@ -173,11 +175,10 @@ class Store(Origins):
         if entry.newer:
             changed |= {"on_top_of": entry.newer["revision_number"], "newer": ""}
             changed["comment"] = on_top(entry.comment, entry.newer)
-        # The BOM goes at a person's word, whichever revision is the newest.
-        changed["revision"] = None
         if server is not None and canonical(server) != entry.server:
             # What was seen of the old server says nothing of the new one.
             changed |= {"server": canonical(server), "base_revision": None, "on_top_of": None}
+            changed |= {"revision": None, "comment": entry.comment}
         if self.bom(entry_id)[0]:
             # What was refused is made anew: the missing part may have its number now.
             changed["request"] = ""
@@ -237,10 +238,22 @@ class Store(Origins):
         with self.transaction() as db:
             db.execute(f"UPDATE entry SET {columns} WHERE id = :id", {**values, "id": entry_id})  # noqa: S608
 
-    def arrived(self, entry: Entry, kind: str, revision: int | None = None, *, note: bool = True) -> None:
+    def arrived(
+        self,
+        entry: Entry,
+        kind: str,
+        revision: int | None = None,
+        *,
+        base: int | None = None,
+        note: bool = True,
+    ) -> None:
         """The server has its file or its BOM. An entry of which nothing is left is gone, with its copy.
 
-        Without ``note`` it was not sent, and makes nothing older out of date.
+        base
+            the revision that the file was made from. A BOM of that one which a person still has to look at
+            may be sent although its file is no longer the newest: all that is newer comes from here.
+        note
+            False: it was not sent, and makes nothing older out of date.
         """
         left = entry.bom_left if kind == "file" else entry.file_left
         with self.transaction() as db:
@@ -250,6 +263,12 @@ class Store(Origins):
                 db.execute(f"UPDATE entry SET {changes} WHERE id = ?", (number, entry.id))  # noqa: S608
             else:
                 db.execute("DELETE FROM entry WHERE id = ?", (entry.id,))
+            if base is not None:
+                db.execute(
+                    "UPDATE entry SET revision = ? WHERE server = ? AND identity = ? AND revision = ?"
+                    " AND NOT file_left AND id < ?",
+                    (revision, entry.server, entry.identity, base, entry.id),
+                )
             for item in filter(None, {entry.identity, entry.part_number} if note else ()):
                 db.execute(
                     "INSERT INTO sent VALUES (?, ?, ?, ?) ON CONFLICT (server, item, kind)"
@@ -290,7 +309,7 @@ class Store(Origins):
                 if folder.name not in keys and self.clock() - folder.stat().st_mtime > _HELD_AGE:
                     shutil.rmtree(folder, ignore_errors=True)
 
-    def _copied(self, source: Path, copy: Path) -> tuple[str, int]:
+    def _copied(self, source: Path, copy: Path, stamp: Stamp | None) -> tuple[str, int]:
         if source == copy:
             return content_hash(copy), copy.stat().st_size
         digest, size = hashlib.sha256(), 0
@@ -299,6 +318,8 @@ class Store(Origins):
                 digest.update(block)
                 size += len(block)
                 write.write(block)
+            if stamp is not None and stamp_of(read.fileno()) != stamp:
+                raise OSError("it was written again since the commit")
         return digest.hexdigest(), size
 
     def _drop_files(self, entry: Entry) -> None:

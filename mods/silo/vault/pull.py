@@ -25,7 +25,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, Protocol
 
-from silo.api.revisions import checksum_of
+from silo.api.revisions import checksum_of, download_revision
 from silo.api.transport import Cancel, stop_if
 from silo.api.wire import BomLine, Item, Revision
 from silo.bom.errors import DocumentError, InputError, NotFoundError, RouteMissingError
@@ -145,6 +145,7 @@ class _Fetch:
     progress: Progress
     files: dict[str, Fetched] = field(default_factory=dict)
     lost: list[Lost] = field(default_factory=list)
+    _at: datetime | None = None
     _revisions: dict[str, list[Revision]] = field(default_factory=dict)
     _contents: dict[tuple[str, int], tuple[Path, str]] = field(default_factory=dict)
 
@@ -155,6 +156,7 @@ class _Fetch:
             which = "no file yet" if number is None else f"no file with the revision {number}"
             raise NotFoundError(f"{item.part_number} has {which} in Silo")
         top = wanted[0]
+        self._at = top.created_at
         name = posixpath.basename((top.file_path or top.file_name or "").replace("\\", "/"))
         left = [(_safe_name(name or f"{item.part_number}.FCStd"), item, top)]
         while left:
@@ -173,7 +175,7 @@ class _Fetch:
         if len(self.files) >= MOST_FILES:
             raise InputError(f"more than {MOST_FILES} files are not fetched in one go")
         self.progress(posixpath.basename(position), len(self.files))
-        content, sha256 = self.content(item.part_number, revision.revision_number)
+        content, sha256 = self.content(item.part_number, revision)
         earlier = frozenset(filter(None, map(checksum_of, self.revisions(item.part_number))))
         self.files[position] = Fetched(
             position, item.part_number, item.id, revision, content, sha256, earlier - {sha256}
@@ -186,11 +188,14 @@ class _Fetch:
         if recorded:
             yield from self.linked(position, item, revision, recorded)
 
-    def content(self, part_number: str, number: int) -> tuple[Path, str]:
+    def content(self, part_number: str, revision: Revision) -> tuple[Path, str]:
+        number, checksum = revision.revision_number, checksum_of(revision)
         key = (part_number, number)
         if key not in self._contents:
             target = self.folder / f"{len(self._contents)}.FCStd"
-            sha256 = self.client.download_file(part_number, target, number, cancelled=self.cancelled)
+            sha256 = download_revision(
+                self.client, part_number, target, number, checksum, cancelled=self.cancelled
+            )
             self._contents[key] = (target, sha256)
         return self._contents[key]
 
@@ -202,6 +207,7 @@ class _Fetch:
     def linked(
         self, position: str, item: Item, revision: Revision, recorded: Sequence[str]
     ) -> Iterator[tuple[str, Item, Revision]]:
+        by_top = len(self.files) == 1
         told = self.client.get_revision(item.part_number, revision.revision_number)
         links = {link.path.replace("\\", "/"): link for link in told.links}
         ids = [link.item for link in links.values() if link.item]
@@ -214,7 +220,7 @@ class _Fetch:
             why = _refused(path)
             if not why and child is None:
                 why = "no item in Silo is known for it: it was never committed"
-            chosen = self.choose(child, link.sha256 if link else "", told.created_at) if child else None
+            chosen = self.choose(child, link.sha256 if link else "", by_top=by_top) if child else None
             if not why and chosen is None:
                 why = f"{child.part_number if child else path} has no file in Silo"
             if why or child is None or chosen is None:
@@ -222,14 +228,21 @@ class _Fetch:
             else:
                 yield target, child, chosen
 
-    def choose(self, child: Item, sha256: str, at: datetime | None) -> Revision | None:
-        """The newest revision of a linked file; for a chosen revision of the top, that of its time."""
+    def choose(self, child: Item, sha256: str, *, by_top: bool) -> Revision | None:
+        """The newest revision of a linked file; for a chosen revision of the top, that of its time.
+
+        What the top itself links to was written down with it (``sha256``). A file further below
+        may have been committed again between the file that links to it and the top.
+        """
         known = self.revisions(child.part_number)
         if not self.pinned or not known:
             return known[0] if known else None
+        at = self._at
         same = [one for one in known if sha256 and checksum_of(one) == sha256]
         before = [one for one in known if at and one.created_at and one.created_at <= at]
-        return (same or before or known[-1:])[0]
+        if same and by_top:
+            return same[0]
+        return max([*same[:1], *before[:1]] or known[-1:], key=lambda one: one.revision_number)
 
 
 @dataclass
@@ -373,10 +386,27 @@ def place(tree: Tree, into: Path | str, rules: Rules = Rules()) -> Pulled:
     places = lay_out((one.position, one.revision.file_path) for one in tree.files)
     anchor = _anchor(tree, places, base)
     placed: list[Placed] = []
+    lost = list(tree.lost)
+    # The disk says which names are one file: by their case, their Unicode form, or a link.
+    taken: dict[tuple[int, int], Placed] = {}
     for one, where in zip(tree.files, places, strict=True):
         target = anchor.joinpath(*where.split("/"))
+        if (before := taken.get(_on_disk(target))) is not None:
+            if (before.part_number, before.revision) != (one.part_number, one.revision.revision_number):
+                why = f"{before.part_number}, revision {before.revision}, has the same place on this disk"
+                lost.append(Lost(one.position, where, why))
+            continue
         placed.append(_place(one, target, base, rules))
-    return Pulled(placed[0].path, tuple(placed), tree.lost)
+        taken[_on_disk(target)] = placed[-1]
+    return Pulled(placed[0].path, tuple(placed), tuple(lost))
+
+
+def _on_disk(path: Path) -> tuple[int, int]:
+    try:
+        status = path.stat()
+    except OSError:
+        return (0, 0)
+    return (status.st_dev, status.st_ino)
 
 
 def _place(one: Fetched, target: Path, base: Path, rules: Rules) -> Placed:
@@ -388,10 +418,10 @@ def _place(one: Fetched, target: Path, base: Path, rules: Rules) -> Placed:
         return Placed(target, one.part_number, number, state, kept)
 
     try:
-        target.parent.mkdir(parents=True, exist_ok=True)
         real = Path(os.path.realpath(target))
         if base not in real.parents:
             raise DocumentError(str(target), f"it leads out of {base}; nothing was written there")
+        real.parent.mkdir(parents=True, exist_ok=True)
         state, kept = State.NEW, None
         if target.exists():
             there = content_hash(target)
@@ -404,7 +434,8 @@ def _place(one: Fetched, target: Path, base: Path, rules: Rules) -> Placed:
                 if not rules.overwrite:
                     return done(State.EDITED)
                 state, kept = State.OVERWRITTEN, rules.keep(str(target))
-        with one.content.open("rb") as read, replacing(target, mode=0o644) as write:
+        # Through a link to where the file is: another assembly may use it there.
+        with one.content.open("rb") as read, replacing(real, mode=0o644) as write:
             shutil.copyfileobj(read, write, 1 << 20)
     except OSError as error:
         raise DocumentError(str(target), f"cannot be written ({error.strerror or error})") from error

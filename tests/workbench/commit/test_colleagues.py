@@ -16,11 +16,12 @@ from silo.api.files import Origin
 from silo.bom.changes import ThreeLines
 from silo.bom.errors import ServerFaultError
 from silo.bom.model import BomEntry
+from silo.durable import stamp_of
 from silo.outbox.entry import UNKNOWN, Commit, State
 from silo.outbox.send import send_all
 from silo.workbench.commit.desk import Answer, Look
 from silo.workbench.commit.flow import CommitFlow
-from silo.workbench.commit.opened import Opened, stamp_of
+from silo.workbench.commit.opened import Opened
 from silo.workbench.commit.plan import Plan
 from silo.workbench.commit.theirs import Choice, Theirs, line_words
 from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone

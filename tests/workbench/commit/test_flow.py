@@ -3,9 +3,14 @@
 
 from __future__ import annotations
 
+import threading
+from pathlib import Path
+from typing import Any
+
 import pytest
 from desk import Office
 
+from silo.outbox.store import Store
 from silo.registering.orders import Order
 from silo.registration import Journal
 from silo.workbench.commit.flow import CommitFlow
@@ -144,3 +149,36 @@ def test_a_disk_that_does_not_take_it_is_a_box(office: Office, flow: CommitFlow)
     flow.start(office.document("Bolt"))
     office.settle()
     assert titles(office) == ["Not committed: Bolt"]
+
+
+class OtherDisk(Store):
+    """The project is on another disk than the outbox: no second names, and copies take their time."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self.gate = threading.Event()
+
+    def hold(self, path: str, key: str) -> Path | None:
+        return None
+
+    def finish(self, *arguments: Any, **more: Any) -> str:
+        self.gate.wait(30)
+        return super().finish(*arguments, **more)
+
+
+def test_a_save_before_the_copy_is_made_is_no_part_of_the_commit(office: Office, flow: CommitFlow) -> None:
+    """The commit is reported as not done; a BOM never goes with a later file."""
+    office.session.outbox = disk = OtherDisk(office.session.outbox.path)
+    doc = office.document("Plate", b"as committed")
+    flow.start(doc)
+    office.desk.pass_turns()
+    doc.content = b"as saved later"
+    office.desk.documents.save(doc)
+    disk.gate.set()
+    office.settle()
+    assert (office.sent, office.files("Plate")) == ([], [])
+    (box,) = [e for e in office.session.shown.activity.entries if e.title == "Not committed: Plate"]
+    assert "commit it again" in box.lines[0].text
+    flow.start(doc)
+    office.settle()
+    assert office.files("Plate") == [b"as saved later"]

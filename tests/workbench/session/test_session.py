@@ -11,6 +11,7 @@ import pytest
 from desk import Office
 
 from silo.bom.errors import SiloError, UnreachableError
+from silo.durable import Stamp
 from silo.outbox.entry import Commit, State
 from silo.outbox.store import Store
 
@@ -44,10 +45,10 @@ class SlowStore(Store):
         self.gate = threading.Event()
         self.copies_made = 0
 
-    def _copied(self, source: Path, copy: Path) -> tuple[str, int]:
+    def _copied(self, source: Path, copy: Path, stamp: Stamp | None) -> tuple[str, int]:
         self.gate.wait(30)
         self.copies_made += 1
-        return super()._copied(source, copy)
+        return super()._copied(source, copy, stamp)
 
 
 @pytest.fixture(name="slow")

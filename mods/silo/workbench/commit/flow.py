@@ -235,6 +235,7 @@ class CommitFlow:
         )
         if commit is None:
             return
+        commit = replace(commit, stamp=taken.stamp)
         base = taken.base
         if base is not None and with_file and not taken.row.is_new:
             commit = replace(commit, origin=base.origin or UNKNOWN)

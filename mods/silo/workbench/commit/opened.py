@@ -15,7 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-Stamp = tuple[int, int, int]
+from silo.durable import Stamp, stamp_of
 
 
 class Origins(Protocol):
@@ -65,15 +65,6 @@ class Base:
         """True where somebody else has written the file since."""
         now = stamp_of(self.path)
         return self.stamp is not None and now is not None and now != self.stamp
-
-
-def stamp_of(path: str) -> Stamp | None:
-    """What changes when a file is written; None where there is no file."""
-    try:
-        status = os.stat(path)
-    except OSError:
-        return None
-    return (status.st_mtime_ns, status.st_size, status.st_ino)
 
 
 def _unchanged_hash(path: str, stamp: Stamp | None) -> str:

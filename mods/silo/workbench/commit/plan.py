@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from silo.bom.errors import SiloError
+from silo.durable import Stamp, stamp_of
 from silo.spelling import one_path
 from silo.workbench.commit.opened import Base
 from silo.workbench.commit.snapshot import Snapshot
@@ -246,6 +247,8 @@ class Taken:
         what the document was made from.
     held
         the saved file's content under a second name; None where that is not possible.
+    stamp
+        of the saved file.
     error
         why there is nothing to send.
     """
@@ -254,6 +257,7 @@ class Taken:
     snapshot: Snapshot | None = None
     key: str = ""
     held: Path | None = None
+    stamp: Stamp | None = None
     error: SiloError | None = None
     base: Base | None = None
 
@@ -297,7 +301,8 @@ class Taker:
             if base.replaced:
                 self.keep_aside(row.path)
             self.documents.save(row.document)
+        stamp = stamp_of(row.path)
         snapshot = self.take(row.document)
         key = self.new_key()
         held = self.hold(row.path, key) if snapshot.identity else None
-        return Taken(row, snapshot, key, held, base=base)
+        return Taken(row, snapshot, key, held, stamp, base=base)

@@ -15,6 +15,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from silo.durable import stamp_of
 from silo.workbench.freecad import host
 from silo.workbench.freecad.edits import EditWatch
 
@@ -133,13 +134,13 @@ def save(doc: Any, *, mark_parents: bool = False) -> None:
         raise DocumentError(path, "the file is read-only")
     if (damaged := damage(path)) is not None:
         raise DocumentError(path, f"{damaged.reason}; {DAMAGED}")
-    before = _stamp(path)
+    before = stamp_of(path)
     try:
         with nullcontext() if mark_parents else others_unmarked(doc):
             _save(doc)
     except (OSError, RuntimeError) as problem:
         raise DocumentError(path, f"FreeCAD could not save it: {problem}") from problem
-    if _stamp(path) == before:
+    if stamp_of(path) == before:
         raise DocumentError(path, "FreeCAD did not write the file; its report view says why")
 
 
@@ -213,14 +214,6 @@ def save_copy(doc: Any, path: Path) -> None:
         raise DocumentError(str(path), f"no copy could be kept: {problem}") from problem
     if not path.is_file():
         raise DocumentError(str(path), "FreeCAD wrote no copy; its report view says why")
-
-
-def _stamp(path: str) -> tuple[int, int, int]:
-    try:
-        status = os.stat(path)
-    except OSError:
-        return (0, 0, 0)
-    return (status.st_mtime_ns, status.st_size, status.st_ino)
 
 
 def save_marked(doc: Any) -> None:

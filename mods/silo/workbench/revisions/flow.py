@@ -124,7 +124,11 @@ class RevisionFlow:
 
         def fetch(client: SiloClient, control: Control) -> None:
             content.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            client.download_file(theirs.part_number, content, theirs.revision, cancelled=control.cancelled)
+            from silo.api.revisions import download_revision
+
+            checksum = str((theirs.newer or {}).get("file_checksum") or "")
+            number = theirs.part_number
+            download_revision(client, number, content, theirs.revision, checksum, cancelled=control.cancelled)
 
         self._session.ask(
             translate("Silo", "Fetching from Silo"),

@@ -18,7 +18,6 @@ from silo.outbox.entry import Entry as Waiting
 from silo.outbox.report import Report, Sent
 from silo.outbox.send import send_all
 from silo.outbox.store import Store
-from silo.outbox.takeover import of_commit_folder
 from silo.workbench.pane import entries
 from silo.workbench.pane.activity import Entry
 from silo.workbench.session.colleagues import Newer
@@ -69,11 +68,6 @@ class Online:
     def address(self) -> str:
         """The server in use; "" where none is configured."""
         return self._client.base_url if self._client is not None else ""
-
-    def take_over(self) -> tuple[str, ...]:
-        """Bring what an older version left waiting into the outbox; what could not be read now."""
-        with self._outbox.send_lock() as mine:
-            return of_commit_folder(self._outbox, self._outbox.path.with_name("commits")) if mine else ()
 
     def send(self, control: Control, *, force: bool) -> Report:
         """Send what waits for this server."""

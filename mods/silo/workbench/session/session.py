@@ -90,8 +90,6 @@ class Session:
 
     def _connect(self, _control: Control) -> tuple[Server, tuple[Waiting, ...]]:
         online = self._need_online()
-        for text in online.take_over():
-            self._console(text)
         server = online.connect(self._known, self._store, live=self._live)
         return server, self.outbox.entries()
 
@@ -109,9 +107,6 @@ class Session:
                 make_client=self._make_client,
             )
         return self._online
-
-    def _console(self, text: str) -> None:
-        self._deliver(lambda: self._listener.console(f"[Silo] {text}"))
 
     def _connected(self, result: tuple[Server, tuple[Waiting, ...]]) -> None:
         server, waiting = result
@@ -143,7 +138,7 @@ class Session:
 
         def finish(_control: Control) -> None:
             made_from = base.origin if base is not None and commit.origin else ""
-            content = self.outbox.finish(commit.key, commit.file, made_from)
+            content = self.outbox.finish(commit.key, commit.file, made_from, commit.stamp)
             if base is not None:
                 base.committed(content)
 
