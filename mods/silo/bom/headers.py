@@ -27,6 +27,7 @@ class Role(StrEnum):
     MATERIAL = "material"
     MASS = "mass"
     TOTAL_MASS = "total_mass"
+    MASS_UNIT = "mass_unit"
     QUANTITY = "quantity"
     ITEM = "item"
     LEVEL = "level"
@@ -56,10 +57,14 @@ _ALIASES: dict[Role, str] = {
         materiale; 材料; 材質; 材质; 素材""",
     Role.MASS: """mass; unit mass; mass each; weight; unit weight; weight each; masse; einzelmasse; gewicht;
         einzelgewicht; stückgewicht; masse unitaire; poids; poids unitaire; masa; masa unitaria; peso;
-        peso unitario; massa; massa unitaria; 質量; 重量; 单重; 質量 単体; 质量; 单件质量; 單重""",
+        peso unitario; massa; massa unitaria; 質量; 重量; 单重; 質量 単体; 质量; 单件质量; 單重; gew;
+        einzelgew; nettogewicht; pds; 単重; 単体質量; 単体重量; 净重; 单件重量""",
     Role.TOTAL_MASS: """total mass; total weight; mass total; weight total; extended mass; extended weight;
         gesamtmasse; gesamtgewicht; masse totale; poids total; masa total; peso total; massa totale;
-        peso totale; 总重量; 総質量; 総重量; 合計質量; 总质量; 总重; 總重""",
+        peso totale; 总重量; 総質量; 総重量; 合計質量; 总质量; 总重; 總重; 合计重量;
+        小计重量; 質量計; 重量計""",
+    Role.MASS_UNIT: """mass unit; mass units; weight unit; weight units; unit of mass; unit of weight;
+        mass uom; weight uom; gewichtseinheit; masseneinheit; unité de masse; unidad de masa""",
     Role.QUANTITY: """quantity; qty; count; pieces; pcs; menge; anzahl; stückzahl; stück; quantité; qté; nb;
         cantidad; cant; quantità; q tà; qta; quantita; 数量; 個数; 員数; 數量""",
     Role.ITEM: """item; item no; index; pos; position; row; line; nr; lfd nr; rang;

@@ -181,3 +181,104 @@ def test_a_bracket_that_is_not_understood(bom: Bom) -> None:
     assert warning.code is BomCode.MASS_WITHOUT_UNIT
     assert "“ctw”" in warning.message
     assert codes(bom("Name,Quantity,Material,Mass (from CAD)\nplate,2,,3.0 g\n")) == []
+
+
+@pytest.mark.parametrize(
+    ("header", "kg"),
+    [
+        *(
+            (h, 0.12)
+            for h in ("Mass [kg/100 pcs]", "Mass per 100 (kg)", "Weight/100 (kg)", "Gew. kg pro 100")
+        ),
+        *((h, 0.012) for h in ("Gewicht/1000 Stk (kg)", "mass_g", "Weight g/pc", "Mass/g")),
+        *(
+            (h, 12)
+            for h in ("Net weight (kg)", "Nettogewicht kg", "unitMassKg", "CAD mass [kg]", "单件重量(kg)")
+        ),
+        *(
+            (h, 3)
+            for h in ("totalMassKg", "Ges.Gew. [kg]", "Overall mass (kg)", "ΣMass kg", "Mass per assy (kg)")
+        ),
+    ],
+)
+def test_what_a_header_says_of_its_masses(bom: Bom, header: str, kg: float) -> None:
+    """12 in the cell of four pieces: by unit, by pieces, by one or all."""
+    table = bom(f"Name,Qty,Material,{header}\nbolt,4,steel,12\n")
+    assert table["bolt"].mass_kg == pytest.approx(kg)
+    assert codes(table) == []
+
+
+@pytest.mark.parametrize(
+    "inner",
+    ["10^-3 kg", "e-3 kg", "x10 g", "kg x 1000", "kg·10³", "%", "kg/m", "g/cm3", "4x", "kg per metre"],
+)
+def test_a_header_that_is_no_mass_is_not_taken_for_one(bom: Bom, inner: str) -> None:
+    """A power, a percentage, a rate: the column is missing, and by the user's own word it is in doubt."""
+    text = f"Name,Qty,Material,Mass ({inner})\nbolt,4,steel,12\n"
+    assert bom(text)["bolt"].mass_kg is None
+    assert codes(bom(text)) == [BomCode.MISSING_COLUMN]
+    forced = bom(text, columns={"mass": f"Mass ({inner})"})
+    assert any("is no mass by its header" in w.message for w in forced.warnings)
+
+
+def test_a_column_of_units_is_read(bom: Bom) -> None:
+    """As SAP exports it; a unit that is none leaves the mass unread, with the line."""
+    table = bom("Name,Qty,Material,Weight,Weight unit\na,1,,12,G\nb,1,,2,KG\nc,1,,2,PCS\n")
+    assert [row.mass_kg for row in table.rows] == [pytest.approx(0.012), 2.0, None]
+    assert [(w.code, w.line) for w in table.warnings] == [(BomCode.UNREADABLE_MASS, 4)]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Name,Qty,Mass,Material\n,[pcs],[g],[-]\nbolt,4,3,\n",
+        "Name,Qty,Mass,,Material\n,,each (g),total (g),\nbolt,4,3,12,\n",
+        "Name,Qty,Mass,,Material\n,,total (g),each (g),\nbolt,4,12,3,\n",
+    ],
+)
+def test_the_second_line_of_a_header_counts(bom: Bom, text: str) -> None:
+    """Units or "each" and "total" below a merged cell."""
+    table = bom(text)
+    assert [(row.name, row.mass_kg) for row in table.rows] == [("bolt", pytest.approx(0.003))]
+    assert codes(table) == []
+
+
+def test_a_row_without_a_name_is_no_second_line(bom: Bom) -> None:
+    """What is no unit there is a row that cannot be used, and is reported as such."""
+    table = bom("Name,Qty,Mass (g),Material\n,,see drawing,\nbolt,4,3,\n")
+    assert codes(table) == [BomCode.NO_NAME]
+
+
+STRUCTURED = "Level,Name,Qty,Material,{}\n0,arm,2,,,\n.1,motor,3,,{}\n"
+
+
+def test_a_total_below_a_parent_that_stands_twice_is_in_doubt(bom: Bom) -> None:
+    """Six motors of 0.1 kg: 0.6 kg in the product, 0.3 kg in one arm. The number alone does not say which."""
+    table = bom(STRUCTURED.format("Total mass (kg)", "0.6"))
+    motor = table["motor"]
+    assert (motor.parent, motor.unsure) == (0, True)
+    assert codes(table) == [BomCode.AMBIGUOUS_MASS]
+    once = bom(STRUCTURED.format("Total mass (kg)", "0.3").replace("arm,2", "arm,1"))
+    assert (once["motor"].unsure, codes(once)) == (False, [])
+
+
+@pytest.mark.parametrize("total", ["0.3", "0.6"])
+def test_a_total_of_the_parent_or_of_the_product_agrees(bom: Bom, total: str) -> None:
+    """Silo's own export gives the mass in the whole product."""
+    table = bom(STRUCTURED.format("Mass (kg),Total mass (kg)", f"0.100,{total}"))
+    assert codes(table) == []
+    assert codes(bom(STRUCTURED.format("Mass (kg),Total mass (kg)", "0.100,0.9"))) == [BomCode.TOTAL_DIFFERS]
+
+
+@pytest.mark.parametrize("marks", [(".1", "..2"), ("+1", "++2"), (" 1", " 2"), ("1.", "2."), (">1", ">>2")])
+def test_levels_are_read_as_they_are_drawn(bom: Bom, marks: tuple[str, str]) -> None:
+    """With dots, plus signs or arrows in front."""
+    table = bom(f"Level,Name,Qty,Material,Mass (g)\n0,top,1,,\n{marks[0]},a,1,,1\n{marks[1]},b,1,,1\n")
+    assert [row.parent for row in table.rows] == [None, 0, 1]
+    assert codes(table) == []
+
+
+def test_a_level_that_cannot_be_read_is_reported(bom: Bom) -> None:
+    """The row stands at the top then, and the quantities above it are not multiplied."""
+    table = bom("Level,Name,Qty,Material,Mass (g)\n0,top,1,,\nsub,a,1,,1\n")
+    assert [(w.code, w.line) for w in table.warnings] == [(BomCode.FILE, 3)]

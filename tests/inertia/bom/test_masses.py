@@ -3,11 +3,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.bom.numbers import Mark, parse_number
+from silo.inertia.bom import BomCode, BomTable
 from silo.inertia.bom.masses import column_mark, is_empty, parse_mass
 
 LB = 0.45359237
@@ -180,3 +183,38 @@ def test_a_square_is_no_digit() -> None:
     """Compatibility forms made "5² kg" 52 kg."""
     assert parse_mass("5² kg").kg is None
     assert parse_mass("5² kg").problem
+
+
+@pytest.mark.parametrize(
+    ("text", "kg", "quantum"),
+    [
+        *(
+            ("2 ± 0.1 kg", 2, 0.5),
+            ("2.0 kg ± 100 g", 2, 0.1),
+            ("2.00±0.001", 2, 0.005),
+            ("2 +/- 0,5", 2, 0.5),
+        ),
+        *(("1 lb 3 oz", 0.538640939375, 0.0141747615625), ("2 kg each", 2, 0.5), ("12 g/pc", 0.012, 0.0005)),
+    ],
+)
+def test_masses_with_more_than_a_number(text: str, kg: float, quantum: float) -> None:
+    """A tolerance is the rounding where it is wider; pounds and ounces add up; "each" says nothing new."""
+    cell = parse_mass(text)
+    assert (cell.kg, cell.quantum_kg, cell.doubt) == (pytest.approx(kg), pytest.approx(quantum), "")
+
+
+@pytest.mark.parametrize("text", ["~2 kg", "≈2", "(2 kg)", "~(2)"])
+def test_a_mass_that_may_not_be_meant_is_in_doubt(text: str, bom: Callable[..., BomTable]) -> None:
+    """Roughly, in brackets (a reference, or negative in book-keeping): used, reported, never pushed."""
+    table = bom(f'Name,Qty,Material,Mass (kg)\na,1,,"{text}"\n')
+    assert (table["a"].mass_kg, table["a"].unsure) == (2, True)
+    assert [(w.code, w.line) for w in table.warnings] == [(BomCode.AMBIGUOUS_MASS, 2)]
+
+
+@pytest.mark.parametrize(
+    "text", ["2 st", "2 x 3 kg", "1-2 kg", "2 kg/m", "50 %", "<0.1", "1 lb 3 oz 2", "2±x"]
+)
+def test_what_is_no_one_mass_is_a_problem(text: str) -> None:
+    cell = parse_mass(text)
+    assert cell.kg is None
+    assert cell.problem

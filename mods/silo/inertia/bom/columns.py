@@ -17,24 +17,30 @@ from silo.bom.numbers import plain_text
 from silo.inertia.bom.masses import unit_factor
 
 _TOTAL = {
-    "total", "totale", "totales", "totals", "gesamt", "ges", "insgesamt", "summe", "sum", "somme", "suma",
-    "somma", "extended", "ext", "row", "line", "zeile", "all", "alle", "tous", "todos", "tutti", "qty",
-    "quantity", "count", "menge", "anzahl", "stückzahl", "quantité", "cantidad", "quantità", "lot", "batch",
-    "set", "group", "subtotal", "cumulative", "rolled", "rollup", "rolledup", "σ", "∑", "合計", "小計", "总",
-    "合计", "總",
+    "total", "totale", "totales", "totals", "tot", "gesamt", "ges", "insgesamt", "summe", "sum", "somme",
+    "suma", "somma", "extended", "ext", "extd", "row", "line", "zeile", "all", "alle", "tous", "todos",
+    "tutti", "qty", "quantity", "count", "menge", "anzahl", "stückzahl", "quantité", "cantidad", "quantità",
+    "lot", "batch", "set", "group", "subtotal", "cumulative", "cumulated", "accumulated",
+    "aggregate", "overall", "combined", "complete", "rolled", "roll", "up", "rollup", "rolledup", "σ", "∑",
+    "合計", "小計", "总", "合计", "總",
 }  # fmt: skip
 _EACH = {
-    "each", "ea", "unit", "units", "piece", "pieces", "pc", "pcs", "part", "item", "one", "single", "1",
-    "einzel", "einzeln", "stück", "stk", "st", "teil", "pièce", "unité", "unitaire", "pieza", "unidad",
-    "unitaria", "unitario", "pezzo", "unità", "個", "单件", "単体", "件",
+    "each", "ea", "unit", "units", "piece", "pieces", "pc", "pcs", "part", "item", "one", "single", "1", "1x",
+    "einzel", "einzeln", "stück", "stk", "st", "teil", "pièce", "unité", "unitaire", "pieza", "unidad", "ud",
+    "unitaria", "unitario", "pezzo", "unità", "個", "单件", "単体", "件", "individual", "component", "body",
+    # of one piece as well, by how it was found out
+    "net", "netto", "neto", "nominal", "calculated", "calc", "estimated", "measured", "actual", "cad",
 }  # fmt: skip
-_FILLERS = {"x", "×", "per", "pro", "par", "por", "je", "in", "en", "for", "für", "of", "the", "a"}
+_FILLERS = {"x", "×", "in", "en", "for", "für", "of", "the", "a"}
+_OVER = {"/", "per", "pro", "par", "por", "je"}
 
-_WORD = re.compile(r"/|[^\W_]+|[×∑]")
-_BRACKETS = re.compile(r"[\(\[（【<]([^)\]）】>]*)[\)\]）】>]")
+_WORD = re.compile(r"[/%]|[^\W_]+|[×∑]")
+_BRACKETS = re.compile(r"[\(\[（【<{]([^)\]）】>}]*)[\)\]）】>}]")
+_CAMEL = re.compile(r"(?<=[a-z])(?=[A-Z][a-z])|(?<=[Σ∑])(?=\w)")
+_ASSEMBLY = {"assembly", "assy", "baugruppe", "robot", "machine"}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class MassHeader:
     """A mass column's header.
 
@@ -47,76 +53,61 @@ class MassHeader:
     strange
         what stands in brackets and is not understood.
     rate
-        True where a cell is no mass: "kg/m", "g/cm3".
+        True where a cell is no mass: "kg/m", "g/cm3", "%", "10^3 kg".
+    pieces
+        how many pieces a cell is the mass of: 100 for "kg/100 pcs".
     """
 
-    title: str
+    title: str = ""
     unit: str = ""
     total: bool = False
     strange: str = ""
     rate: bool = False
+    pieces: int = 1
 
 
 def read_mass_header(cell: str) -> MassHeader:
     """Take a header apart; for any text, also one that is no mass column's."""
     text = plain_text(cell)
-    unit, strange, total, each, rate = "", [], False, False, False
+    header = MassHeader()
     for bracket in _BRACKETS.findall(text):
-        found = _inside(bracket)
-        unit = unit or found.unit
-        total, each, rate = total or found.total, each or found.each, rate or found.rate
-        if found.strange:
-            strange.append(bracket.strip())
-    kept: list[str] = []
-    for word in _WORD.findall(_BRACKETS.sub(" ", text)):
-        low = word.casefold()
-        if low in _TOTAL:
-            total = True
-        elif low in _EACH:
-            each = True
-        elif kept and not unit and unit_factor(word) is not None:
-            unit = word  # "mass_kg", "Gewicht in kg"; never the first word
-        elif low not in _FILLERS or not kept:
-            kept.append(low)
+        plain = bracket.strip().rstrip(".")
+        if not header.unit and unit_factor(plain) is not None:
+            header.unit = plain  # "lb f"
+        elif _read_words(bracket, header):
+            header.strange = ", ".join(filter(None, (header.strange, bracket.strip())))
     # "Mass (unit) × qty" is the row's: each says what is multiplied.
-    return MassHeader(" ".join(kept), unit, total, ", ".join(strange), rate)
+    header.title = " ".join(_read_words(_CAMEL.sub(" ", _BRACKETS.sub(" ", text)), header, title=True))
+    return header
 
 
-@dataclass(frozen=True, slots=True)
-class _Bracket:
-    unit: str = ""
-    total: bool = False
-    each: bool = False
-    strange: bool = False
-    rate: bool = False
-
-
-def _inside(text: str) -> _Bracket:
-    if unit_factor(text.strip().rstrip(".")) is not None:
-        return _Bracket(unit=text.strip().rstrip("."))
-    unit, total, each, strange, rate, over = "", False, False, False, False, False
+def _read_words(text: str, header: MassHeader, *, title: bool = False) -> list[str]:
+    """Put what the words say into ``header``; the words that say nothing known are returned."""
+    kept: list[str] = []
+    over = False
     for word in _WORD.findall(text):
         low = word.casefold()
-        if low in ("/", "per", "pro", "par", "por", "je"):
+        first = title and not kept
+        if low in _OVER:
             over = True
+        elif low in _TOTAL or (over and low in _ASSEMBLY):
+            header.total = True
         elif low in _EACH:
-            each = True
-        elif over:
-            # "g/pc" was left above; what else stands below the line makes a rate: kg/m, g/cm3.
-            rate = rate or bool(unit)
-            strange = strange or not unit
-        elif low in _TOTAL:
-            total = True
-        elif not unit and unit_factor(word) is not None:
-            unit = word
-        elif low not in _FILLERS:
-            strange = True
-    return _Bracket(unit, total, each, strange, rate)
+            continue
+        elif over and low.isdecimal():
+            header.pieces = int(low) or 1
+        elif not first and not header.unit and unit_factor(word) is not None:
+            header.unit = word  # "mass_kg", "Gewicht in kg", "Masse/g"; never the first word
+        elif over or low == "%" or (not first and any(letter.isdigit() for letter in low)):
+            header.rate = True  # kg/m, g/cm3, 1000 kg
+        elif first or low not in _FILLERS:
+            kept.append(low)
+    return kept
 
 
 ROLES = (
     *(Role.NAME, Role.PART_NUMBER, Role.DESCRIPTION, Role.MATERIAL, Role.MASS, Role.TOTAL_MASS),
-    *(Role.QUANTITY, Role.ITEM, Role.LEVEL, Role.FIND_NUMBER),
+    *(Role.QUANTITY, Role.ITEM, Role.LEVEL, Role.FIND_NUMBER, Role.MASS_UNIT),
 )
 """What a mass calculation reads of a BOM."""
 
@@ -131,6 +122,8 @@ class Columns:
         masses are written in full (Silo's own export does so): a short one was not rounded.
     strange
         what the header of a mass column says in brackets and is not understood.
+    pieces
+        how many pieces a mass column's cells are the mass of, where it is not one.
     """
 
     at: Mapping[Role, int]
@@ -138,6 +131,7 @@ class Columns:
     others: tuple[tuple[Role, int], ...] = ()
     exact: bool = False
     strange: Mapping[Role, str] = field(default_factory=dict)
+    pieces: Mapping[Role, int] = field(default_factory=dict)
 
     def cell(self, row: Sequence[str], role: Role) -> str:
         """The row's cell for a role; "" where there is no such column or the row is too short.
@@ -185,9 +179,10 @@ def find_columns(header: Sequence[str], given: Mapping[str, str] | None = None) 
     masses = {role: read_mass_header(header[at[role]]) for role in _MASSES if role in at}
     units = {role: mass.unit for role, mass in masses.items() if mass.unit}
     strange = {role: mass.strange for role, mass in masses.items() if mass.strange}
+    pieces = {role: mass.pieces for role, mass in masses.items()}
     others = tuple((role, i) for role, i in seen if role in _ONE_ONLY and at[role] != i)
     exact = {normal(cell) for cell in header} >= _SILOS_OWN
-    return Columns(at, units, others, exact, strange)
+    return Columns(at, units, others, exact, strange, pieces)
 
 
 def _given_roles(given: Mapping[str, str]) -> dict[Role, str]:
@@ -202,7 +197,7 @@ def _given_roles(given: Mapping[str, str]) -> dict[Role, str]:
 
 def _role_of(cell: str) -> tuple[Role, int] | None:
     """Role and rank of one header cell: "Mass", "Mass (g)", "mass_kg", "Gewicht in kg", "Summe Masse"."""
-    found = alias(normal(cell))
+    found = alias(normal(cell.replace("/", " per ")))  # "Mass/unit" is no unit of a mass
     if found is not None and found[0] is not Role.MASS:
         return found if found[0] in ROLES else None
     header = read_mass_header(cell)

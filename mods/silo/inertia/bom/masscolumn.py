@@ -9,7 +9,7 @@ from dataclasses import replace
 from silo.bom.headers import Role
 from silo.bom.numbers import Mark
 from silo.inertia.bom.masses import MassCell, column_mark, is_force, parse_mass
-from silo.inertia.bom.rows import BomCode, BOMEntry
+from silo.inertia.bom.rows import BomCode, BOMEntry, BomTable
 from silo.inertia.bom.sheet import Row, Sheet
 
 Tell = Callable[[BomCode, str, Row, str], None]
@@ -41,6 +41,8 @@ class MassReader:
         # Programs that separate by commas write points; no other delimiter says where a file comes from.
         self._points_are_decimal = sheet.delimiter == ","
         self._units: dict[int, str] = {}
+        self._totals: dict[int, MassCell] = {}
+        self._from_total: set[int] = set()
         self._told_unit = self._told_force = False
 
     def read(self, row: Row, name: str, quantity: float | None) -> MassCell:
@@ -48,10 +50,12 @@ class MassReader:
         one = self._cell(Role.MASS, row, name)
         total = self._cell(Role.TOTAL_MASS, row, name)
         if one.kg is None and total.kg is not None:
+            self._from_total.add(row.line)
             return self._per_piece(total, row, name, quantity)
         if one.kg is not None:
             self._units[row.line] = one.unit
-        self._compare(one, total, row, name, quantity)
+        if total.kg is not None:
+            self._totals[row.line] = total
         return one
 
     def to_display_precision(self, rows: Sequence[BOMEntry]) -> list[BOMEntry]:
@@ -77,10 +81,12 @@ class MassReader:
         if role not in self._columns.at:
             return MassCell()
         text = self._columns.cell(row.cells, role)
-        unit = self._columns.units.get(role) or self._unit
+        unit = self._columns.units.get(role) or self._columns.cell(row.cells, Role.MASS_UNIT) or self._unit
         cell = parse_mass(text, mark=self._marks[role], unit=unit)
         if cell.ambiguous:
             cell = self._decide(text, unit, row, name)
+        if cell.doubt:
+            self._tell(BomCode.AMBIGUOUS_MASS, f"the mass “{text}” {cell.doubt}", row, name)
         if cell.problem is not None:
             self._tell(
                 BomCode.UNREADABLE_MASS, f"the mass “{text}” {cell.problem}; it is not used", row, name
@@ -97,6 +103,9 @@ class MassReader:
             self._told_force = True
             words = f"“{cell.unit}” is a unit of force; masses are what weighs as much at 9.80665 m/s²"
             self._tell(BomCode.FILE, words, row, name)
+        pieces = self._columns.pieces.get(role, 1)
+        if cell.kg is not None and pieces != 1:
+            cell = replace(cell, kg=cell.kg / pieces, quantum_kg=cell.quantum_kg / pieces)
         return cell
 
     def _decide(self, text: str, unit: str | None, row: Row, name: str) -> MassCell:
@@ -121,16 +130,34 @@ class MassReader:
         self._tell(BomCode.UNREADABLE_MASS, words, row, name)
         return MassCell()
 
-    def _compare(self, one: MassCell, total: MassCell, row: Row, name: str, quantity: float | None) -> None:
-        if one.kg is None or total.kg is None or not quantity:
-            return
-        expected = one.kg * quantity
-        allowed = one.quantum_kg * quantity + total.quantum_kg + _TOTAL_TOLERANCE * expected
-        if abs(expected - total.kg) > allowed:
-            self._tell(
-                BomCode.TOTAL_DIFFERS,
-                f"the total mass says {total.kg:.6g} kg, but {quantity:g} times {one.kg:.6g} kg is "
-                f"{expected:.6g} kg; the mass of one piece was used",
-                row,
-                name,
+    def check_totals(self, table: BomTable) -> tuple[BOMEntry, ...]:
+        """The rows, those with a total that may be of one parent or of the whole product marked as unsure."""
+        return tuple(self._checked(row, table) for row in table.rows)
+
+    def _checked(self, row: BOMEntry, table: BomTable) -> BOMEntry:
+        where = Row(row.line, ())
+        above = table.ancestors(row)
+        if row.line in self._from_total and any(parent.quantity != 1 for parent in above):
+            words = (
+                f"the total mass was divided by the {row.quantity:g} pieces in one “{above[0].name}”; "
+                "if it is the total of the whole product, one piece weighs less"
             )
+            self._tell(BomCode.AMBIGUOUS_MASS, words, where, row.name)
+            return replace(row, unsure=True)
+        total = self._totals.get(row.line)
+        if total is None or total.kg is None or row.mass_kg is None or not row.quantity:
+            return row
+        # Of the row, or of the whole product (Silo's own export): what fits is meant.
+        counts = {row.quantity, table.total_quantity(row) or row.quantity}
+        if not any(_agree(row, count, total.kg, total.quantum_kg) for count in counts):
+            words = (
+                f"the total mass says {total.kg:.6g} kg, but {row.quantity:g} times {row.mass_kg:.6g} kg is "
+                f"{row.mass_kg * row.quantity:.6g} kg; the mass of one piece was used"
+            )
+            self._tell(BomCode.TOTAL_DIFFERS, words, where, row.name)
+        return row
+
+
+def _agree(row: BOMEntry, count: float, total: float, quantum: float) -> bool:
+    expected = (row.mass_kg or 0.0) * count
+    return abs(expected - total) <= row.quantum_kg * count + quantum + _TOTAL_TOLERANCE * expected

@@ -11,7 +11,7 @@ import math
 import re
 import unicodedata
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from silo.bom.numbers import Mark, Number, common_mark, parse_number, plain_text
 
@@ -25,7 +25,8 @@ MASS_UNITS: dict[str, float] = {
     **dict.fromkeys(("kilogrammes", "kilogramo", "kilogramos", "chilogrammo", "chilogrammi"), 1.0),
     **dict.fromkeys(("キログラム", "千克", "公斤"), 1.0),
     **dict.fromkeys(("g", "gr", "gram", "grams", "gramm", "gramme", "grammes", "gramo", "gramos"), 1e-3),
-    **dict.fromkeys(("grammo", "grammi", "グラム", "克"), 1e-3),
+    **dict.fromkeys(("grammo", "grammi", "gm", "gms", "grs", "グラム", "克"), 1e-3),
+    **dict.fromkeys(("dag", "dkg", "deka"), 1e-2),
     **dict.fromkeys(("mg", "milligram", "milligrams", "milligramm", "milligramme", "毫克"), 1e-6),
     **dict.fromkeys(("µg", "μg", "ug", "microgram", "micrograms"), 1e-9),
     **dict.fromkeys(("t", "to", "tonne", "tonnes", "tonnen", "toneladas", "tonnellate"), 1e3),
@@ -85,8 +86,10 @@ class MassCell:
         marked by hand ("0.3 kg*").
     mark, ambiguous
         see :class:`~silo.inertia.bom.numbers.Number`.
+    doubt
+        why the mass may not be meant as such, in words that end a sentence.
     problem
-        why it could not be read, or could be read two ways; None where all is well.
+        why it could not be read; None where all is well.
     """
 
     kg: float | None = None
@@ -95,6 +98,7 @@ class MassCell:
     overridden: bool = False
     mark: Mark | None = None
     ambiguous: bool = False
+    doubt: str = ""
     problem: str | None = None
 
 
@@ -104,22 +108,46 @@ _CELL = re.compile(
 )
 
 
+_EACH = re.compile(r"\s*(?:\b(?:per|pro|par)\b\s*|/\s*)?\b(?:each|ea|pcs?|pieces?|stk|stück|unit)\.?$", re.I)
+_POUNDS_OUNCES = re.compile(r"(?P<lb>[\d.]+)\s*lbs?\.?\s*,?\s*(?P<oz>[\d.]+)\s*oz\.?", re.IGNORECASE)
+_TOLERANCE = re.compile(r"(?P<mass>.+?)\s*(?:±|\+/-|\+-)\s*(?P<by>[\d.,]+)\s*(?P<unit>[^\d\s]*)")
+
+
 def parse_mass(text: str, *, mark: Mark | None = None, unit: str | None = None) -> MassCell:
-    """One cell as a mass. ``mark``: the column's decimal mark, ``unit``: its header's; None: unknown."""
+    """One cell as a mass. ``mark``: the column's decimal mark, ``unit``: its header's; None: unknown.
+
+    "2 ± 0.1 kg", "1 lb 3 oz" and "2 kg each" are masses; "~2 kg" and "(2 kg)" are, with a doubt.
+    """
     if is_empty(text):
         return MassCell()
-    cell = re.sub(r"^\((.*)\)$", r"\1", plain_text(text)).lstrip("≈~ ").strip()
-    found = _CELL.fullmatch(cell)
-    if found is None:
+    cell = plain_text(text)
+    if (split := _TOLERANCE.fullmatch(cell)) is not None:
+        own = split["mass"] + (f" {split['unit']}" if split["mass"][-1].isdecimal() else "")
+        found, by = (
+            parse_mass(part, mark=mark, unit=unit) for part in (own, f"{split['by']} {split['unit']}")
+        )
+        return found if by.kg is None else replace(found, quantum_kg=max(found.quantum_kg, by.kg))
+    if (both := _POUNDS_OUNCES.fullmatch(cell)) is not None:
+        lb, oz = (parse_mass(both[u], mark=Mark.POINT, unit=u) for u in ("lb", "oz"))
+        if lb.kg is None or oz.kg is None:
+            return MassCell(problem="is no mass")
+        return replace(oz, kg=lb.kg + oz.kg)
+    doubt = ""
+    if cell[:1] in ("~", "≈"):
+        cell, doubt = cell.lstrip("~≈ "), "is marked as approximate"
+    if cell.startswith("(") and cell.endswith(")"):
+        cell, doubt = cell[1:-1].strip(), "is in brackets: a reference, or a negative number"
+    split = _CELL.fullmatch(_EACH.sub("", cell))
+    if split is None:
         return MassCell(problem="is no mass")
-    number = parse_number(re.sub(r"^([+\-−])\s+", r"\1", found["number"]), mark)
+    number = parse_number(re.sub(r"^([+\-−])\s+", r"\1", split["number"]), mark)
     if number is None:
         return MassCell(problem="has no number that can be read")
-    written = found["unit"].strip().rstrip(".")
+    written = split["unit"].strip().rstrip(".")
     factor = unit_factor(written or unit or "kg")
     if factor is None:
         return MassCell(problem=f"has the unknown unit “{written or unit}”")
-    return _cell(number, factor, written or unit or "", bool(found["star"]))
+    return replace(_cell(number, factor, written or unit or "", bool(split["star"])), doubt=doubt)
 
 
 def _cell(number: Number, factor: float, unit: str, overridden: bool) -> MassCell:

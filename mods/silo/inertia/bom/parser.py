@@ -12,7 +12,8 @@ from pathlib import Path
 from silo.bom.errors import InputError
 from silo.bom.headers import Role, find_clashes
 from silo.bom.numbers import LARGEST_QUANTITY, Mark, read_count
-from silo.inertia.bom.masscolumn import MassReader
+from silo.inertia.bom.columns import read_mass_header
+from silo.inertia.bom.masscolumn import MASS_COLUMNS, MassReader
 from silo.inertia.bom.masses import is_empty, unit_factor
 from silo.inertia.bom.rows import BomCode, BOMEntry, BomTable, BomWarning
 from silo.inertia.bom.sheet import Row, Sheet, read_sheet
@@ -71,7 +72,7 @@ class BOMParser:
             delimiter=self._delimiter,
         )
         warnings = [BomWarning(BomCode.FILE, note) for note in sheet.notes]
-        warnings += _missing_columns(sheet)
+        warnings += _doubtful_columns(sheet)
         warnings += _second_columns(sheet)
 
         def tell(code: BomCode, message: str, row: Row, name: str) -> None:
@@ -84,7 +85,7 @@ class BOMParser:
             entry = _entry(sheet, row, masses, item_role, warnings)
             if entry is not None:
                 rows.append(entry)
-        table_rows = with_structure(masses.to_display_precision(rows))
+        table_rows = masses.check_totals(BomTable(with_structure(masses.to_display_precision(rows))))
         warnings += _duplicates(table_rows)
         return BomTable(table_rows, tuple(warnings), source)
 
@@ -113,9 +114,9 @@ def _entry(
         quantity=quantity,
         quantum_kg=mass.quantum_kg,
         overridden=mass.overridden,
-        unsure=mass.ambiguous,
+        unsure=mass.ambiguous or bool(mass.doubt),
         item=cell(row.cells, item_role) or cell(row.cells, Role.FIND_NUMBER),
-        level=_level(cell(row.cells, Role.LEVEL)),
+        level=_level(cell(row.cells, Role.LEVEL), item_role, row.line, name, warnings),
         line=row.line,
     )
 
@@ -141,8 +142,13 @@ def _item_role(sheet: Sheet) -> Role:
     return Role.LEVEL if dotted(Role.LEVEL) and not dotted(Role.ITEM) else Role.ITEM
 
 
-def _level(text: str) -> int:
-    return int(text) if text.isdecimal() and len(text) < 4 else 1
+def _level(text: str, item_role: Role, line: int, name: str, warnings: list[BomWarning]) -> int:
+    """ "2", "..2" and "+2" are one below "1". Item numbers (1.1) are no levels."""
+    found = re.fullmatch(r"[\s.+>·-]*(\d{1,3})[\s.]*", text)
+    if found is None and text and item_role is not Role.LEVEL:
+        words = f"the level “{text}” cannot be read; the row is taken to stand at the top"
+        warnings.append(BomWarning(BomCode.FILE, words, line, name))
+    return int(found[1]) if found else 1
 
 
 def _check_length(sheet: Sheet, row: Row, name: str, warnings: list[BomWarning]) -> None:
@@ -169,7 +175,7 @@ def _check_length(sheet: Sheet, row: Row, name: str, warnings: list[BomWarning])
         )
 
 
-def _missing_columns(sheet: Sheet) -> list[BomWarning]:
+def _doubtful_columns(sheet: Sheet) -> list[BomWarning]:
     at = sheet.columns.at
     seen = ", ".join(cell.strip() for cell in sheet.header if cell.strip())
     missing = []
@@ -177,7 +183,16 @@ def _missing_columns(sheet: Sheet) -> list[BomWarning]:
         missing.append("mass")
     if Role.MATERIAL not in at:
         missing.append("material")
-    return [
+    rates = [
+        BomWarning(
+            BomCode.FILE,
+            f"“{sheet.header[at[role]].strip()}” is no mass by its header, and was taken for one",
+            sheet.header_line,
+        )
+        for role in MASS_COLUMNS
+        if role in at and read_mass_header(sheet.header[at[role]]).rate
+    ]
+    return rates + [
         BomWarning(
             BomCode.MISSING_COLUMN,
             f"there is no {what} column (the columns are {seen}); "

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Bytes of a CSV export → a header and rows with their line numbers. Encoding and delimiter are found out.
+"""Bytes of a CSV export or a workbook → a header and rows with their line numbers.
 
-The order of the tries: a byte order mark decides; then UTF-8; then the Windows code pages. A delimiter is
-right when a line under it reads as a header; nothing is concluded from counting commas.
+Encoding and delimiter are found out; a workbook's sheets become CSV first. The order of the tries: a byte
+order mark decides; then UTF-8; then the Windows code pages. A delimiter is right when a line under it reads
+as a header; nothing is concluded from counting commas.
 """
 
 from __future__ import annotations
@@ -10,18 +11,20 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from itertools import islice
+from dataclasses import dataclass, replace
+from itertools import islice, zip_longest
 
 from silo.bom.errors import InputError
 from silo.bom.headers import Role
-from silo.inertia.bom.columns import Columns, find_columns
+from silo.inertia.bom.columns import Columns, find_columns, read_mass_header
 
 MAX_BYTES = 64 * 1024 * 1024
 HEADER_WITHIN = 40
 """The header must be among this many first lines (title blocks are a few lines long)."""
 
 DELIMITERS = (",", ";", "\t", "|")
+_WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
+"""How XLSX and ODS files begin, and XLS files."""
 _CODE_PAGES = ("cp1252", "cp932", "gb18030", "latin-1")
 
 
@@ -54,7 +57,9 @@ def read_sheet(
     encoding: str | None = None,
     delimiter: str | None = None,
 ) -> Sheet:
-    """Decode a CSV export. ``columns``, ``encoding``, ``delimiter``: the user's word, else found out.
+    """Decode a CSV export, or the first sheet of a workbook that holds a BOM.
+
+    ``columns``, ``encoding``, ``delimiter``: the user's word, else found out.
 
     Raises InputError where there is no header line with a column to tell parts apart by, or where the given
     encoding does not fit; the message lists what was seen.
@@ -65,11 +70,19 @@ def read_sheet(
         raise InputError(f"a delimiter is one character, got “{delimiter}”")
     marks = (delimiter,) if delimiter else DELIMITERS
     first_lines = ""
-    for name, text in _decodings(data, encoding, source):
+    workbook = data.startswith(_WORKBOOKS)
+    marks = (",",) if workbook else marks
+    texts = _sheets(data, source) if workbook else _decodings(data, encoding, source)
+    for name, text in texts:
+        if text.lstrip()[:1] == "<":
+            raise InputError(f"{source}: this is HTML or XML and no table; export it as CSV or XLSX")
         first_lines = first_lines or text
         best = _best_header(text, marks, columns)
         if best is not None:
-            return _sheet(text, name, best, data, columns)
+            sheet = _sheet(text, name, best, data, columns)
+            more = [name for name, text in texts if workbook and _best_header(text, marks, columns)]
+            note = f"{name} of the workbook was read; not read: {', '.join(more)}"
+            return replace(sheet, notes=(*sheet.notes, note)) if more else sheet
     raise InputError(_no_header(source, first_lines))
 
 
@@ -83,7 +96,19 @@ class _Header:
 def _sheet(text: str, encoding: str, best: _Header, data: bytes, given: Mapping[str, str] | None) -> Sheet:
     records = list(_records(text, best.delimiter))
     header = records[best.index]
-    notes = list(_notes(encoding, data, header, best.columns, given))
+    columns = best.columns
+    below = records[best.index + 1 : best.index + 2]
+    if below and _continues(header, columns, below[0]):
+        # "Mass" over "[g]", or over "each" and "total": a merged cell has its text in the first one.
+        filled = [next(filter(None, reversed(header.cells[: i + 1])), "") for i in range(len(header.cells))]
+        cells = [
+            f"{above} ({under})" if under.strip() else own
+            for above, own, under in zip_longest(filled, header.cells, below[0].cells, fillvalue="")
+        ]
+        header = Row(header.line, tuple(cells))
+        columns = find_columns(cells, given)
+        best = replace(best, index=best.index + 1, columns=columns)
+    notes = list(_notes(encoding, data, header, columns, given))
     bad = _bad_quotes(text, best.delimiter)
     if bad is not None:
         notes.append(
@@ -92,7 +117,21 @@ def _sheet(text: str, encoding: str, best: _Header, data: bytes, given: Mapping[
     rows = tuple(
         r for r in records[best.index + 1 :] if any(c.strip() for c in r.cells) and r.cells != header.cells
     )
-    return Sheet(header.cells, header.line, best.columns, rows, encoding, best.delimiter, tuple(notes))
+    return Sheet(header.cells, header.line, columns, rows, encoding, best.delimiter, tuple(notes))
+
+
+def _continues(header: Row, columns: Columns, below: Row) -> bool:
+    """True where the record below a header is its second line: no name, and a unit or the like for masses."""
+    if any(columns.cell(below.cells, role) for role in (Role.NAME, Role.PART_NUMBER, Role.DESCRIPTION)):
+        return False
+    if any(letter.isdigit() for cell in below.cells for letter in cell):
+        return False
+    places = [columns.at[role] for role in (Role.MASS, Role.TOTAL_MASS) if role in columns.at]
+    cells = [below.cells[i].strip() for i in places if i < len(below.cells)]
+    read = [
+        read_mass_header(f"mass ({cell.strip('[](){}')})") for cell in cells if any(map(str.isalpha, cell))
+    ]
+    return bool(read) and not any(one.strange or one.rate for one in read)
 
 
 def _notes(
@@ -107,6 +146,32 @@ def _notes(
         if Role(role) not in columns.at:
             seen = ", ".join(c.strip() for c in header.cells if c.strip())
             yield f"there is no column “{text}” for {role} in line {header.line} ({seen})"
+
+
+def _sheets(data: bytes, source: str) -> Iterator[tuple[str, str]]:
+    """Each sheet of a workbook as CSV; numbers in full, with decimal points; dates as in ISO 8601."""
+    try:
+        from python_calamine import CalamineError, load_workbook
+    except ImportError as error:
+        raise InputError(
+            f"{source}: this is a workbook; export it as CSV, or install silo-mod[inertia]"
+        ) from error
+    try:
+        book = load_workbook(io.BytesIO(data))
+        for name in book.sheet_names:
+            out = io.StringIO()
+            rows = book.get_sheet_by_name(name).to_python(skip_empty_area=False)
+            csv.writer(out).writerows([_shown(value) for value in row] for row in rows)
+            yield f"sheet “{name}”", out.getvalue()
+    except CalamineError as error:
+        raise InputError(f"{source}: the workbook cannot be read ({error})") from error
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, float):
+        text = f"{value:.15g}"
+        return text + "0" * (text[-4:-3] == ".")  # "1.2340" cannot be 1234
+    return " ".join(str(value).splitlines())
 
 
 def _decodings(data: bytes, encoding: str | None, source: str) -> Iterator[tuple[str, str]]:

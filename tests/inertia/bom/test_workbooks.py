@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""BOMs as XLSX and ODS: the same table as from CSV, with the rows' own numbers."""
+
+from __future__ import annotations
+
+import datetime
+import io
+import zipfile
+from typing import Any
+
+import pytest
+
+from silo.bom.errors import InputError
+from silo.inertia.bom import BomCode, BOMParser
+
+openpyxl = pytest.importorskip("openpyxl")
+HEAD = ["Name", "Qty", "Material", "Mass (g)"]
+
+
+def xlsx(**sheets: list[list[Any]]) -> bytes:
+    book = openpyxl.Workbook()
+    book.remove(book.active)
+    for title, rows in sheets.items():
+        sheet = book.create_sheet(title)
+        for row in rows:
+            sheet.append(row)
+    book.save(out := io.BytesIO())
+    return out.getvalue()
+
+
+def ods(rows: list[list[Any]]) -> bytes:
+    def cell(value: Any) -> str:
+        kind = "string" if isinstance(value, str) else f'float" office:value="{value}'
+        return f'<table:table-cell office:value-type="{kind}"><text:p>{value}</text:p></table:table-cell>'
+
+    names = " ".join(
+        f'xmlns:{n}="urn:oasis:names:tc:opendocument:xmlns:{n}:1.0"' for n in ("office", "table", "text")
+    )
+    body = "".join(f"<table:table-row>{''.join(map(cell, row))}</table:table-row>" for row in rows)
+    manifest = '<manifest:manifest xmlns:manifest="urn:oasis:names:tc:opendocument:xmlns:manifest:1.0"/>'
+    with zipfile.ZipFile(out := io.BytesIO(), "w") as archive:
+        archive.writestr("mimetype", "application/vnd.oasis.opendocument.spreadsheet")
+        archive.writestr("META-INF/manifest.xml", manifest)
+        archive.writestr(
+            "content.xml",
+            f'<?xml version="1.0"?><office:document-content {names}><office:body><office:spreadsheet>'
+            f'<table:table table:name="BOM">{body}</table:table>'
+            "</office:spreadsheet></office:body></office:document-content>",
+        )
+    return out.getvalue()
+
+
+def test_a_workbook_is_read_like_a_csv_file() -> None:
+    """A cover sheet, title lines, a text with a line break, numbers as numbers and as text."""
+    rows = [["Parts list"], [], HEAD, ["Base\nplate", 4, "steel", 1.234], ["bolt", "2 pcs", "steel", "12,5"]]
+    for data in (xlsx(Cover=[["Robot arm"]], BOM=rows), ods([HEAD, *rows[3:]])):
+        table = BOMParser().parse_bytes(data)
+        assert [(row.name.split()[0], row.quantity) for row in table.rows] == [("Base", 4), ("bolt", 2)]
+        assert [row.mass_kg for row in table.rows] == [pytest.approx(1.234e-3), pytest.approx(0.0125)]
+        assert table.warnings == ()
+    assert BOMParser().parse_bytes(xlsx(BOM=rows)).rows[0].line == 4
+
+
+def test_what_is_no_number_in_a_workbook_is_reported() -> None:
+    """A date for a quantity, a truth value and an error for a mass; a formula that nothing has computed."""
+    rows = [["a", datetime.date(2026, 1, 2), "steel", 1], ["b", 1, "steel", True], ["c", 1, "steel", "=1+1"]]
+    table = BOMParser().parse_bytes(xlsx(BOM=[HEAD, *rows]))
+    assert [row.mass_kg for row in table.rows] == [pytest.approx(1e-3), None, None]
+    found = [(w.code, w.line) for w in table.warnings]
+    assert found == [(BomCode.UNREADABLE_QUANTITY, 2), (BomCode.UNREADABLE_MASS, 3)]
+
+
+def test_a_second_sheet_with_a_bom_is_named() -> None:
+    """Which of two revisions was meant, the file does not say."""
+    table = BOMParser().parse_bytes(xlsx(A=[HEAD, ["a", 1, "steel", 1]], B=[HEAD, ["a", 1, "steel", 2]]))
+    assert table["a"].mass_kg == pytest.approx(1e-3)
+    (warning,) = table.warnings
+    assert "sheet “A”" in warning.message
+    assert "sheet “B”" in warning.message
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (xlsx(BOM=[HEAD])[:600], "cannot be read"),
+        (xlsx(BOM=[]), "empty"),
+        (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + b"\0" * 600, "cannot be read"),
+        (b"<html><table><tr><th>Name</th></tr></table></html>", "HTML"),
+    ],
+)
+def test_what_is_no_table_says_so(data: bytes, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        BOMParser().parse_bytes(data, "bom.xlsx")
