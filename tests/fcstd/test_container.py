@@ -16,7 +16,7 @@ from silo.bom.errors import DocumentError
 from silo.bom.findings import FindingCode
 from silo.fcstd import Limits, open_document
 from silo.fcstd.container import ContainerFile
-from silo.fcstd.problem import FcstdError
+from silo.fcstd.limits import FcstdError
 
 
 def refused(path: Path, limits: Limits | None = None) -> str:

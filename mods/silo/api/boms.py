@@ -101,8 +101,7 @@ class BomCalls(Caller):
             reply = self._get(subject, *_bom(part_number), "where-used", params=params)
             page = reply.models(WhereUsedLine, "where_used", "parents", *LISTS)
             found.extend(page)
-            total = reply.headers.get("X-Total-Count", "")
-            if not page or not (total.isascii() and total.isdigit()) or len(found) >= int(total):
+            if not page or len(found) >= reply.total:
                 return found
 
     def merge_bom(

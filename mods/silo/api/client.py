@@ -8,12 +8,12 @@ What comes back are the wire models, which also read as mappings. What goes wron
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any, Protocol, Self
 
 import requests
 
@@ -21,11 +21,11 @@ from silo.api.address import ServerAddress
 from silo.api.boms import BomCalls
 from silo.api.caller import Abilities, load_abilities, save_abilities
 from silo.api.events import SILENCE, HttpEventStream, open_stream
-from silo.api.files import FileCalls
+from silo.api.files import FileCalls, Origin, Progress
 from silo.api.policy import Retries
 from silo.api.sse import ServerEvent
 from silo.api.transport import Call, Cancel, Timeouts, Transport, stop_if
-from silo.api.wire import ServerState, User
+from silo.api.wire import MergeRequest, MergeResult, Revision, ServerState, User
 from silo.bom.errors import SiloError
 
 
@@ -156,3 +156,54 @@ class SiloClient(FileCalls, BomCalls):
             for event in stream:
                 stop_if(cancelled)
                 yield event
+
+
+class SendApi(Protocol):
+    """What the outbox needs of a Silo.
+
+    :class:`SiloClient` has it over HTTP, :class:`silo.testing.FakeSilo` in memory; one suite tests both.
+    """
+
+    @property
+    def base_url(self) -> str: ...
+
+    def get_item_by_uuid(self, uuid: str, /) -> Mapping[str, Any] | None: ...
+
+    def get_bom(self, part_number: str, /) -> Sequence[Any]: ...
+
+    def merge_bom(
+        self, part_number: str, request: MergeRequest, /, *, cancelled: Cancel | None = None
+    ) -> MergeResult: ...
+
+    def ready(self) -> ServerState: ...
+
+    def revisions(
+        self, part_number: str, /, *, newest: int | None = None, after: int = 0
+    ) -> list[Revision]: ...
+
+    def get_revision(self, part_number: str, number: int, /) -> Revision: ...
+
+    def upload_file(
+        self,
+        part_number: str,
+        path: Path | str,
+        comment: str = "",
+        properties: Mapping[str, Any] | None = None,
+        on_progress: Progress | None = None,
+        *,
+        file_name: str | None = None,
+        idempotency_key: str | None = None,
+        sha256: str | None = None,
+        origin: Origin | None = None,
+        cancelled: Cancel | None = None,
+    ) -> Revision: ...
+
+    def download_file(
+        self,
+        part_number: str,
+        path: Path | str,
+        revision: int | None = None,
+        on_progress: Progress | None = None,
+        *,
+        cancelled: Cancel | None = None,
+    ) -> str: ...

@@ -22,7 +22,6 @@ import requests
 
 from silo.api.failures import Where, translated
 from silo.api.policy import Backoff, told_wait
-from silo.api.protocol import EventStream
 from silo.api.replies import WebPageError, error_of
 from silo.api.sse import HEARTBEAT, RESET, STATE, ServerEvent, SseParser
 from silo.api.transport import MAX_ERROR, Call, Transport, read_some
@@ -160,6 +159,17 @@ _Told = TypeVar("_Told")
 def _number(marker: str | None) -> int:
     # Servers count; where one does not, its markers have no order and none is "before" another.
     return int(marker) if marker and marker.isascii() and marker.isdigit() and len(marker) < 30 else -1
+
+
+class EventStream(Protocol):
+    """One open stream of events. ``close`` may be called from another thread and ends the iteration."""
+
+    @property
+    def last_event_id(self) -> str | None: ...
+
+    def __iter__(self) -> Iterator[ServerEvent]: ...
+
+    def close(self) -> None: ...
 
 
 class EventSource(Protocol):

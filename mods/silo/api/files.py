@@ -4,23 +4,23 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+import os
+import secrets
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, Self
 from urllib.parse import urljoin
 
 from silo.api.caller import LISTS
 from silo.api.items import ItemCalls
-from silo.api.multipart import FileBody, FileForm, Progress, upload_fields
 from silo.api.replies import error_of
-from silo.api.transport import MAX_ERROR, Call, Cancel, Transport, as_json
+from silo.api.transport import MAX_ERROR, Call, Cancel, Transport, as_json, stop_if
 from silo.api.wire import LinkedFile, Revision, Wire
 from silo.bom.errors import (
     ConflictError,
     DocumentError,
-    NotFoundError,
     RejectedError,
     RouteMissingError,
     ServerFaultError,
@@ -29,6 +29,10 @@ from silo.durable import replacing
 
 MAX_DOWNLOAD = 4 << 30
 _PAGE = 1000  # revisions in one answer
+_BLOCK = 1 << 18
+
+Progress = Callable[[int, int], object]
+"""Called with (bytes done, bytes in all)."""
 
 
 class Origin(Wire):
@@ -57,8 +61,7 @@ class FileCalls(ItemCalls):
             fresh = [r for r in page if r.revision_number > after]
             fresh = [r for r in fresh if lowest is None or r.revision_number < lowest]
             found += sorted(fresh, key=lambda revision: revision.revision_number, reverse=True)
-            total = reply.headers.get("X-Total-Count", "")
-            if newest is not None or not fresh or not total.isdecimal() or len(found) >= int(total):
+            if newest is not None or not fresh or len(found) >= reply.total:
                 return found[:newest]
             params["before"] = found[-1].revision_number
 
@@ -117,8 +120,8 @@ class FileCalls(ItemCalls):
         path = Path(path)
         name = file_name or path.name
         subject = f"{name} for {part_number}"
-        fields = upload_fields(comment, properties, sha256) | _origin_fields(origin)
-        with FileForm(path, fields, file_name=name, on_progress=on_progress, cancelled=cancelled) as form:
+        fields = _upload_fields(comment, properties, sha256, origin)
+        with closing(FileForm(path, fields, name, on_progress, cancelled)) as form:
             headers = {"Content-Type": form.content_type, "Accept": "application/json"}
             if idempotency_key:
                 headers["Idempotency-Key"] = idempotency_key
@@ -172,30 +175,32 @@ class FileCalls(ItemCalls):
             pieces = transport.pieces(response, call)
             return _write(Path(path), pieces, int(total) if total.isdigit() else 0, on_progress)
 
-    def thumbnail(self, part_number: str, /) -> bytes | None:
-        """The picture of an item as PNG; None where there is none, or the server keeps none."""
-        try:
-            return self._get(f"the picture of {part_number}", "items", part_number, "thumbnail").content
-        except (NotFoundError, RejectedError, ServerFaultError):
-            return None
-
 
 def _revision(part_number: str, number: int) -> tuple[str, ...]:
     return ("items", part_number, "revisions", str(number))
 
 
-def _origin_fields(origin: Origin | None) -> dict[str, str]:
-    """Where the file came from; a server that knows none of these takes no notice."""
-    said: dict[str, str] = {}
+def _upload_fields(
+    comment: str, properties: Mapping[str, object] | None, sha256: str | None, origin: Origin | None
+) -> dict[str, str]:
+    """The text parts of an upload: comment, properties, what must arrive, and where the file came from.
+
+    A server that does not know the last two ignores them.
+    """
+    fields = {"comment": comment}
+    if properties:
+        fields["properties"] = as_json(properties).decode()
+    if sha256:
+        fields["sha256"] = sha256
     if origin is None:
-        return said
+        return fields
     if origin.base_revision is not None:
-        said["base_revision"] = str(origin.base_revision)
+        fields["base_revision"] = str(origin.base_revision)
     if origin.file_path:
-        said["path"] = origin.file_path
+        fields["path"] = origin.file_path
     if origin.links is not None:
-        said["links"] = as_json([link.model_dump() for link in origin.links]).decode()
-    return said
+        fields["links"] = as_json([link.model_dump() for link in origin.links]).decode()
+    return fields
 
 
 def _in_two_steps(
@@ -226,8 +231,7 @@ def _in_two_steps(
     key, url = place.get("object_key"), place.get("upload_url")
     if not isinstance(key, str) or not isinstance(url, str):
         raise ServerFaultError(f"{call.subject}: the server names no place to upload the file to")
-    content = FileBody(path, on_progress=on_progress, cancelled=call.cancelled)
-    with content:
+    with closing(FileBody(path, on_progress, call.cancelled)) as content:
         put = replace(
             call,
             method="PUT",
@@ -261,3 +265,124 @@ def _replacing(path: Path) -> Iterator[BinaryIO]:
             yield file
     except OSError as error:
         raise DocumentError(str(path), f"cannot be written ({error.strerror or error})") from error
+
+
+class FileForm:
+    """The body of a multipart upload; a readable of known length, as :mod:`requests` wants a stream.
+
+    fields
+        text parts, sent before the file.
+    on_progress
+        called with the bytes of the file that were taken so far; a pure observer.
+
+    Raises :class:`DocumentError` where the file cannot be read or changes under our hands.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        fields: Mapping[str, str],
+        file_name: str,
+        on_progress: Progress | None = None,
+        cancelled: Cancel | None = None,
+    ) -> None:
+        self._path = path
+        self._progress, self._cancelled = on_progress, cancelled
+        self._boundary = secrets.token_hex(16)
+        self._begin = self._text_parts(fields) + self._file_head(file_name)
+        self._end = f"\r\n--{self._boundary}--\r\n".encode()
+        try:
+            self._file: BinaryIO = path.open("rb")
+        except OSError as error:
+            raise _unreadable(path, error) from error
+        self.file_size = os.fstat(self._file.fileno()).st_size
+        # `requests` takes the length of a stream from this attribute and sends it as Content-Length.
+        self.len = len(self._begin) + self.file_size + len(self._end)
+        self.rewound()
+
+    @property
+    def content_type(self) -> str:
+        return f"multipart/form-data; boundary={self._boundary}"
+
+    @property
+    def sha256(self) -> str:
+        """Of the bytes read so far; of the file, once the form was read to its end."""
+        return self._hash.hexdigest()
+
+    def rewound(self) -> Self:
+        """The form from its beginning: a redirect wants it once more."""
+        self._head, self._tail, self._left = self._begin, self._end, self.file_size
+        self._hash = hashlib.sha256()
+        self._file.seek(0)
+        return self
+
+    def read(self, size: int = -1) -> bytes:
+        """The next bytes of the form."""
+        stop_if(self._cancelled)
+        if self._head:
+            return self._take_head(size)
+        if self._left:
+            return self._take_file(size)
+        tail, self._tail = self._tail, b""
+        return tail
+
+    def __iter__(self) -> Self:
+        return self
+
+    def __next__(self) -> bytes:
+        block = self.read(_BLOCK)
+        if not block:
+            raise StopIteration
+        return block
+
+    def close(self) -> None:
+        self._file.close()
+
+    def _take_head(self, size: int) -> bytes:
+        size = len(self._head) if size < 0 else size
+        block, self._head = self._head[:size], self._head[size:]
+        return block
+
+    def _take_file(self, size: int) -> bytes:
+        try:
+            block = self._file.read(min(self._left, size if size > 0 else _BLOCK))
+        except OSError as error:
+            raise _unreadable(self._path, error) from error
+        if not block:
+            raise DocumentError(
+                str(self._path), "the file became shorter while it was sent; save it, then try again"
+            )
+        self._hash.update(block)
+        self._left -= len(block)
+        if self._progress is not None:
+            self._progress(self.file_size - self._left, self.file_size)
+        return block
+
+    def _text_parts(self, fields: Mapping[str, str]) -> bytes:
+        return "".join(
+            f'--{self._boundary}\r\nContent-Disposition: form-data; name="{name}"\r\n'
+            f"Content-Type: text/plain; charset=utf-8\r\n\r\n{text}\r\n"
+            for name, text in fields.items()
+        ).encode("utf-8", "replace")
+
+    def _file_head(self, name: str) -> bytes:
+        # The quoting that browsers use for file names (WHATWG HTML, multipart/form-data encoding).
+        quoted = name.replace('"', "%22").replace("\r", "%0D").replace("\n", "%0A")
+        return (
+            f'--{self._boundary}\r\nContent-Disposition: form-data; name="file"; filename="{quoted}"\r\n'
+            "Content-Type: application/octet-stream\r\n\r\n"
+        ).encode("utf-8", "replace")
+
+
+class FileBody(FileForm):
+    """The bare bytes of a file as the body of a request."""
+
+    def __init__(self, path: Path, on_progress: Progress | None, cancelled: Cancel | None) -> None:
+        super().__init__(path, {}, path.name, on_progress, cancelled)
+        self._begin = self._end = b""
+        self.len = self.file_size
+        self.rewound()
+
+
+def _unreadable(path: Path, error: OSError) -> DocumentError:
+    return DocumentError(str(path), f"the file cannot be read ({error.strerror or error}); nothing was sent")

@@ -21,6 +21,7 @@ from silo.bom.errors import (
     NotFoundError,
     RejectedError,
     RouteMissingError,
+    ServerFaultError,
     SiloError,
 )
 
@@ -131,6 +132,13 @@ class ItemCalls(Caller):
     def get_item(self, part_number: str, /) -> Item:
         """The item with this part number; raises :class:`NotFoundError` where there is none."""
         return self._get(f"item {part_number}", "items", part_number).model(Item)
+
+    def thumbnail(self, part_number: str, /) -> bytes | None:
+        """The picture of an item as PNG; None where there is none, or the server keeps none."""
+        try:
+            return self._get(f"the picture of {part_number}", "items", part_number, "thumbnail").content
+        except (NotFoundError, RejectedError, ServerFaultError):
+            return None
 
     def search_items(
         self, query: str = "", *, item_type: str | None = None, limit: int = 50, offset: int = 0

@@ -74,6 +74,12 @@ class Reply:
         kind = self.headers.get("Content-Type", "").lower()
         return "html" in kind or self.content[:200].lstrip()[:1] == b"<"
 
+    @property
+    def total(self) -> int:
+        """How many things there are on all pages; 0 where the server does not say."""
+        text = self.headers.get("X-Total-Count", "")
+        return int(text) if text.isascii() and text.isdigit() else 0
+
     def data(self) -> Any:
         """The JSON of a good answer; raises :class:`ServerFaultError` where it is none."""
         if self.is_html:

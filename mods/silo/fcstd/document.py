@@ -15,11 +15,10 @@ from typing import TYPE_CHECKING, Any, cast
 from silo.bom.document import LinkProblem
 from silo.bom.findings import FindingCode
 from silo.bom.walk.kinds import Kind, Survey, kind_by_type, kind_of
-from silo.fcstd.container import ContainerFile, Entry
-from silo.fcstd.inflate import Inflater
+from silo.fcstd.container import ContainerFile, Entry, Inflater
+from silo.fcstd.limits import FcstdError
 from silo.fcstd.locate import Found
 from silo.fcstd.objects import FcstdObject
-from silo.fcstd.problem import FcstdError
 from silo.fcstd.properties import Kept, Properties
 from silo.fcstd.typetree import ancestors, is_listed
 from silo.fcstd.values import ABSENT, LocalList, Ref, Vector

@@ -19,10 +19,18 @@ from typing import BinaryIO, NamedTuple
 
 from silo.bom.errors import DocumentError
 from silo.durable import remove_patiently, sync_folder
-from silo.fcstd.container import CENTRAL, DOCUMENT_XML, END, LOCAL, ContainerFile, Directory, Entry, FileState
-from silo.fcstd.inflate import Inflater
-from silo.fcstd.limits import Limits
-from silo.fcstd.problem import FcstdError
+from silo.fcstd.container import (
+    CENTRAL,
+    DOCUMENT_XML,
+    END,
+    LOCAL,
+    ContainerFile,
+    Directory,
+    Entry,
+    FileState,
+    Inflater,
+)
+from silo.fcstd.limits import FcstdError, Limits
 from silo.platform import copy_rights, patiently, swap
 
 _HAS_DESCRIPTOR = 0x8

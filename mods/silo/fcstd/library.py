@@ -18,10 +18,9 @@ from silo.bom.findings import FindingCode
 from silo.bom.walk.kinds import Kind
 from silo.fcstd.container import DOCUMENT_XML, ContainerFile, Directory, FileState
 from silo.fcstd.document import FcstdDocument
-from silo.fcstd.limits import Limits
+from silo.fcstd.limits import FcstdError, Limits
 from silo.fcstd.locate import Found, Locator, NotFound
 from silo.fcstd.objects import FcstdObject
-from silo.fcstd.problem import FcstdError
 from silo.fcstd.properties import to_keep
 from silo.fcstd.values import Ref
 from silo.fcstd.xmltext import Shared, XmlText

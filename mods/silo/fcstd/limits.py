@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""How much an FCStd file may ask of us. Everything is counted on what was really read, not on what it
-claims."""
+"""How much an FCStd file may ask of us, and the error of one that cannot be read.
+
+Everything is counted on what was really read, not on what the file claims.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+
+from silo.bom.errors import DocumentError
+from silo.bom.findings import FindingCode
 
 _MB = 1024 * 1024
 
@@ -49,3 +54,24 @@ class Limits:
 
 # For a file that FreeCAD has opened: whatever its size, FreeCAD had the memory for it.
 ANY_SIZE = Limits(1 << 32, 1 << 32, 2000, entries=1 << 30, objects=1 << 30, side_entry=1 << 32)
+
+
+class FcstdError(DocumentError):
+    """A file that cannot be read.
+
+    finding
+        what a link to this file has: missing, unreadable, …
+    state
+        the state of the file (``FileState``) that was tried, None where it could not be opened.
+    """
+
+    def __init__(
+        self,
+        path: str,
+        reason: str,
+        finding: FindingCode = FindingCode.UNREADABLE_FILE,
+        state: object = None,
+    ) -> None:
+        super().__init__(path, reason)
+        self.finding = finding
+        self.state = state

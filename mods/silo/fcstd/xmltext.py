@@ -21,10 +21,8 @@ from xml.sax.saxutils import unescape
 
 from silo.fcstd import careful
 from silo.fcstd.careful import Head, Malformed, Span
-from silo.fcstd.container import Entry
-from silo.fcstd.inflate import Inflater
-from silo.fcstd.limits import Limits
-from silo.fcstd.problem import FcstdError
+from silo.fcstd.container import Entry, Inflater
+from silo.fcstd.limits import FcstdError, Limits
 
 if TYPE_CHECKING:
     from silo.fcstd.properties import Shape

@@ -18,9 +18,9 @@ from typing import Any
 from pydantic import ValidationError
 
 from silo.api.address import canonical
+from silo.api.client import SendApi
 from silo.api.files import Origin
 from silo.api.policy import Backoff, Scope, Then, judge
-from silo.api.protocol import SendApi
 from silo.api.revisions import (
     MayHaveArrivedError,
     SentFile,

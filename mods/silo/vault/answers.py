@@ -15,8 +15,8 @@ import silo.bom
 import silo.fcstd
 from silo.fcstd.container import FileState
 from silo.fcstd.library import Content, Library, Remembered
+from silo.fcstd.limits import FcstdError
 from silo.fcstd.locate import Found, NotFound
-from silo.fcstd.problem import FcstdError
 
 FORMAT = 2
 _SETTLED_NS = 2_500_000_000  # FAT has ticks of 2 s, the coarsest in use

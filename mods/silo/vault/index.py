@@ -33,8 +33,8 @@ from typing import Any, BinaryIO
 from silo.bom.errors import InputError
 from silo.durable import remove_patiently
 from silo.fcstd.library import Contents, Facts
+from silo.fcstd.limits import FcstdError
 from silo.fcstd.locate import Locator
-from silo.fcstd.problem import FcstdError
 from silo.folders import cache_folder
 from silo.platform import hold_lock
 from silo.vault.answers import FORMAT, Known, Seen, engine, json_of, led_to

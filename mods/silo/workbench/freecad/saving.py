@@ -20,7 +20,7 @@ from silo.workbench.freecad import host
 from silo.workbench.freecad.edits import EditWatch
 
 if TYPE_CHECKING:
-    from silo.fcstd.problem import FcstdError
+    from silo.fcstd.limits import FcstdError
 
 DAMAGED = (
     "FreeCAD opens what it can of a damaged file, and saving that would make the loss final: fetch the file "
@@ -91,8 +91,7 @@ def damage(path: str, name: str = "") -> FcstdError | None:
     from silo.fcstd import Library
     from silo.fcstd.careful import Refused
     from silo.fcstd.container import FileState
-    from silo.fcstd.limits import ANY_SIZE
-    from silo.fcstd.problem import FcstdError
+    from silo.fcstd.limits import ANY_SIZE, FcstdError
 
     if not path or not os.access(path, os.R_OK):
         return None
