@@ -19,7 +19,7 @@ from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.merge import plan_merge
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.paths import relative
-from silo.bom.snapshot import from_plain, to_plain
+from silo.bom.report import from_plain, to_plain
 from silo.bom_sync import Status, blocking, resolve, sync
 from silo.fcstd import open_document, stamp
 from silo.fcstd.container import CENTRAL, LOCAL

@@ -13,7 +13,7 @@ import pytest
 
 from silo.bom.errors import ConfigError, DocumentError, InputError
 from silo.bom.model import BomEntry, Extraction
-from silo.bom.snapshot import to_plain
+from silo.bom.report import to_plain
 from silo.freecadcmd.run import find_freecadcmd, run_freecad
 
 # A stand-in for freecadcmd: it gets the same arguments and answers in the same file. What it does with a file

@@ -23,7 +23,7 @@ from typing import IO, Any
 from silo import platform
 from silo.bom.errors import CancelledError, ConfigError, DocumentError, InputError, SiloError
 from silo.bom.model import Extraction
-from silo.bom.snapshot import from_plain
+from silo.bom.report import from_plain
 from silo.folders import scratch_folder
 from silo.freecads import commands, exchange_folder, start
 

@@ -47,8 +47,7 @@ from silo.bom.errors import (
     RouteMissingError,
     SiloError,
 )
-from silo.bom.report import project_folder
-from silo.bom.snapshot import from_plain
+from silo.bom.report import from_plain, project_folder
 from silo.bom_sync import Resolved, Status, decide, merge_request, resolve, server_lines
 from silo.outbox.database import OutboxError
 from silo.outbox.entry import ASKED, SAME_PART, Entry, State

@@ -29,7 +29,7 @@ from typing import Any
 
 from silo.api.address import canonical
 from silo.bom.errors import ConflictError, DocumentError, InputError
-from silo.bom.snapshot import to_plain
+from silo.bom.report import to_plain
 from silo.durable import Stamp, remove_patiently, replacing, stamp_of
 from silo.files import content_hash
 from silo.folders import data_folder

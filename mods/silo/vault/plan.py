@@ -17,7 +17,7 @@ from silo.bom.errors import SiloError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.links import MAX_LEVELS
 from silo.bom.model import BomEntry, Extraction
-from silo.bom.snapshot import whole_row
+from silo.bom.report import whole_row
 from silo.bom.walk.rings import Rings
 from silo.bom.walk.standard import standard_uuid
 from silo.fcstd.suggest import with_suggestions

@@ -29,8 +29,8 @@ from silo.bom.errors import DocumentError, InputError, SiloError
 from silo.bom.findings import respelt_findings
 from silo.bom.links import extract
 from silo.bom.model import Extraction
+from silo.bom.report import from_plain, to_plain
 from silo.bom.roots import choose_assembly
-from silo.bom.snapshot import from_plain, to_plain
 from silo.fcstd.library import Content, Contents, Library, facts_of
 from silo.fcstd.locate import Found, Locator
 from silo.vault.answers import Known, engine
@@ -88,7 +88,7 @@ class Answer:
 
     @cached_property
     def plain(self) -> dict[str, Any]:
-        """As :mod:`silo.bom.snapshot` writes an extraction; or the one key of an error."""
+        """As :mod:`silo.bom.report` writes an extraction; or the one key of an error."""
         data: dict[str, Any] = json.loads(self.known.answer)
         return data
 

@@ -126,7 +126,7 @@ def _extractions(
 
 def _write_lines(job: Job, out: TextIO) -> int:
     """One line when a file is begun and one when it is done, so that a reader knows where FreeCAD died."""
-    from silo.bom.snapshot import to_plain
+    from silo.bom.report import to_plain
 
     fine = True
     tops = documents_in(job.tops)

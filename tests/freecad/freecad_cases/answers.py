@@ -14,7 +14,7 @@ from silo.bom.errors import SiloError
 from silo.bom.findings import Finding, Place
 from silo.bom.identity import walk_entries
 from silo.bom.model import BomEntry, Extraction
-from silo.bom.snapshot import to_plain
+from silo.bom.report import to_plain
 
 
 def component(entry: BomEntry, base: str) -> str:

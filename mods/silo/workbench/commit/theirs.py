@@ -190,7 +190,7 @@ def look_held(
     """
     from silo.api.address import canonical
     from silo.api.revisions import standing
-    from silo.bom.snapshot import from_plain
+    from silo.bom.report import from_plain
     from silo.vault.revisions import top_of
 
     extraction = outbox.bom(entry.id)[0]
