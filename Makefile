@@ -21,7 +21,7 @@ help:
 	@echo "make test-windows-files  the tests with the file semantics of Windows, simulated"
 	@echo "make test-other-disk  the tests on a disk that does not distinguish upper and lower case (Linux, FUSE)"
 	@echo "make check  ruff, mypy, import directions"
-	@echo "make translations  bring the files for translators up to date"
+	@echo "make translations  bring the files for translators up to date (LANGUAGE=de begins one)"
 
 setup: $(DEV)
 
@@ -63,7 +63,7 @@ test-machine: setup
 	$(BIN)/python -m pytest $(SPREAD) --dist loadscope -m "freecad or browser"
 
 translations: setup
-	$(BIN)/python scripts/translations.py
+	$(BIN)/python scripts/translations.py $(LANGUAGE)
 
 check: setup
 	$(BIN)/ruff check .

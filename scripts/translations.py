@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Collects the add-on's texts for translators: ``silo.ts``, and every ``silo_<language>.ts`` beside it.
+"""Collects the add-on's texts for translators, in one ``silo_<language>.ts`` for each language.
 
     scripts/translations.py            bring the files up to date
-    scripts/translations.py --check    change nothing; exit code 1 where one is out of date
+    scripts/translations.py de         the same, and begin one for German
+    scripts/translations.py --check    change nothing; exit code 1 where a file is out of date
 
 A text is what stands in ``translate("Silo", "…")`` in mods/silo/workbench or in a module of SHARED;
 both arguments must be literals.
@@ -27,7 +28,6 @@ SOURCES = ROOT / "mods" / "silo" / "workbench"
 # Words that the command line shows too.
 SHARED = (ROOT / "mods" / "silo" / "api" / "activity.py",)
 FOLDER = SOURCES / "resources" / "translations"
-TEMPLATE = FOLDER / "silo.ts"
 CONTEXT = "Silo"
 
 
@@ -123,11 +123,17 @@ def _add(context: ET.Element, text: str, files: Iterable[str], known: Translatio
     made.text = known.text
 
 
-def wanted(folder: Path = FOLDER, sources: Path = SOURCES, also: Iterable[Path] = SHARED) -> dict[Path, str]:
-    """What each .ts file should hold."""
+def wanted(
+    languages: Iterable[str] = (),
+    folder: Path = FOLDER,
+    sources: Path = SOURCES,
+    also: Iterable[Path] = SHARED,
+) -> dict[Path, str]:
+    """What each .ts file should hold: those that exist, and one for each of ``languages``."""
     texts = collect(sources, also)
-    paths = [folder / TEMPLATE.name, *sorted(folder.glob("silo_*.ts"))]
-    return {path: ts(texts, *read(path)) for path in paths}
+    found = dict.fromkeys(sorted(folder.glob("silo_*.ts")), "")
+    found |= {folder / f"silo_{language}.ts": language for language in languages}
+    return {path: ts(texts, read(path)[0] or new, read(path)[1]) for path, new in found.items()}
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -135,10 +141,11 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
+    parser.add_argument("languages", nargs="*", help="begin a file for this language: de, pt-BR")
     parser.add_argument("--check", action="store_true", help="change nothing, say what is out of date")
     args = parser.parse_args(arguments)
     try:
-        files = wanted()
+        files = wanted(args.languages)
     except NotLiteral as mistakes:
         print(mistakes, file=sys.stderr)
         return 1

@@ -34,9 +34,23 @@ def _sources(tmp_path: Path) -> Path:
 
 
 def test_the_committed_files_are_up_to_date(script: ModuleType) -> None:
-    """After a text has changed: make translations."""
+    """After a text has changed: make translations. Every text of the add-on can be collected."""
+    assert len(script.collect(also=script.SHARED)) > 100
     for path, text in script.wanted().items():
         assert path.read_text(encoding="utf-8") == text, f"{path.name}: run make translations"
+
+
+def test_a_file_for_a_new_language_has_every_text(script: ModuleType, sources: Path) -> None:
+    """Ready for Qt Linguist; the next run keeps what was translated in it."""
+    ((path, text),) = script.wanted(["de"], sources, sources, ()).items()
+    assert path == sources / "silo_de.ts"
+    path.write_text(
+        text.replace('<translation type="unfinished" />', "<translation>Abgleichen</translation>", 1)
+    )
+    assert script.wanted((), sources, sources, ()) == {path: path.read_text()}
+    language, known = script.read(path)
+    assert (language, list(known)) == ("de", ["Sync", "Show & <hide>"])
+    assert known["Sync"] == script.Translation("Abgleichen", "")
 
 
 def test_each_text_once_with_the_files_that_use_it(script: ModuleType, sources: Path) -> None:
