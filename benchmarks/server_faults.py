@@ -51,7 +51,7 @@ from server_testing import (
     wait_until,
 )
 from server_testing.kill import LINES, Moments, kill_rounds, killed
-from server_testing.process import ForkedServer, command_line, forked
+from server_testing.process import command_line, forked
 
 TOKEN = "silo_faults"
 READS = 300
@@ -301,7 +301,7 @@ def readonly(url: str, folder: Path) -> str:
         if user is not None:
             os.chown(each, user, user)
     refused: set[int] = set()
-    with ForkedServer(url, files, TOKEN, user_id=user) as server, Api(server.base_url, TOKEN) as api:
+    with ServerProcess.forked(url, files, TOKEN, user_id=user) as server, Api(server.base_url, TOKEN) as api:
         item = api.item()
         assert upload(api, item, b"before", "k1").status == 201
         may_write(files, allowed=False)
@@ -323,14 +323,14 @@ def readonly(url: str, folder: Path) -> str:
     if not sqlite:
         return "uploads 503, all else went on; well afterwards"
     try:
-        ForkedServer(url, files, TOKEN, user_id=user).stop()
+        ServerProcess.forked(url, files, TOKEN, user_id=user).stop()
     except AssertionError as error:
         told = str(error)
         assert "cannot be used" in told, told
     else:
         raise AssertionError("a server started that can write nothing")
     may_write(place, allowed=True)
-    with ForkedServer(url, files, TOKEN, user_id=user) as server, Api(server.base_url, TOKEN) as api:
+    with ServerProcess.forked(url, files, TOKEN, user_id=user) as server, Api(server.base_url, TOKEN) as api:
         assert api.call("GET", "/api/items/MEANWHILE").status == 200
         assert api.call("GET", f"/api/items/{item}/file").body == b"during"
     check_sqlite(path)
@@ -504,7 +504,7 @@ def kill_merges(url: str, folder: Path, kills: int) -> str:
 def kill_uploads(url: str, folder: Path, kills: int) -> str:
     """After each kill the revision is there with all of its file, or not at all; the retry makes it one."""
     answered = there = 0
-    server = ForkedServer(url, folder, TOKEN)
+    server = ServerProcess.forked(url, folder, TOKEN)
     with Api(server.base_url, TOKEN) as api:
         item = api.item("KILLED")
         started = time.perf_counter()
@@ -513,7 +513,7 @@ def kill_uploads(url: str, folder: Path, kills: int) -> str:
     for number in range(kills):
         content, key = os.urandom(UPLOAD), f"k{number}"
         came = killed(server, TOKEN, lambda api, c=content, k=key: upload(api, item, c, k), moments.next())
-        server = ForkedServer(url, folder, TOKEN)
+        server = ServerProcess.forked(url, folder, TOKEN)
         with Api(server.base_url, TOKEN) as api:
             newest = api.get(f"/api/items/{item}/revisions?limit=1")[0]["revision_number"]
             assert newest in (number + 1, number + 2), "a revision is lost or doubled"
@@ -533,7 +533,7 @@ def kill_uploads(url: str, folder: Path, kills: int) -> str:
 def kill_imports(url: str, folder: Path, kills: int) -> str:
     """After each kill the BOM is the old one or the CSV's."""
     answered = new = 0
-    server = ForkedServer(url, folder, TOKEN)
+    server = ServerProcess.forked(url, folder, TOKEN)
     with Api(server.base_url, TOKEN) as api:
         children = api.items(LINES)
         parent = api.item("IMPORTED")
@@ -546,7 +546,7 @@ def kill_imports(url: str, folder: Path, kills: int) -> str:
         came = killed(
             server, TOKEN, lambda api, n=after: import_csv(api, parent, children, n), moments.next()
         )
-        server = ForkedServer(url, folder, TOKEN)
+        server = ServerProcess.forked(url, folder, TOKEN)
         with Api(server.base_url, TOKEN) as api:
             state = api.quantities(parent)
             found = set(state.values())
@@ -577,7 +577,7 @@ def kill_restores(url: str, folder: Path, kills: int) -> str:
     folder.mkdir()
     backups: list[Path] = []
     states: list[tuple[list[float], bytes | None]] = []
-    with ForkedServer(url, folder / "files", TOKEN) as server, Api(server.base_url, TOKEN) as api:
+    with ServerProcess.forked(url, folder / "files", TOKEN) as server, Api(server.base_url, TOKEN) as api:
         children = api.items(LINES)
         parent = api.item("RESTORED")
         for turn in (1, 2):

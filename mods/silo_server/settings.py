@@ -5,12 +5,14 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 from silo.bom.errors import ConfigError
+from silo.bom.numbers import yes_or_no
 from silo.folders import data_folder
 
 MIB = 1024 * 1024
@@ -148,21 +150,12 @@ def settings_from_environment(environ: Mapping[str, str] | None = None, **given:
 
 
 def _convert(variable: str, text: str, kind: str) -> Any:
-    try:
-        if kind == "bool":
-            return _boolean(text)
-        if kind == "int":
-            return int(text)
-        if kind == "float":
-            return float(text)
-    except ValueError:
-        raise ConfigError(f"{variable}: wanted {kind}, got {text!r}") from None
-    return Path(text) if "Path" in kind else text
-
-
-def _boolean(text: str) -> bool:
-    if text.lower() in ("1", "true", "yes", "on"):
-        return True
-    if text.lower() in ("0", "false", "no", "off"):
-        return False
-    raise ValueError(text)
+    readers: Mapping[str, Callable[[str], Any]] = {"bool": yes_or_no, "int": int, "float": float}
+    if kind not in readers:
+        return Path(text) if "Path" in kind else text
+    value = None
+    with suppress(ValueError):
+        value = readers[kind](text)
+    if value is None:
+        raise ConfigError(f"{variable}: wanted {kind}, got {text!r}")
+    return value

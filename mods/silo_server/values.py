@@ -5,11 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from decimal import Decimal
 from enum import StrEnum
 from typing import Any, NamedTuple, TypeVar
 
-from silo.bom.numbers import plain
 from silo_server.clock import wire
 
 T = TypeVar("T")
@@ -217,10 +215,3 @@ def to_wire(value: Any, *left_out: str) -> dict[str, Any]:
 
 
 _TIMES: dict[type, dict[str, bool]] = {}  # class → field → whether it is a time
-
-
-def number(value: float | Decimal | None) -> float | int | None:
-    """A count reads as a count: 12.0 is written as 12."""
-    if isinstance(value, Decimal):
-        return plain(value)
-    return int(value) if value is not None and value == int(value) else value

@@ -112,7 +112,8 @@ def test_a_component_that_people_entered_with_another_quantity_is_a_conflict(tol
     assert (conflict.part_number, conflict.local_quantity) == ("P", 4)
     assert (diff.added, diff.quantity_changed, diff.unchanged) == ((), (), ())
     assert diff.drifted
-    assert not diff.changes_server
+    assert not diff.added
+    assert not diff.quantity_changed
 
 
 def test_an_assembly_line_beside_a_manual_one() -> None:

@@ -19,6 +19,8 @@ from silo.bom.numbers import (
     plain,
     read_number,
     read_quantity,
+    whole_number,
+    yes_or_no,
 )
 
 READ = [
@@ -148,3 +150,29 @@ def test_any_text_is_a_number_or_a_sentence(text: str) -> None:
     for read in (read_number, read_quantity):
         reading = read(text)
         assert (reading.value is None) == bool(reading.problem)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [("12", 12), ("007", 7), ("9" * 15, 10**15 - 1), ("9" * 16, None)]
+    + [(text, None) for text in ("", "²", "１２", "-1", "+1", "1.0", " 1", "1e3", "0x1")],
+)
+def test_a_whole_number_of_a_program_has_ascii_digits_only(text: str, expected: int | None) -> None:
+    """Headers and form fields may hold anything; none of it raises."""
+    assert whole_number(text) == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [(" Yes ", True), ("on", True), ("0", False), ("FALSE", False), ("maybe", None), ("", None)],
+)
+def test_a_setting_says_yes_or_no(text: str, expected: bool | None) -> None:
+    """In the words that people use; anything else is not taken for a no."""
+    assert yes_or_no(text) is expected
+
+
+def test_what_is_no_count_stays_as_it_is() -> None:
+    """Also what is absent, and what no whole number can show."""
+    assert plain(None) is None
+    assert (plain(0.5), plain(7), plain(1e300), plain(Decimal("1e300"))) == (0.5, 7, 1e300, 1e300)
+    assert str(plain(float("nan"))) == "nan"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Databases for the tests that start their own servers, or none."""
+"""Databases for the tests that start their own servers, or none; a server, and visitors of its pages."""
 
 from __future__ import annotations
 
@@ -7,12 +7,15 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from server_testing import Databases
+from server_testing import Api, Databases
+from web_visitor import Visitor, visitors_of
 
 from silo_server.bootstrap import prepare
 from silo_server.db.engine import Database
+from silo_server.run import RunningServer, running_server
 from silo_server.settings import Settings
 
+TOKEN = "silo_pages"
 KINDS = ["sqlite", pytest.param("postgres", marks=pytest.mark.postgres)]
 
 
@@ -37,3 +40,24 @@ def db(url: str, tmp_path: Path) -> Iterator[Database]:
     prepare(made, "silo_test")
     yield made
     made.close()
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningServer]:
+    """A server over an empty database."""
+    folder = tmp_path_factory.mktemp("pages")
+    with running_server(f"sqlite:///{folder / 'silo.db'}", token=TOKEN) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def api(server: RunningServer) -> Iterator[Api]:
+    """The admin's token."""
+    with Api(server.base_url, TOKEN) as caller:
+        yield caller
+
+
+@pytest.fixture(scope="module")
+def visitors(api: Api) -> dict[str, Visitor]:
+    """A session per role."""
+    return visitors_of(api)

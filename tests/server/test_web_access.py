@@ -12,9 +12,9 @@ from urllib.parse import unquote, urlencode
 import pytest
 from fastapi.routing import APIRoute
 from server_testing import Api
-from web_visitor import FORM, HTML, ROLES, Visitor, enter, visitors_of
+from web_visitor import FORM, HTML, ROLES, Visitor, enter
 
-from silo_server.run import RunningServer, running_server
+from silo_server.run import running_server
 from silo_server.settings import Settings
 from silo_server.web.forms import Kept, unpacked
 from silo_server.web.pages import ROUTERS
@@ -72,27 +72,6 @@ CHANGING = [path for (method, path), role in TABLE.items() if method == "POST" a
 def fill(path: str) -> str:
     """The path of something that does not exist, so that nothing is harmed."""
     return re.sub(r"{(\w+)}", lambda found: "999999" if found[1] == "token_id" else "NO-SUCH", path)
-
-
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningServer]:
-    """A server over an empty database."""
-    folder = tmp_path_factory.mktemp("pages")
-    with running_server(f"sqlite:///{folder / 'silo.db'}", token=TOKEN) as running:
-        yield running
-
-
-@pytest.fixture(scope="module")
-def api(server: RunningServer) -> Iterator[Api]:
-    """The admin's token."""
-    with Api(server.base_url, TOKEN) as caller:
-        yield caller
-
-
-@pytest.fixture(scope="module")
-def visitors(api: Api) -> dict[str, Visitor]:
-    """A session per role."""
-    return visitors_of(api)
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,6 @@ import gzip
 import json
 import re
 import zlib
-from collections.abc import Iterator
 from html import unescape
 from html.parser import HTMLParser
 from itertools import pairwise
@@ -16,35 +15,14 @@ from pathlib import Path
 
 import pytest
 from server_testing import Api, bom, form_body
-from web_visitor import HTML, ROLES, Visitor, enter, visitors_of
+from web_visitor import HTML, ROLES, Visitor, enter
 
-from silo_server.run import RunningServer, running_server
+from silo_server.run import running_server
 from silo_server.settings import Settings
 
 TOKEN = "silo_pages"
 VIEWER, EDITOR, ADMIN = ROLES
 HOSTILE = "<script>alert(1)</script>\"'&<img src=x>"
-
-
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningServer]:
-    """A server over an empty database."""
-    folder = tmp_path_factory.mktemp("pages")
-    with running_server(f"sqlite:///{folder / 'silo.db'}", token=TOKEN) as running:
-        yield running
-
-
-@pytest.fixture(scope="module")
-def api(server: RunningServer) -> Iterator[Api]:
-    """The admin's token."""
-    with Api(server.base_url, TOKEN) as caller:
-        yield caller
-
-
-@pytest.fixture(scope="module")
-def visitors(api: Api) -> dict[str, Visitor]:
-    """A session per role."""
-    return visitors_of(api)
 
 
 # --- what is sent -------------------------------------------------------------------------------------------

@@ -68,15 +68,9 @@ class BomCalls(Caller):
         """
 
         def batch(some: Sequence[str]) -> dict[str, list[BomLine]]:
-            reply = self._change(
-                "POST",
-                f"the BOMs of {len(some)} items",
-                *("items", "boms"),
-                body=NumbersBody(part_numbers=list(some)),
-                repeatable=True,
-                cancelled=cancelled,
-            )
-            return reply.model(BomsAnswer).boms
+            asked = NumbersBody(part_numbers=list(some))
+            subject = f"the BOMs of {len(some)} items"
+            return self._ask(subject, "items", "boms", body=asked, cancelled=cancelled).model(BomsAnswer).boms
 
         def single(part_number: str) -> list[BomLine] | None:
             try:

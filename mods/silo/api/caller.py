@@ -140,6 +140,10 @@ class Caller:
             )
         )
 
+    def _ask(self, subject: str, *segments: str, body: BaseModel, cancelled: Cancel | None = None) -> Reply:
+        """Ask what is too long for an address: a POST that may be repeated freely."""
+        return self._change("POST", subject, *segments, body=body, repeatable=True, cancelled=cancelled)
+
     def _change(
         self,
         method: str,

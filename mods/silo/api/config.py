@@ -25,6 +25,7 @@ from typing import Any
 
 from silo.api.address import ServerAddress
 from silo.bom.errors import ConfigError
+from silo.bom.numbers import yes_or_no
 from silo.durable import replacing
 from silo.folders import config_folder
 from silo.platform import MODES_COUNT
@@ -34,7 +35,6 @@ log = logging.getLogger("silo.api")
 URL, TOKEN, VERIFY = "SILO_API_URL", "SILO_API_TOKEN", "SILO_SSL_VERIFY"
 
 _KEYS = ("url", "token", "verify")
-_YES, _NO = ("1", "true", "yes", "on"), ("0", "false", "no", "off")
 _HOW = (
     "Start one on this computer with `silo-mod serve` (it prints its address and a token), then run "
     f"`silo-mod login URL`, set {URL} and {TOKEN}, or give --server and --token"
@@ -182,13 +182,14 @@ def _verify(option: bool | str | None, variable: str | None, stored: Any, path: 
         if isinstance(value, bool):
             return value
         if isinstance(value, str) and value.strip():
-            return _verify_text(source, value.strip())
+            return verify_of(source, value.strip())
     return True
 
 
-def _verify_text(source: str, text: str) -> bool | str:
-    if text.lower() in _YES + _NO:
-        return text.lower() in _YES
+def verify_of(source: str, text: str) -> bool | str:
+    """How certificates are checked: yes, no, or the path of a file. ConfigError, naming ``source``."""
+    if (said := yes_or_no(text)) is not None:
+        return said
     if not Path(text).expanduser().exists():
         raise ConfigError(
             f"{source}: wanted true, false or a file with certificate authorities; {text} is no file"

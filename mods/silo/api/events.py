@@ -27,6 +27,7 @@ from silo.api.sse import HEARTBEAT, RESET, STATE, ServerEvent, SseParser
 from silo.api.transport import MAX_ERROR, Call, Transport, read_some
 from silo.api.wire import ServerState
 from silo.bom.errors import AuthError, RejectedError, RouteMissingError, ServerFaultError, SiloError
+from silo.bom.numbers import whole_number
 
 log = logging.getLogger("silo.api")
 
@@ -158,7 +159,8 @@ _Told = TypeVar("_Told")
 
 def _number(marker: str | None) -> int:
     # Servers count; where one does not, its markers have no order and none is "before" another.
-    return int(marker) if marker and marker.isascii() and marker.isdigit() and len(marker) < 30 else -1
+    number = whole_number(marker or "", 29)
+    return -1 if number is None else number
 
 
 class EventStream(Protocol):

@@ -25,6 +25,7 @@ from silo.bom.errors import (
     RouteMissingError,
     ServerFaultError,
 )
+from silo.bom.numbers import whole_number
 from silo.durable import replacing
 
 MAX_DOWNLOAD = 4 << 30
@@ -171,9 +172,8 @@ class FileCalls(ItemCalls):
         with transport.opened(call) as response:
             if not 200 <= response.status_code < 300:
                 raise error_of(transport.reply(response, replace(call, max_bytes=MAX_ERROR, endless=False)))
-            total = response.headers.get("Content-Length", "")
-            pieces = transport.pieces(response, call)
-            return _write(Path(path), pieces, int(total) if total.isdigit() else 0, on_progress)
+            total = whole_number(response.headers.get("Content-Length", "")) or 0
+            return _write(Path(path), transport.pieces(response, call), total, on_progress)
 
 
 def _revision(part_number: str, number: int) -> tuple[str, ...]:

@@ -106,14 +106,8 @@ class ItemCalls(Caller):
         """
 
         def batch(some: Sequence[str]) -> dict[str, Item]:
-            reply = self._change(
-                "POST",
-                f"{len(some)} items",
-                *("items", "by-uuid"),
-                body=UuidsBody(uuids=list(some)),
-                repeatable=True,
-                cancelled=cancelled,
-            )
+            asked = UuidsBody(uuids=list(some))
+            reply = self._ask(f"{len(some)} items", "items", "by-uuid", body=asked, cancelled=cancelled)
             known = {_written(item.id): item for item in reply.models(Item, *LISTS)}
             return {uuid: known[_written(uuid)] for uuid in some if _written(uuid) in known}
 

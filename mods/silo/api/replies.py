@@ -36,6 +36,7 @@ from silo.bom.errors import (
     UnreachableError,
     VersionConflictError,
 )
+from silo.bom.numbers import whole_number
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -77,8 +78,7 @@ class Reply:
     @property
     def total(self) -> int:
         """How many things there are on all pages; 0 where the server does not say."""
-        text = self.headers.get("X-Total-Count", "")
-        return int(text) if text.isascii() and text.isdigit() else 0
+        return whole_number(self.headers.get("X-Total-Count", "")) or 0
 
     def data(self) -> Any:
         """The JSON of a good answer; raises :class:`ServerFaultError` where it is none."""
@@ -218,8 +218,8 @@ def error_of(reply: Reply, *, writing: bool = False) -> SiloError:
 def retry_after(reply: Reply) -> float | None:
     """The pause that the answer asks for, in seconds; None where it names none that can be read."""
     text = reply.headers.get("Retry-After", "").strip()
-    if text.isascii() and text.isdigit():
-        return float(text[:9])
+    if (seconds := whole_number(text, 300)) is not None:
+        return float(seconds)
     try:
         return max(0.0, parsedate_to_datetime(text).timestamp() - time.time())
     except (ValueError, TypeError, OverflowError):

@@ -37,6 +37,7 @@ from silo.bom.errors import (
     SiloError,
     UnreachableError,
 )
+from silo.bom.numbers import whole_number
 
 MAX_REDIRECTS = 5
 MAX_ERROR = 1 << 20
@@ -269,9 +270,9 @@ def _headers(call: Call) -> dict[str, str]:
 
 def _check_length(response: requests.Response, size: int, where: Where) -> None:
     # urllib3 1 takes an early end for the end.
-    told = response.headers.get("Content-Length", "")
+    told = whole_number(response.headers.get("Content-Length", ""))
     packed = "Content-Encoding" in response.headers or response.request.method == "HEAD"
-    if told.isdigit() and not packed and size < int(told):
+    if told is not None and not packed and size < told:
         raise UnreachableError(f"{where.asked} closed the connection after {size} of {told} bytes; try again")
 
 

@@ -28,6 +28,9 @@ from pydantic import (
     model_validator,
 )
 
+from silo.bom.headers import designators
+from silo.bom.numbers import plain
+
 Source = Literal["assembly", "manual"]
 
 
@@ -66,11 +69,6 @@ class Record(Answer, Mapping[str, Any]):
         return len(type(self).model_fields)
 
 
-def _shortest(value: float) -> float:
-    # The spec writes 12, never 12.0; a server that counts in integers refuses the latter.
-    return int(value) if value == value and abs(value) < 2**53 and value == int(value) else value
-
-
 def _known_source(value: Any) -> Any:
     # A source we do not know is somebody's: only lines that say "assembly" may be changed by a merge.
     if isinstance(value, str):
@@ -80,12 +78,11 @@ def _known_source(value: Any) -> Any:
 
 
 def _designators(value: Any) -> Any:
-    if isinstance(value, str):
-        return [part for part in value.replace(",", " ").split() if part]
-    return value
+    return list(designators(value)) if isinstance(value, str) else value
 
 
-_Shortest = PlainSerializer(_shortest, return_type=int | float)
+# The spec writes 12, never 12.0; a server that counts in integers refuses the latter.
+_Shortest = PlainSerializer(plain, return_type=int | float)
 
 
 def _time_or_none(value: Any, read: ValidatorFunctionWrapHandler) -> Any:

@@ -11,12 +11,18 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 from silo.bom.model import BomEntry
 from silo.bom.naming import display_name
 
 Key = tuple[str, str]
+T = TypeVar("T")
+
+
+def _first(*states: T | None) -> T:
+    """The first state there is; one of them always is."""
+    return next(state for state in states if state is not None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,9 +43,7 @@ class LineChange:
     @property
     def entry(self) -> BomEntry:
         """The component as it is now, or as it was last."""
-        found = self.new or self.old
-        assert found is not None  # one of the two is always there
-        return found
+        return _first(self.new, self.old)
 
     @property
     def kind(self) -> str:
@@ -62,9 +66,7 @@ class AssemblyChange:
     @property
     def head(self) -> BomEntry:
         """The assembly as it is now, or as it was last."""
-        found = self.new or self.old
-        assert found is not None  # one of the two is always there
-        return found.head
+        return _first(self.new, self.old).head
 
     @property
     def kind(self) -> str:
@@ -104,16 +106,12 @@ class ThreeLines:
     @property
     def entry(self) -> BomEntry:
         """The component, by the newest state that has it."""
-        found = self.mine or self.theirs or self.base
-        assert found is not None  # one of them is always there
-        return found
+        return _first(self.mine, self.theirs, self.base)
 
     @property
     def quantities(self) -> tuple[float, float, float]:
         """Of base, theirs and mine; 0 where there is no line."""
-        base, theirs, mine = (
-            entry.quantity if entry is not None else 0 for entry in (self.base, self.theirs, self.mine)
-        )
+        base, theirs, mine = (entry.quantity if entry else 0 for entry in (self.base, self.theirs, self.mine))
         return base, theirs, mine
 
     @property

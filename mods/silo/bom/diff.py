@@ -22,7 +22,7 @@ from typing import Any
 
 from silo.bom.findings import Finding, Place
 from silo.bom.model import BomChange, BomDiff, BomEntry, QuantityChange
-from silo.bom.numbers import exact_sum
+from silo.bom.numbers import exact_sum, plain
 
 # Two quantities closer than this, relatively, are one: lengths pass through databases as floats.
 RELATIVE_TOLERANCE = 1e-9
@@ -56,11 +56,6 @@ def same_quantity(a: object, b: object) -> bool:
     return math.isclose(x, y, rel_tol=RELATIVE_TOLERANCE, abs_tol=1e-12)
 
 
-def _whole(value: float | None) -> float | None:
-    # 12.0 is shown and sent as 12: a count reads as a count.
-    return int(value) if value is not None and value.is_integer() else value
-
-
 def _local(entry: Any) -> _Line | None:
     if isinstance(entry, Mapping):
         number = entry.get("child_part_number") or entry.get("part_number")
@@ -78,7 +73,7 @@ def _summed(lines: Iterable[_Line]) -> dict[str, float | None]:
             total[line.part_number] = float(both)
         else:
             total[line.part_number] = line.quantity
-    return {pn: _whole(q) for pn, q in total.items()}
+    return {number: plain(quantity) for number, quantity in total.items()}
 
 
 def local_quantities(entries: Iterable[BomEntry | Mapping[str, Any]]) -> dict[str, float | None]:
@@ -91,9 +86,12 @@ def is_manual(line: Mapping[str, Any]) -> bool:
 
     A source that we do not know is somebody's; only what assemblies wrote may be rewritten by one.
     """
-    if (line.get("rel_type") or "component") != "component":
-        return True
-    return (line.get("source") or "assembly") != "assembly"
+    return not is_component(line) or (line.get("source") or "assembly") != "assembly"
+
+
+def is_component(line: Mapping[str, Any]) -> bool:
+    """True for a line that counts parts; ``alternate`` and ``reference`` lines do not."""
+    return (line.get("rel_type") or "component") == "component"
 
 
 def diff_bom(
@@ -125,7 +123,7 @@ def diff_bom(
         line = _Line(remote["child_part_number"], as_number(remote.get("quantity")))
         if is_manual(remote):
             manual_lines.append(line)
-            if (remote.get("rel_type") or "component") == "component":
+            if is_component(remote):
                 manual_components.append(line)
         else:
             assembly_lines.append(line)

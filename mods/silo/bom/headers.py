@@ -180,6 +180,11 @@ def _others(role: Role) -> str:
     return ", ".join(name.strip() for name in _ALIASES[role].split(";")[1:5])
 
 
+def designators(cell: str) -> tuple[str, ...]:
+    """``R1, R2 R3`` as three reference designators."""
+    return tuple(cell.replace(",", " ").split())
+
+
 def safe_cell(value: Any) -> Any:
     """A cell for CSV: what would be run as a formula is made text; numbers stay numbers."""
     if isinstance(value, str) and value.lstrip("'").startswith(FORMULA_STARTS):

@@ -20,8 +20,9 @@ from dataclasses import dataclass
 from typing import Any
 from urllib.parse import quote
 
-from silo.bom.diff import Component, diff_bom, is_manual, local_quantities, same_quantity
+from silo.bom.diff import Component, diff_bom, is_component, is_manual, local_quantities, same_quantity
 from silo.bom.model import BomChange, BomDiff, BomEntry
+from silo.bom.numbers import plain
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ def _untold(
     untold = []
     for line in lines:
         number, told = line["child_part_number"], line.get("assembly_told")
-        if told is None or not is_manual(line) or (line.get("rel_type") or "component") != "component":
+        if told is None or not is_manual(line) or not is_component(line):
             continue
         # An override of a line that the assembly once owned is in conflict too when the assembly drops it.
         now = local.get(number, 0.0)
@@ -154,7 +155,7 @@ def answer_of(
     """The answer to a merge (spec §5); ``sync_id`` and ``left_out`` only where there are such."""
 
     def lines(changes: Iterable[BomChange]) -> list[dict[str, Any]]:
-        return [{"part_number": one.part_number, "quantity": _count(one.quantity)} for one in changes]
+        return [{"part_number": one.part_number, "quantity": plain(one.quantity)} for one in changes]
 
     unreferenced = [
         {
@@ -172,8 +173,8 @@ def answer_of(
             "quantity_changed": [
                 {
                     "part_number": change.part_number,
-                    "old_quantity": _count(change.remote_quantity),
-                    "new_quantity": _count(change.local_quantity),
+                    "old_quantity": plain(change.remote_quantity),
+                    "new_quantity": plain(change.local_quantity),
                 }
                 for change in diff.quantity_changed
             ],
@@ -189,7 +190,7 @@ def answer_of(
 
 def conflict_warning(part_number: str, assembly: float | None, server: float | None) -> dict[str, Any]:
     """The warning of a line that a person gave another quantity than the assembly has."""
-    cad, ours = _count(assembly), _count(server)
+    cad, ours = plain(assembly), plain(server)
     return {
         "type": "conflict",
         "part_number": part_number,
@@ -197,8 +198,3 @@ def conflict_warning(part_number: str, assembly: float | None, server: float | N
         "assembly_quantity": cad,
         "server_quantity": ours,
     }
-
-
-def _count(quantity: float | None) -> float | None:
-    """A count reads as a count: 12.0 is written as 12."""
-    return int(quantity) if quantity is not None and quantity == int(quantity) else quantity

@@ -203,11 +203,6 @@ class BomDiff:
         _freeze(self, *(f.name for f in fields(self)))
 
     @property
-    def changes_server(self) -> bool:
-        """True where a merge would write a line (unreferenced ones stay as they are)."""
-        return bool(self.added or self.quantity_changed)
-
-    @property
     def drifted(self) -> bool:
         """True where CAD and server differ in any way a check should report."""
         return bool(self.added or self.removed or self.quantity_changed or self.conflicts)

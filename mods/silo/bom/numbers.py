@@ -29,7 +29,7 @@ from decimal import Context, Decimal
 from enum import StrEnum
 from fractions import Fraction
 from math import isfinite
-from typing import NamedTuple
+from typing import NamedTuple, overload
 
 LONGEST = 40
 """[characters] no number that a person types is longer."""
@@ -207,10 +207,34 @@ def exact_product(values: Iterable[float | int | Decimal]) -> Decimal:
     return product
 
 
-def plain(value: float | int | Decimal) -> int | float:
-    """``value`` as JSON and people should see it: a count as a count (12, not 12.0)."""
-    exact = as_decimal(value)
-    return int(exact) if exact == exact.to_integral_value() and abs(exact) < 10**16 else float(exact)
+@overload
+def plain(value: None) -> None: ...
+@overload
+def plain(value: float | Decimal) -> int | float: ...
+def plain(value: float | Decimal | None) -> int | float | None:
+    """``value`` as JSON and people should see it: a count as a count (12, not 12.0); None stays None."""
+    if isinstance(value, float):
+        return int(value) if value.is_integer() and abs(value) < 1e16 else value
+    if isinstance(value, Decimal):
+        return int(value) if value == value.to_integral_value() and abs(value) < 10**16 else float(value)
+    return value
+
+
+def whole_number(text: str, digits: int = 15) -> int | None:
+    """The whole number that a program wrote: so many ASCII digits at most; None for anything else.
+
+    For headers, form fields and addresses. ``str.isdigit`` alone is also true for "²", which ``int`` refuses.
+    """
+    return int(text) if text.isascii() and text.isdigit() and len(text) <= digits else None
+
+
+_YES, _NO = ("1", "true", "yes", "on"), ("0", "false", "no", "off")
+
+
+def yes_or_no(text: str) -> bool | None:
+    """What a setting says: ``1``, ``true``, ``yes``, ``on`` or their opposites; None for anything else."""
+    word = text.strip().lower()
+    return True if word in _YES else False if word in _NO else None
 
 
 class _Split(NamedTuple):

@@ -111,28 +111,23 @@ def _parents() -> dict[str, list[str]]:
     return parents
 
 
-_PARENTS = _parents()
+PARENTS = _parents()
 
 
 def is_listed(type_name: str) -> bool:
     """True for a type of the table, and for the Python form of one."""
-    return type_name in _PARENTS or type_name.removesuffix("Python") in _PARENTS
-
-
-def listed_types() -> tuple[str, ...]:
-    """All types of the table."""
-    return tuple(_PARENTS)
+    return type_name in PARENTS or type_name.removesuffix("Python") in PARENTS
 
 
 @lru_cache(maxsize=4096)
 def ancestors(type_name: str) -> frozenset[str]:
     """The type itself and all that it is derived from; unknown types are plain document objects."""
     found = {type_name, _ROOT}
-    parents = _PARENTS.get(type_name)
+    parents = PARENTS.get(type_name)
     if parents is None:
         base = type_name.removesuffix("Python")
         later = _LATER.get(type_name.partition("::")[0])
-        parents = [base] if base in _PARENTS else [later] if later else []
+        parents = [base] if base in PARENTS else [later] if later else []
     for parent in parents:
         found |= ancestors(parent)
     return frozenset(found)

@@ -13,6 +13,7 @@ from starlette.responses import Response
 
 from silo.api.wire import MergeResult
 from silo.bom.errors import CycleError, RejectedError
+from silo.bom.numbers import plain
 from silo_server.db.engine import Tx
 from silo_server.routes import document
 from silo_server.routes.context import (
@@ -20,6 +21,7 @@ from silo_server.routes.context import (
     WRITE_ERRORS,
     Editor,
     ExpectedVersion,
+    Server,
     ServerDep,
     Viewer,
     etag_of,
@@ -51,7 +53,7 @@ from silo_server.services.bom.merge import MergeOutcome, merge_bom, preview_merg
 from silo_server.services.bom.merge_json import MergeOrder, read_merge_order
 from silo_server.services.bom.review import told_quantities
 from silo_server.services.items import get_by_numbers, get_item
-from silo_server.values import Actor, Item, LineState, number, to_wire
+from silo_server.values import Actor, Item, LineState, to_wire
 
 router = APIRouter(prefix="/api/items/{part_number}/bom", tags=["bom"])
 several = APIRouter(prefix="/api", tags=["bom"])
@@ -97,7 +99,7 @@ def _lines_of(tx: Tx, parents: Sequence[Item]) -> dict[int, list[dict[str, Any]]
             {
                 **line_to_wire(line, parent.part_number),
                 "assembly_told": line.child_id in told.get(parent.id, {}),
-                "assembly_quantity": number(told.get(parent.id, {}).get(line.child_id)),
+                "assembly_quantity": plain(told.get(parent.id, {}).get(line.child_id)),
                 "components": last.get(parent.id, NEVER).components.get(line.child_id, []),
             }
             for line in lines.get(parent.id, [])
@@ -131,9 +133,7 @@ def change_line(
 
     Another quantity on an assembly line makes it a manual override.
     """
-    with server.db.write(caller) as tx:
-        edited = edits.change_line(tx, part_number, child, line_changes(body), expected)
-        return _edited(edited, 200)
+    return _change(server, caller, part_number, child, body, expected)
 
 
 @router.delete("/{child}", status_code=204, responses=WRITE_ERRORS)
@@ -141,9 +141,7 @@ def remove_line(
     server: ServerDep, caller: Editor, part_number: str, child: str, expected: ExpectedVersion
 ) -> Response:
     """Remove the one line of a child; 409 where it has several."""
-    with server.db.write(caller) as tx:
-        edited = edits.remove_line(tx, part_number, child, expected)
-    return Response(status_code=204, headers={"ETag": etag_of(edited.version)})
+    return _remove(server, caller, part_number, child, expected)
 
 
 @router.put("/lines/{line_id}", response_model=LineOut, responses=WRITE_ERRORS)
@@ -156,9 +154,7 @@ def change_line_by_id(
     expected: ExpectedVersion,
 ) -> Response:
     """Change the line with this id; for a child that has several lines (a component and an alternate)."""
-    with server.db.write(caller) as tx:
-        edited = edits.change_line(tx, part_number, LineId(line_id), line_changes(body), expected)
-        return _edited(edited, 200)
+    return _change(server, caller, part_number, LineId(line_id), body, expected)
 
 
 @router.delete("/lines/{line_id}", status_code=204, responses=WRITE_ERRORS)
@@ -166,9 +162,7 @@ def remove_line_by_id(
     server: ServerDep, caller: Editor, part_number: str, line_id: str, expected: ExpectedVersion
 ) -> Response:
     """Remove the line with this id."""
-    with server.db.write(caller) as tx:
-        edited = edits.remove_line(tx, part_number, LineId(line_id), expected)
-    return Response(status_code=204, headers={"ETag": etag_of(edited.version)})
+    return _remove(server, caller, part_number, LineId(line_id), expected)
 
 
 @router.post("/merge", response_model=MergeResult, responses=WRITE_ERRORS, openapi_extra=MERGE_BODY)
@@ -217,7 +211,7 @@ def get_flat(server: ServerDep, caller: Viewer, part_number: str) -> dict[str, A
                 "name": row.line.child_name,
                 "description": row.line.child_description,
                 "item_type": row.line.child_item_type,
-                "total_quantity": number(row.total),
+                "total_quantity": plain(row.total),
                 "unit": row.unit,
             }
             for row in tree.flatten(graph)
@@ -242,7 +236,7 @@ def get_cost(server: ServerDep, caller: Viewer, part_number: str) -> dict[str, A
             {
                 "part_number": row.part_number,
                 "name": row.name,
-                "total_quantity": number(row.quantity),
+                "total_quantity": plain(row.quantity),
                 "unit": row.unit,
                 "standard_cost": row.unit_cost,
                 "currency": row.currency,
@@ -269,7 +263,7 @@ def get_mass(server: ServerDep, caller: Viewer, part_number: str) -> dict[str, A
             {
                 "part_number": row.part_number,
                 "name": row.name,
-                "total_quantity": number(row.quantity),
+                "total_quantity": plain(row.quantity),
                 "mass_kg": row.unit_mass,
                 "total_mass_kg": row.total,
                 "is_assembly": row.is_assembly,
@@ -300,7 +294,7 @@ def get_where_used(
             "parent_description": usage.parent.description,
             "parent_archived": usage.parent.archived_at is not None,
             **to_wire(usage, "parent"),
-            "quantity": number(usage.quantity),
+            "quantity": plain(usage.quantity),
         }
         for usage in found
     ]
@@ -331,6 +325,26 @@ def _merge(
         with server.db.write(caller) as tx:
             remember_refusal(tx, get_item(tx, part_number, lock=True), str(error)[:4096])
         raise
+
+
+def _change(
+    server: Server,
+    caller: Actor,
+    part_number: str,
+    which: str | LineId,
+    body: LineChangeBody,
+    expected: int | None,
+) -> Response:
+    with server.db.write(caller) as tx:
+        return _edited(edits.change_line(tx, part_number, which, line_changes(body), expected), 200)
+
+
+def _remove(
+    server: Server, caller: Actor, part_number: str, which: str | LineId, expected: int | None
+) -> Response:
+    with server.db.write(caller) as tx:
+        edited = edits.remove_line(tx, part_number, which, expected)
+    return Response(status_code=204, headers={"ETag": etag_of(edited.version)})
 
 
 def _edited(edited: edits.Edited, status: int) -> Response:
@@ -366,7 +380,7 @@ def render_expanded(rows: Sequence[tree.Occurrence]) -> bytes:
             revisions = _members(revisions_to_wire(line))
         parts.append(
             b'{"id":"%b","parent_part_number":%b,%b,%b,%b,"depth":%d,"total_quantity":%b}'
-            % (line.id.encode(), above, child, state, revisions, depth, repr(number(total)).encode())
+            % (line.id.encode(), above, child, state, revisions, depth, repr(plain(total)).encode())
         )
     return b"[" + b",".join(parts) + b"]"
 

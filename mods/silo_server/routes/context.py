@@ -17,6 +17,7 @@ from starlette.responses import Response
 
 from silo.api.wire import ErrorBody
 from silo.bom.errors import AuthError, ForbiddenError, RejectedError
+from silo.bom.numbers import whole_number
 from silo_server.background import Probe
 from silo_server.db.engine import Database
 from silo_server.events.hub import Hub
@@ -194,8 +195,8 @@ def expected_version(request: Request) -> int | None:
     header = request.headers.get("if-match", "").strip()
     if header in ("", "*"):
         return None
-    text = header.removeprefix("W/").strip('"').removeprefix("v")
-    return int(text) if text.isascii() and text.isdigit() and len(text) < 10 else -1
+    version = whole_number(header.removeprefix("W/").strip('"').removeprefix("v"), 9)
+    return -1 if version is None else version
 
 
 ExpectedVersion = Annotated[int | None, Depends(expected_version)]

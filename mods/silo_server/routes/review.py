@@ -11,6 +11,7 @@ from pydantic import Field, WithJsonSchema
 from starlette.responses import Response
 
 from silo.bom.errors import RejectedError
+from silo.bom.numbers import plain, whole_number
 from silo_server.clock import stamp, wire
 from silo_server.db.engine import Tx
 from silo_server.routes import document, models
@@ -30,7 +31,7 @@ from silo_server.services.bom import history
 from silo_server.services.bom import review as service
 from silo_server.services.bom.lines import line_state_to_wire, line_to_wire, state_to_json
 from silo_server.services.items import get_item
-from silo_server.values import Item, LineState, number, to_wire
+from silo_server.values import Item, LineState, to_wire
 
 router = APIRouter(prefix="/api/items/{part_number}/bom", tags=["bom review"])
 
@@ -82,8 +83,8 @@ def get_review(server: ServerDep, caller: Viewer, part_number: str) -> Response:
             {
                 "child_part_number": conflict.line.child_part_number,
                 "child_name": conflict.line.child_name,
-                "assembly_quantity": number(conflict.cad_quantity),
-                "server_quantity": number(conflict.line.state.quantity),
+                "assembly_quantity": plain(conflict.cad_quantity),
+                "server_quantity": plain(conflict.line.state.quantity),
                 "since": wire(conflict.since),
                 "override": conflict.line.state.override,
             }
@@ -220,8 +221,8 @@ def undo(
 
 def find_point(tx: Tx, item: Item, text: str) -> int:
     """The change that a point of time means; RejectedError where it is none."""
-    if text.isascii() and text.isdigit() and len(text) <= 18:
-        return int(text)
+    if (change_id := whole_number(text, 18)) is not None:
+        return change_id
     if text == "now":
         return history.change_at(tx, item, "9999")
     try:

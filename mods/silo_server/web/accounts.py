@@ -30,7 +30,7 @@ from silo_server.web.forms import (
     text,
 )
 from silo_server.web.login_page import Administrator, Reader
-from silo_server.web.render import page
+from silo_server.web.render import page, sentence
 from silo_server.web.tables import part_of
 
 router = APIRouter(include_in_schema=False)
@@ -159,7 +159,7 @@ def _show(
         run=run,
         fixed=server.settings.read_only,
         roles=list(Role),
-        problem=problem[:1].upper() + problem[1:],
+        problem=sentence(problem),
         link=link,
         typed=typed or {},
         minutes=int(server.settings.login_link_seconds // 60),
@@ -260,7 +260,7 @@ def _own_page(
         key=secrets.token_hex(16),
         scopes=[scope for scope in Scope if caller.role.covers(scope.role)],
         asks_password=not caller.by_link,
-        problem=problem[:1].upper() + problem[1:],
+        problem=sentence(problem),
         fresh=fresh,
         shortest=accounts.MIN_PASSWORD,
     )

@@ -18,7 +18,7 @@ from starlette.datastructures import FormData
 from starlette.responses import RedirectResponse, Response
 
 from silo.bom.errors import RejectedError
-from silo.bom.numbers import parse_number, plain, read_quantity
+from silo.bom.numbers import parse_number, plain, read_quantity, whole_number
 from silo_server.routes.context import form_of, server_of
 from silo_server.services.access.accounts import MAX_PASSWORD
 from silo_server.web.render import NOTICE_COOKIE
@@ -43,7 +43,7 @@ Form = Annotated[FormData, Depends(_form)]
 
 
 def text(form: FormData, name: str, most: int = 500) -> str:
-    """A text field, trimmed; "" where it is absent or a file. RejectedError where it is longer."""
+    """A text field, trimmed; "" where it is absent or a file. RejectedError above ``most``."""
     value = form.get(name)
     if not isinstance(value, str):
         return ""
@@ -66,8 +66,7 @@ def password_of(form: FormData, name: str) -> str:
 
 def whole(form: FormData, name: str) -> int | None:
     """A whole number, None where there is none."""
-    value = text(form, name)
-    return int(value) if value.isascii() and value.isdigit() and len(value) < 16 else None
+    return whole_number(text(form, name))
 
 
 # Forms with one of these fields are not kept: a password goes nowhere but where it was typed for.

@@ -30,7 +30,7 @@ from silo_server.values import Actor
 from silo_server.web.forms import Form, back, text, whole
 from silo_server.web.login_page import Writer
 from silo_server.web.merge_page import bom_path
-from silo_server.web.render import isolate, page
+from silo_server.web.render import isolate, page, sentence
 from silo_server.web.words import changes
 
 router = APIRouter(include_in_schema=False)
@@ -100,8 +100,7 @@ class Problem:
 
     @classmethod
     def of(cls, error: SiloError) -> Problem:
-        words = str(error).removeprefix("file: ")
-        return cls(words[:1].upper() + words[1:] + ("" if words.endswith(".") else "."), error.status_hint)
+        return cls(sentence(str(error).removeprefix("file: ")), error.status_hint)
 
 
 def layout_of(form: FormData) -> Layout | None:

@@ -282,8 +282,7 @@ def _same(name: str, a: str, b: str) -> bool:
 
 
 def _text(form: FormData, key: str) -> str:
-    most = SHORT if key == "name" else LONGEST
-    return text(form, key, most).replace("\r\n", "\n")
+    return text(form, key, SHORT if key == "name" else LONGEST)
 
 
 def _is_plain(value: Any) -> bool:

@@ -7,6 +7,7 @@ written, whatever happened to the line since, and only a field that two people c
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -15,6 +16,7 @@ from starlette.datastructures import FormData
 
 from silo.bom.diff import same_quantity
 from silo.bom.errors import RejectedError
+from silo.bom.headers import designators
 from silo.bom.numbers import read_quantity
 from silo_server.db.engine import Tx
 from silo_server.services.bom import history
@@ -22,7 +24,7 @@ from silo_server.services.bom.changes import ChangeKind
 from silo_server.services.bom.history import Change, ChangedLine
 from silo_server.services.bom.review import Action, Decision, Review, told_quantities
 from silo_server.values import Item, Line, LineState
-from silo_server.web.forms import Edit, amount, compared, same_text, text, texts
+from silo_server.web.forms import Edit, amount, compared, same_text, text, texts, whole
 from silo_server.web.render import quantity
 from silo_server.web.words import FIELDS, by_whom, changes
 
@@ -78,14 +80,13 @@ def read(form: FormData) -> LineForm:
     typed = {name: _text(form, name) for name in FIELDS if name in form}
     if readings := _text(form, "quantity_is"):
         typed["quantity"] = readings  # the answer to "which of the two numbers?"
-    at = _text(form, "at")
     return LineForm(
         typed,
         {name: _text(form, f"was_{name}") for name in FIELDS if f"was_{name}" in form},
         {name: _text(form, f"pick_{name}") for name in FIELDS if f"pick_{name}" in form},
         [name for name in _text(form, "asked").split() if name in FIELDS],
         text(form, "why"),
-        int(at) if at.isascii() and at.isdigit() and len(at) < 16 else 0,
+        whole(form, "at") or 0,
     )
 
 
@@ -137,7 +138,7 @@ def values_of(texts: Mapping[str, str]) -> dict[str, Any]:
         if name == "quantity":
             values[name] = amount(written, FIELDS[name])
         elif name == "reference_designators":
-            values[name] = tuple(written.replace(",", " ").split())
+            values[name] = designators(written)
         else:
             values[name] = written or None
     return values
@@ -232,10 +233,10 @@ def _same(name: str, a: str, b: str) -> bool:
         one, other = read_quantity(a).value, read_quantity(b).value
         return one is not None and other is not None and same_quantity(one, other)
     if name == "reference_designators":
-        return a.replace(",", " ").split() == b.replace(",", " ").split()
+        return designators(a) == designators(b)
     return same_text(a, b, lines=name == "notes")
 
 
 def _text(form: FormData, name: str) -> str:
-    value = form.get(name)
-    return value.replace("\x00", "").replace("\r\n", "\n").strip() if isinstance(value, str) else ""
+    """A field of any length: :func:`values_of` refuses a long one by the name that the page shows."""
+    return text(form, name, sys.maxsize)

@@ -15,6 +15,7 @@ from starlette.datastructures import FormData
 from starlette.responses import Response
 
 from silo.bom.errors import ConflictError, NotFoundError, RejectedError, SiloError
+from silo.bom.numbers import whole_number
 from silo_server.db.engine import Tx
 from silo_server.errors import DuplicateError, LinesChangedError
 from silo_server.routes.context import Server, ServerDep
@@ -25,12 +26,12 @@ from silo_server.services.bom.last_sync import in_sentences, last_sync
 from silo_server.services.bom.lines import LineId, component_of, line_of, lines_of, mark_of
 from silo_server.services.bom.review import Decision
 from silo_server.services.items import get_item
-from silo_server.values import Actor, Item, Line, LineState
+from silo_server.values import Actor, Line, LineState
 from silo_server.web import line_form
 from silo_server.web.forms import AmbiguousError, Form, back, text, texts, whole
 from silo_server.web.line_form import LineForm
 from silo_server.web.login_page import Reader, Writer
-from silo_server.web.render import isolate, page, plural, segment
+from silo_server.web.render import isolate, page, plural, segment, sentence
 from silo_server.web.tables import Address, Page, arranged, fits, page_of
 from silo_server.web.words import FIELDS, by_whom, sentences
 
@@ -170,16 +171,11 @@ def change_line(
     request: Request, server: ServerDep, caller: Writer, part_number: str, line_id: str, form: Form
 ) -> Response:
     """Change what the person changed in the form of a line; what two people changed is asked about."""
-    sent = line_form.read(form)
-    asked = Asked(edit=line_id, typed=sent.typed, seen=sent.seen, why=sent.why)
 
-    def work(tx: Tx) -> tuple[str, int]:
-        parent = get_item(tx, part_number, lock=True)
-        line = _line_to_change(tx, parent, line_id, sent, asked, text(form, "child"))
+    def change(tx: Tx, line: Line, sent: LineForm, asked: Asked, told: list[str]) -> tuple[str, int]:
         if clashes := line_form.unmade(sent):
             raise Refused(replace(asked, problem="Choose yours or theirs, then save.", clashes=clashes), 400)
         edit = line_form.edit_of(sent, line.state)
-        told = line_form.meanwhile(tx, parent, [line.id], sent.at).get(line.id, [])
         if edit.clashes:
             problem = (
                 f"Nothing was saved yet: somebody else changed {line.child_part_number} while you edited it. "
@@ -193,7 +189,7 @@ def change_line(
             return f"Nothing was different, so nothing was changed.{also}", 0
         return f"{isolate(edited.child_part_number)} changed.{also}", edited.change_id
 
-    return _do(request, server, caller, part_number, form, work, asked)
+    return _do_line(request, server, caller, part_number, line_id, form, change)
 
 
 @router.post("/items/{part_number}/bom/lines/{line_id}/remove")
@@ -201,34 +197,49 @@ def remove_line(
     request: Request, server: ServerDep, caller: Writer, part_number: str, line_id: str, form: Form
 ) -> Response:
     """Take a line out of the BOM, if it is as the person saw it."""
+
+    def remove(tx: Tx, line: Line, sent: LineForm, asked: Asked, told: list[str]) -> tuple[str, int]:
+        seen, why = text(form, "mark") or None, sent.why or None
+        try:
+            edited = edits.remove_line(tx, part_number, LineId(line.id), seen=seen, why=why)
+        except LinesChangedError:
+            problem = f"Nothing was removed: {line.child_part_number} was changed by somebody else meanwhile."
+            raise Refused(replace(asked, problem=problem, story=told), 412) from None
+        return f"{isolate(edited.child_part_number)} removed.", edited.change_id
+
+    return _do_line(request, server, caller, part_number, line_id, form, remove)
+
+
+def _do_line(
+    request: Request,
+    server: Server,
+    caller: Actor,
+    part_number: str,
+    line_id: str,
+    form: FormData,
+    act: Callable[[Tx, Line, LineForm, Asked, list[str]], tuple[str, int]],
+) -> Response:
+    """Do ``act`` to the line of a form. Where it is gone, what was typed stays in the form for a new one.
+
+    act
+        gets the line as it is now, the form, how the page shows it again, and what happened to the line
+        meanwhile.
+    """
     sent = line_form.read(form)
     asked = Asked(edit=line_id, typed=sent.typed, seen=sent.seen, why=sent.why)
 
     def work(tx: Tx) -> tuple[str, int]:
         parent = get_item(tx, part_number, lock=True)
-        line = _line_to_change(tx, parent, line_id, sent, asked, text(form, "child"))
+        told = line_form.meanwhile(tx, parent, [line_id], sent.at).get(line_id, [])
         try:
-            edited = edits.remove_line(
-                tx, part_number, LineId(line.id), seen=text(form, "mark") or None, why=sent.why or None
-            )
-        except LinesChangedError:
-            story = line_form.meanwhile(tx, parent, [line.id], sent.at).get(line.id, [])
-            problem = f"Nothing was removed: {line.child_part_number} was changed by somebody else meanwhile."
-            raise Refused(replace(asked, problem=problem, story=story), 412) from None
-        return f"{isolate(edited.child_part_number)} removed.", edited.change_id
+            line = line_of(lines_of(tx, parent), LineId(line_id), parent)
+        except NotFoundError:
+            problem = "This line is no longer in the BOM. What you typed stands below, as a line to be added."
+            typed = {**sent.typed, "child": text(form, "child")}
+            raise Refused(replace(asked, problem=problem, story=told, edit="", typed=typed), 404) from None
+        return act(tx, line, sent, asked, told)
 
     return _do(request, server, caller, part_number, form, work, asked)
-
-
-def _line_to_change(tx: Tx, parent: Item, line_id: str, sent: LineForm, asked: Asked, child: str) -> Line:
-    """The line of a form; where it is gone, what was typed stays, in the form for a new one."""
-    try:
-        return line_of(lines_of(tx, parent), LineId(line_id), parent)
-    except NotFoundError:
-        story = line_form.meanwhile(tx, parent, [line_id], sent.at).get(line_id, [])
-        problem = "This line is no longer in the BOM. What you typed stands below, as a line to be added."
-        typed = {**sent.typed, "child": child}
-        raise Refused(replace(asked, problem=problem, story=story, edit="", typed=typed), 404) from None
 
 
 def view_of(query: str) -> str:
@@ -349,8 +360,7 @@ def table_of(lines: Sequence[Line], path: str, view: str) -> tuple[Page[Line], A
         if (shown is None or shown[1](line))
         and test(line.child_part_number, line.child_name, *_remarks(line.state))
     ]
-    number = asked.pop("page", "")[:7]
-    wanted = int(number) if number.isascii() and number.isdigit() else 1
+    wanted = whole_number(asked.pop("page", "")) or 1
     table = page_of(arranged(found, asked.get("sort", ""), _SORTS), len(lines), wanted)
     return table, Address(path, asked | ({"page": str(table.number)} if table.number > 1 else {}))
 
@@ -375,4 +385,4 @@ def _sentence(error: SiloError) -> str:
     message = "; ".join(
         problem.partition(": ")[2] if problem.startswith("decisions[") else problem for problem in problems
     ) or str(error)
-    return message[:1].upper() + message[1:] + "."
+    return sentence(message)

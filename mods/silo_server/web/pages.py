@@ -34,7 +34,7 @@ from silo_server.web import (
     waiting_page,
 )
 from silo_server.web.login_page import LoginNeededError, OldFormError, send_again, to_login
-from silo_server.web.render import page
+from silo_server.web.render import page, sentence
 
 ROUTERS = (
     login_page.router,
@@ -140,7 +140,7 @@ def _page_above(request: Request) -> str:
 def _sentence(status: int, message: str, request: Request) -> str:
     if message.startswith(("Not Found:", "Method Not Allowed:")):
         return f"There is no page {request.url.path}."
-    return message[:1].upper() + message[1:] + ("" if message.endswith((".", "?", "!")) else ".")
+    return sentence(message)
 
 
 def _actor(request: Request) -> Actor | None:

@@ -15,7 +15,7 @@ from markupsafe import Markup, escape
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.responses import HTMLResponse, Response
 
-from silo.bom.numbers import as_decimal
+from silo.bom.numbers import as_decimal, whole_number
 from silo_server.clock import wire
 from silo_server.db.engine import mode_of
 from silo_server.routes.context import masked, server_of
@@ -130,6 +130,11 @@ def _rounded(value: Decimal) -> Decimal:
     return short.quantize(Decimal(1)) if short == short.to_integral_value() else short
 
 
+def sentence(text: str) -> str:
+    """A message as a sentence: a capital first, and a full stop where it has no end."""
+    return f"{text[:1].upper()}{text[1:]}{'' if not text or text.endswith(('.', '?', '!')) else '.'}"
+
+
 def segment(text: str) -> str:
     """A part number as one segment of a path."""
     return quote(text, safe="")
@@ -185,7 +190,7 @@ def page(
         csrf=masked(actor.csrf_token) if actor is not None and actor.csrf_token else "",
         here=request.url.path,
         notice=notice,
-        undo=int(undo) if undo.isascii() and undo.isdigit() and len(undo) < 16 else 0,
+        undo=whole_number(undo) or 0,
         **values,
     )
     # The one place that puts links below the sub-path. What people typed has no bare quote, so is no link.

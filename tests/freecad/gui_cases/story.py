@@ -117,6 +117,10 @@ def story() -> None:
     preview(one, docs["top"])
 
 
+def _is_synced(diff: Any) -> bool:
+    return not diff.added and not diff.quantity_changed
+
+
 def preview(one: Any, top: Any) -> None:
     """6. The preview: what differs, then Sync."""
     top.getObject("Gearbox2").ElementCount = 3
@@ -126,7 +130,7 @@ def preview(one: Any, top: Any) -> None:
     wait(lambda: window._preview is not None)
     tell(preview=rows(window.table), preview_text=labels(window), can_sync=window.sync_button.isEnabled())
     window.sync_button.click()
-    wait(lambda: settled() and window._preview is not None and not window._preview.top.diff.changes_server)
+    wait(lambda: settled() and window._preview is not None and _is_synced(window._preview.top.diff))
     tell(preview_after=rows(window.table))
     item = window.table.topLevelItem(0)
     window.table.setCurrentItem(item)

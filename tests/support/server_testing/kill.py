@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from server_testing.caller import Api, bom, merge_body
-from server_testing.process import ForkedServer
+from server_testing.process import ServerProcess
 
 TOKEN = "silo_kill"
 LINES = 300
@@ -56,7 +56,7 @@ class Moments:
         self._commit *= 0.93 if done else 1.07
 
 
-def killed(server: ForkedServer, token: str, work: Callable[[Api], object], after: float) -> bool:
+def killed(server: ServerProcess, token: str, work: Callable[[Api], object], after: float) -> bool:
     """Kill the server so many seconds after ``work`` begins; True where its answer had come."""
     came = threading.Event()
 
@@ -75,7 +75,7 @@ def killed(server: ForkedServer, token: str, work: Callable[[Api], object], afte
 
 def kill_rounds(database_url: str, files_dir: Path, kills: int, seed: int) -> KillReport:
     """Do ``kills`` rounds; AssertionError where a BOM is between, or a retry's answer wrong."""
-    server = ForkedServer(database_url, files_dir, TOKEN)
+    server = ServerProcess.forked(database_url, files_dir, TOKEN)
     with Api(server.base_url, TOKEN) as api:
         children = api.items(LINES)
         parent = api.item("KILL-ASM")
@@ -92,7 +92,7 @@ def kill_rounds(database_url: str, files_dir: Path, kills: int, seed: int) -> Ki
         came = killed(
             server, TOKEN, lambda api, sent=body: api.good("POST", bom(parent, "merge"), sent), moments.next()
         )
-        server = ForkedServer(database_url, files_dir, TOKEN)
+        server = ServerProcess.forked(database_url, files_dir, TOKEN)
         with Api(server.base_url, TOKEN) as api:
             found = api.quantities(parent)
             assert found in (before, after), f"round {number}: the BOM is between old and new"

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import cache
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerContext
@@ -28,19 +29,49 @@ class ServerProcess:
     def __init__(
         self, database_url: str, files_dir: Path, token: str, *, workers: int = 1, **settings: str
     ) -> None:
-        environ = {**os.environ, "SILO_API_TOKEN": token, "SILO_STORAGE_ROOT_DIR": str(files_dir), **settings}
         command = [sys.executable, "-P", "-m", "silo_server", "--port", "0", "--database", database_url]
-        self._process = subprocess.Popen(
-            [*command, "--workers", str(workers)], env=environ, stdout=subprocess.PIPE, text=True
+        process = subprocess.Popen(
+            [*command, "--workers", str(workers)],
+            env={**os.environ, **_environ(files_dir, token, settings)},
+            stdout=subprocess.PIPE,
+            text=True,
         )
-        assert self._process.stdout is not None
-        first = self._process.stdout.readline()
+        assert process.stdout is not None
+        first = process.stdout.readline()
         assert first.startswith("Silo server: "), f"the server did not start: {first!r}"
+        self._process: subprocess.Popen[str] | BaseProcess = process
         self.base_url = first.removeprefix("Silo server: ").strip()
+
+    @classmethod
+    def forked(
+        cls, database_url: str, files_dir: Path, token: str, *, user_id: int | None = None, **settings: str
+    ) -> Self:
+        """One that starts in a tenth of the time, for tests that kill hundreds.
+
+        It is forked from a process that has loaded the server and done nothing else. ``user_id``: serve as
+        this user of the machine (needs root).
+        """
+        self = cls.__new__(cls)
+        ours, theirs = _loaded().Pipe()
+        self._process = forked(_serve, database_url, _environ(files_dir, token, settings), user_id, theirs)
+        theirs.close()
+        try:
+            assert ours.poll(TIMEOUT), "the server did not start in time"
+            said = ours.recv()
+        except EOFError:
+            said = "the server ended before it answered"
+        finally:
+            ours.close()
+        if not said.startswith("http"):
+            self._end()
+            raise AssertionError(f"the server did not start: {said}")
+        self.base_url = said
+        return self
 
     @property
     def pid(self) -> int:
         """Its process id."""
+        assert self._process.pid is not None
         return self._process.pid
 
     def __enter__(self) -> Self:
@@ -56,64 +87,23 @@ class ServerProcess:
 
     def stop(self, by: signal.Signals = signal.SIGTERM) -> int:
         """Ask it to end (SIGINT is Ctrl-C), and wait; its exit code."""
-        if self._process.poll() is None:
-            self._process.send_signal(by)
+        with suppress(ProcessLookupError):
+            os.kill(self.pid, by)
         return self._end()
 
     def _end(self) -> int:
+        if isinstance(self._process, BaseProcess):
+            self._process.join(TIMEOUT)
+            assert self._process.exitcode is not None, "the server does not end"
+            return self._process.exitcode
         code = self._process.wait(TIMEOUT)
         assert self._process.stdout is not None
         self._process.stdout.close()
         return code
 
 
-class ForkedServer:
-    """A server like :class:`ServerProcess` that starts in a tenth of its time, for those who kill hundreds.
-
-    It is forked from a process that has loaded the server and done nothing else, and is killed by the same
-    SIGKILL. ``user_id``: serve as this user of the machine (needs root).
-    """
-
-    def __init__(
-        self, database_url: str, files_dir: Path, token: str, *, user_id: int | None = None, **settings: str
-    ) -> None:
-        environ = {"SILO_API_TOKEN": token, "SILO_STORAGE_ROOT_DIR": str(files_dir), **settings}
-        ours, theirs = _loaded().Pipe()
-        self._process = forked(_serve, database_url, environ, user_id, theirs)
-        theirs.close()
-        try:
-            assert ours.poll(TIMEOUT), "the server did not start in time"
-            said = ours.recv()
-        except EOFError:
-            said = "the server ended before it answered"
-        finally:
-            ours.close()
-        if not said.startswith("http"):
-            self._end()
-            raise AssertionError(f"the server did not start: {said}")
-        self.base_url: str = said
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.stop()
-
-    def kill(self) -> None:
-        """``kill -9``, and wait until it is gone."""
-        self._process.kill()
-        self._end()
-
-    def stop(self) -> int | None:
-        """Ask it to end, and wait; its exit code."""
-        self._process.terminate()
-        return self._end()
-
-    def _end(self) -> int | None:
-        self._process.join(TIMEOUT)
-        code = self._process.exitcode
-        assert code is not None, "the server does not end"
-        return code
+def _environ(files_dir: Path, token: str, settings: dict[str, str]) -> dict[str, str]:
+    return {"SILO_API_TOKEN": token, "SILO_STORAGE_ROOT_DIR": str(files_dir), **settings}
 
 
 def forked(work: Callable[..., None], *args: Any) -> BaseProcess:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -170,8 +171,16 @@ def test_the_configuration_file_comes_last() -> None:
 
 def test_a_certificate_setting_nobody_understands_is_reported() -> None:
     """Neither yes nor no must not mean "do not check"."""
-    with pytest.raises(ConfigError, match="SILO_SSL_VERIFY: wanted true or false, got 'maybe'"):
+    with pytest.raises(ConfigError, match=r"SILO_SSL_VERIFY: wanted true, false or .*; maybe is no file"):
         choose_server(Known(HOME), EMPTY, {"SILO_SSL_VERIFY": "maybe"})
+
+
+def test_the_variable_may_name_a_file_with_authorities(tmp_path: Path) -> None:
+    """As on the command line."""
+    authorities = tmp_path / "ca.pem"
+    authorities.write_text("")
+    chosen = choose_server(Known(HOME), EMPTY, {"SILO_SSL_VERIFY": str(authorities)})
+    assert chosen.verify == str(authorities)
 
 
 def test_a_token_is_never_shown() -> None:

@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any, Protocol
 
-from silo.bom.errors import ConfigError
 from silo.workbench.settings.preferences import Preferences
 
 
@@ -102,14 +101,10 @@ def _choose_url(known: Known, env: Mapping[str, str], file_server: Any) -> tuple
 
 
 def _verify_from(env: Mapping[str, str], otherwise: bool | str) -> bool | str:
-    word = env.get("SILO_SSL_VERIFY", "").strip().lower()
-    if not word:
-        return otherwise
-    if word in ("1", "true", "yes", "on"):
-        return True
-    if word in ("0", "false", "no", "off"):
-        return False
-    raise ConfigError(f"SILO_SSL_VERIFY: wanted true or false, got {word!r}")
+    from silo.api.config import VERIFY, verify_of  # not before FreeCAD's window stands
+
+    text = env.get(VERIFY, "").strip()
+    return verify_of(VERIFY, text) if text else otherwise
 
 
 def _choose_token(

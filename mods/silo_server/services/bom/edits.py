@@ -9,6 +9,7 @@ from typing import Any
 
 from silo.bom.diff import same_quantity
 from silo.bom.errors import RejectedError
+from silo.bom.numbers import plain
 from silo_server.db.engine import Tx
 from silo_server.errors import DuplicateError, LinesChangedError
 from silo_server.json_values import json_problem
@@ -24,7 +25,7 @@ from silo_server.services.bom.changes import (
 from silo_server.services.bom.lines import LineId, line_of, lines_of, mark_of
 from silo_server.services.bom.merge_json import quantity_problem
 from silo_server.services.items import get_item
-from silo_server.values import Item, Line, LineState, number
+from silo_server.values import Item, Line, LineState
 
 REL_TYPES = ("component", "alternate", "reference")
 SOURCES = ("manual", "assembly")
@@ -61,7 +62,7 @@ def add_line(
             )
     check_no_cycle(tx, parent, [child.id])
     change = LineChange(new_line_id(), child.id, None, state)
-    text = f"{child.part_number} added, quantity {number(state.quantity)}"
+    text = f"{child.part_number} added, quantity {plain(state.quantity)}"
     return _apply(tx, parent, change, child.part_number, text, why)
 
 
@@ -89,7 +90,7 @@ def change_line(
         _check_free(tx, parent, line, after.rel_type)
     fields = sorted(k for k in changes if getattr(after, k) != getattr(line.state, k))
     if not same_quantity(after.quantity, line.state.quantity):
-        quantity = f"quantity {number(line.state.quantity)} → {number(after.quantity)}"
+        quantity = f"quantity {plain(line.state.quantity)} → {plain(after.quantity)}"
         fields = [quantity, *(name for name in fields if name != "quantity")]
     what = ", ".join(name.replace("_", " ") for name in fields) or "source"
     change = LineChange(line.id, line.child_id, line.state, after, line.position)

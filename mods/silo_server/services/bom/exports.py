@@ -28,7 +28,7 @@ from silo_server.services.bom.last_sync import in_sentences, last_syncs, marks
 from silo_server.services.bom.rollup import Worth, parts_of, worths
 from silo_server.services.bom.tree import MAX_DEPTH, Exact, Graph, expand, flatten, load_graph
 from silo_server.services.items import get_item
-from silo_server.values import Item, Line, number
+from silo_server.values import Item, Line
 
 
 class View(StrEnum):
@@ -96,7 +96,7 @@ def export(tx: Tx, part_number: str, view: View, pieces: int = 1) -> Export:
     def row(line: Line, item: str, level: int, quantity: Exact | float, total: Exact) -> Row:
         amount = total * pieces
         part, worth = parts[line.child_id], known[line.child_id]
-        values = _row(line, part.properties, item, level, number(quantity), number(amount))
+        values = _row(line, part.properties, item, level, plain(quantity), plain(amount))
         return values | _values(worth, amount) | {"Incomplete": found.get(line.child_id)}
 
     rows: Iterator[Row]

@@ -19,8 +19,16 @@ from typing import Any
 from sqlalchemy import select
 
 from silo.bom.errors import RejectedError
-from silo.bom.headers import Role, find_clashes, find_roles, missing_columns, plain_cell, second_columns
-from silo.bom.numbers import Mark, common_mark, parse_number, read_quantity
+from silo.bom.headers import (
+    Role,
+    designators,
+    find_clashes,
+    find_roles,
+    missing_columns,
+    plain_cell,
+    second_columns,
+)
+from silo.bom.numbers import Mark, common_mark, parse_number, read_quantity, whole_number
 from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import items
@@ -363,7 +371,7 @@ def _as_written(before: LineState, field: str, value: Any) -> bool:
     """True where a file says what the line says; it drops spaces at the ends, and parts designators."""
     known = getattr(before, field)
     if field == "reference_designators":
-        return " ".join(known).replace(",", " ").split() == list(value)
+        return bool(designators(" ".join(known)) == value)
     return isinstance(known, str) and known.strip() == (value or "")
 
 
@@ -379,11 +387,10 @@ def _changes(record: Mapping[str, str], problems: list[str]) -> dict[str, Any]:
     if record.get("rel_type"):
         changes["rel_type"] = record["rel_type"].lower()
     if "reference_designators" in record:
-        changes["reference_designators"] = tuple(record["reference_designators"].replace(",", " ").split())
+        changes["reference_designators"] = designators(record["reference_designators"])
     if "child_revision" in record:
         revision = record["child_revision"]
-        known = revision.isascii() and revision.isdigit() and len(revision) < 7
-        if revision and not known:
+        changes["child_revision"] = whole_number(revision, 6)
+        if revision and changes["child_revision"] is None:
             problems.append(f"Revision: wanted a whole number, got {revision[:40]!r}")
-        changes["child_revision"] = int(revision) if known else None
     return changes

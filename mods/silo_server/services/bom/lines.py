@@ -12,12 +12,13 @@ from typing import Any
 from sqlalchemy import Integer, Select, func, select, type_coerce
 
 from silo.bom.errors import ConflictError, NotFoundError
+from silo.bom.numbers import plain
 from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import bom_lines, items
 from silo_server.errors import TooLargeError
 from silo_server.json_values import MAX_DEPTH, dumps, loads
-from silo_server.values import Item, Line, LineState, names_of, number, to_wire
+from silo_server.values import Item, Line, LineState, names_of, to_wire
 
 # "override" as the number that SQLite has: making a bool of it costs more than all the rest of the row.
 STATE_COLUMNS = [
@@ -193,7 +194,7 @@ def child_to_wire(line: Line) -> dict[str, Any]:
 
 def line_state_to_wire(state: LineState) -> dict[str, Any]:
     """What a line says of itself."""
-    return to_wire(state) | {"quantity": number(state.quantity), "cad_quantity": number(state.cad_quantity)}
+    return to_wire(state) | {"quantity": plain(state.quantity), "cad_quantity": plain(state.cad_quantity)}
 
 
 def revisions_to_wire(line: Line) -> dict[str, Any]:

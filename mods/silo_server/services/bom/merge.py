@@ -19,6 +19,7 @@ from sqlalchemy import delete, insert, select
 from silo.bom.errors import ConflictError, RejectedError
 from silo.bom.merge import MergePlan, answer_of, plan_merge, summary
 from silo.bom.model import QuantityChange
+from silo.bom.numbers import plain
 from silo_server.db.bulk import insert_rows, one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import bom_conflicts, bom_syncs, items
@@ -39,7 +40,7 @@ from silo_server.services.bom.lines import lines_of
 from silo_server.services.bom.merge_json import MergeOrder, event_of
 from silo_server.services.items import get_item
 from silo_server.services.revisions import check_base
-from silo_server.values import Item, Line, LineState, number
+from silo_server.values import Item, Line, LineState
 
 
 @dataclass(frozen=True, slots=True)
@@ -289,7 +290,7 @@ def _rebuilt(tx: Tx, parent: Item, stored: str, change_id: int) -> str:
 
 
 def _pair(part_number: str, state: LineState) -> dict[str, Any]:
-    return {"part_number": part_number, "quantity": number(state.quantity)}
+    return {"part_number": part_number, "quantity": plain(state.quantity)}
 
 
 def _remember_sync(
