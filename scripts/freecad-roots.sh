@@ -24,7 +24,7 @@ SELF=$(realpath "${BASH_SOURCE[0]}")
 SUITES=(bookworm trixie sid)
 declare -A FREECAD_OF=([bookworm]=0.20 [trixie]=1.0 [sid]=1.1)
 # Raise this when the recipe below changes: finished roots are then completed anew.
-RECIPE=1
+RECIPE=2
 # The second line is what FreeCAD's window needs under Xvfb and what apt would only recommend.
 PACKAGES=(freecad freecad-python3 ca-certificates
   xvfb xauth libgl1-mesa-dri fonts-dejavu-core procps)
@@ -137,6 +137,10 @@ install_freecad() {
   in_root "$root" dpkg --configure -a
   in_root "$root" apt-get -q update
   in_root "$root" apt-get -q -y -f --no-install-recommends install "${PACKAGES[@]}"
+  # Qt 6 reads SVG with a plugin: without it the check marks of FreeCAD's themes are not drawn.
+  if in_root "$root" dpkg -s libqt6svg6 >/dev/null 2>&1; then
+    in_root "$root" apt-get -q -y --no-install-recommends install qt6-svg-plugins
+  fi
   in_root "$root" apt-get clean
 }
 

@@ -4,10 +4,8 @@
 Run: ``.venv/bin/python scripts/screenshots_freecad.py [FOLDER] [STYLE]``. It needs FreeCAD and Xvfb; the
 newest of ``scripts/freecad-roots.sh --list`` is taken, or that of ``SILO_PICTURES_FREECAD`` (such as 1.0).
 With ``--tour`` it makes the animated ``addon-tour.gif`` instead: a commit after a colleague's.
-STYLE names a style sheet of FreeCAD, such as "FreeCAD Dark.qss", to look at the windows in another theme.
-FreeCAD 1.1 draws a theme's check marks from SVG files. Qt 6 reads those with its plugin libqsvg, which the
-root of FreeCAD 1.1 lacks: every box of such a picture looks empty, in FreeCAD's windows too. Our style has no
-part in it.
+STYLE names a style sheet of FreeCAD, such as "FreeCAD Dark.qss", or a theme of FreeCAD 1.1, such as
+"FreeCAD Dark", to look at the windows in it; ``SILO_PICTURES_SCALE=2`` is for a screen of double resolution.
 """
 
 from __future__ import annotations
@@ -52,11 +50,13 @@ def main() -> None:
         window(version, Path(scratch).resolve()) as freecad,
     ):
         freecad.prepare()
+        scale = os.environ.get("SILO_PICTURES_SCALE", "1")
+        freecad.pixels = f"{round(1600 * float(scale))}x{round(1000 * float(scale))}"
         with freecad.server.client() as client:
             top = prepare(freecad, client)
         freecad.answers["colleague commits"] = lambda: colleague_commits(freecad, *top)
         furnish(freecad.home / "user.cfg", sys.argv[2] if len(sys.argv) > 2 else "")
-        env = {"SILO_PICTURES": str(folder), "QT_XCB_NO_MITSHM": "1"}
+        env = {"SILO_PICTURES": str(folder), "QT_XCB_NO_MITSHM": "1", "QT_SCALE_FACTOR": scale}
         if tour:
             env["SILO_TOUR"] = "1"
         freecad.run("pictures.py", env=env)
@@ -71,13 +71,17 @@ VIEW = (
     '<FCParamGroup Name="View"><FCBool Name="Simple" Value="1"/><FCBool Name="Gradient" Value="0"/>'
     '<FCUInt Name="BackgroundColor" Value="4109760511"/></FCParamGroup>'
 )
-STYLE = '<FCParamGroup Name="MainWindow"><FCText Name="StyleSheet">{}</FCText></FCParamGroup>'
+STYLE = '<FCParamGroup Name="MainWindow"><FCText Name="StyleSheet">{}</FCText>{}</FCParamGroup>'
+THEME = '<FCText Name="QtStyle">FreeCAD</FCText><FCText Name="Theme">{}</FCText>'
 
 
 def furnish(config: Path, style: str) -> None:
     """FreeCAD's look, in its configuration file."""
     mod = '<FCParamGroup Name="Mod">'
-    more = VIEW + (STYLE.format(style) if style else "")
+    more = VIEW
+    if style:
+        is_sheet = style.endswith(".qss")
+        more += STYLE.format(style, "") if is_sheet else STYLE.format("FreeCAD.qss", THEME.format(style))
     config.write_text(config.read_text().replace(mod, more + mod))
 
 
@@ -111,6 +115,9 @@ def colleague_commits(freecad: Window, number: str, top: Path) -> str:
 def prepare(freecad: Window, client: SiloClient) -> tuple[str, Path]:
     """A server that knows the assembly from before, and on which people have worked since."""
     story = GearboxStory(freecad.folder, client)
+    if freecad.freecad.version < (1, 0):
+        for file in (story.top, story.top.parent / "Gearbox.FCStd"):
+            as_before_1_0(file)
     extraction = read_assembly(str(story.top))
     early = [
         proposal
@@ -124,6 +131,24 @@ def prepare(freecad: Window, client: SiloClient) -> tuple[str, Path]:
     story.sync()
     people_worked(story, client)
     return story.number_of("TopAssembly"), story.top
+
+
+def as_before_1_0(file: Path) -> None:
+    """The assembly of a file as FreeCAD 0.20 has one: a part with links in it."""
+    with zipfile.ZipFile(file) as source:
+        entries = {entry.filename: source.read(entry) for entry in source.infolist()}
+    document = entries["Document.xml"].replace(b'ProgramVersion="1.0R"', b'ProgramVersion="0.20R"')
+    for new, old in (
+        (b"Assembly::AssemblyObject", b"App::Part"),
+        (b"Assembly::AssemblyLink", b"App::Link"),
+        (b"Assembly::JointGroup", b"App::DocumentObjectGroup"),
+    ):
+        document = document.replace(new, old)
+    entries["Document.xml"] = document
+    entries.pop("GuiDocument.xml", None)
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as target:
+        for name, content in entries.items():
+            target.writestr(name, content)
 
 
 def people_worked(story: GearboxStory, client: SiloClient) -> None:

@@ -88,6 +88,24 @@ def test_without_a_choice_nothing_is_undone(day: Day) -> None:
     assert day.lines("Left") == {"Bolt": True, "Plate": False}
 
 
+def test_a_long_difference_is_shown_whole(day: Day) -> None:
+    """In the dialog, for a commit that is held, and in the history: the first lines, and all at a press."""
+    first, every = day.bob["left"]["all"]
+    assert len(first) == 1 + 12 + 1
+    assert len(every) == 30
+    assert {*every} == {*first[1:-1]}
+    assert sorted(day.bob["held_all"]) == [
+        "Bolt: 4 → 0 by you, as before in theirs",
+        "Plate: 1 → 0 by them, as before in yours",
+    ]
+    assert day.bob["history_all"] == 20
+
+
+def test_in_a_low_window_nothing_of_what_waits_is_cut(day: Day) -> None:
+    """It scrolls with the news, and does not make the window higher."""
+    assert (day.bob["held_height"], day.bob["held_cut"]) == (400, [])
+
+
 def test_on_top_at_a_persons_word(day: Day) -> None:
     """The comment says so, the BOM is mine; the commit after it asks nothing."""
     numbers = [number for number, _ in day.revisions("OnTop")]

@@ -275,6 +275,7 @@ def test_the_bom_of_each_revision(project: Project) -> None:
     with RevisionBoms(project.silo, project.number("Arm"), str(project.arm)) as boms:
         assert words(boms.change(1, 2)) == "Box 4 → 6"
         assert words(boms.change(None, 1)).startswith("+ ")
+        assert words(boms.change(1, 2) * 9).endswith("Box 4 → 6, and 3 more")
     with RevisionBoms(project.silo, project.number("Plate"), "/nowhere/Plate.FCStd") as boms:
         assert boms.change(None, 1) == ()
 

@@ -8,7 +8,7 @@ files: the lines of two revisions, and those of the file at hand, are then named
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -106,8 +106,14 @@ def revision_of(revisions: Sequence[Revision], sha256: str) -> Revision | None:
 
 def words(lines: Sequence[LineChange], most: int = 6) -> str:
     """A difference in one line, such as ``+ Bolt 4, - Plate 1, Nut 4 → 8``."""
+    more = f", and {len(lines) - most} more" if len(lines) > most else ""
+    return ", ".join(line_texts(lines[:most])) + more
+
+
+def line_texts(lines: Iterable[LineChange]) -> list[str]:
+    """The lines of a difference in words."""
     told = []
-    for line in lines[:most]:
+    for line in lines:
         name = display_name(line.entry) or line.entry.object_name
         if line.old is None:
             told.append(f"+ {name} {line.entry.quantity:g}")
@@ -117,5 +123,4 @@ def words(lines: Sequence[LineChange], most: int = 6) -> str:
             told.append(f"{name} {line.old.quantity:g} → {line.new.quantity:g}")
         else:
             told.append(f"{name} moved")
-    more = f", and {len(lines) - most} more" if len(lines) > most else ""
-    return ", ".join(told) + more
+    return told

@@ -40,6 +40,7 @@ class Buttons:
             Do.SEND_HERE: lambda action: addon.session.send_here(map(int, action.target.split(","))),
             Do.SAVE_COPY: self._save_copy,
             Do.DISCARD: lambda action: addon.session.discard(int(action.target)),
+            Do.DETAILS: self._details,
             Do.STOP: lambda _action: addon.session.cancel(),
             Do.PREVIEW: lambda action: self._with_document(action.document, addon.previews.start),
             Do.SAME: self._same_part,
@@ -69,6 +70,15 @@ class Buttons:
             self._addon.revisions.choose(
                 held.path, of_held(held), Choice.TAKE, taken=lambda: session.discard(entry_id, keep=True)
             )
+
+    def _details(self, action: Action) -> None:
+        """All lines of the BOM difference for which a commit is held."""
+        from silo.workbench.commit.theirs import line_texts
+        from silo.workbench.gui import widgets
+
+        theirs = self._addon.session.shown.theirs.get(int(action.target))
+        if theirs is not None:
+            widgets.read(host.main_window(), theirs.headline, line_texts(theirs))
 
     def _same_part(self, action: Action) -> None:
         """These files are one part on purpose; the BOM is synced without the question."""

@@ -11,6 +11,8 @@ from __future__ import annotations
 import os
 import shutil
 import sys
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +38,8 @@ from inside import (
     tell,
     wait,
 )
+
+from silo.workbench.pane.activity import Action, Do
 
 SHARED = Path(os.environ["SILO_TEST_SHARED"])
 NAMES = ("Left", "OnTop", "Taken", "Copied", "Held")
@@ -71,6 +75,7 @@ def commit(doc: Any, comment: str, choice: str | None = None) -> dict[str, Any]:
             picture(found, f"commit {choice or 'cancelled'}")
         found.comment.setPlainText(comment)
         if choice == "":
+            seen["all"] = all_lines(found)
             found.reject()
             return
         if choice is not None:
@@ -83,6 +88,29 @@ def commit(doc: Any, comment: str, choice: str | None = None) -> dict[str, Any]:
         Gui.runCommand("Origin_Commit")
     wait(settled)
     return seen
+
+
+def all_lines(found: Any) -> list[list[str]]:
+    """What the dialog shows of a long difference: at first, and when the rest is asked for."""
+    ((number, theirs),) = found._theirs.items()
+    found.show_theirs({theirs.path: replace(theirs, lines=theirs.lines[:1] * 30)})
+    item = found.files.topLevelItem(number)
+    first = [item.child(n).text(1) for n in range(item.childCount())]
+    return [first, read(lambda: press(found, "… and 18 more lines"))]
+
+
+def read(show: Callable[[], None]) -> list[str]:
+    """The lines of the window that scrolls."""
+    lines: list[str] = []
+
+    def answer(found: Any) -> None:
+        picture(found, "read")
+        lines.extend(found.findChild(QtWidgets.QPlainTextEdit).toPlainText().splitlines())
+        press(found, "Close")
+
+    with dialog("SiloRead", answer):
+        show()
+    return lines
 
 
 def found_open(folder: str, name: str) -> Any:
@@ -166,9 +194,13 @@ def held(one: Any, doc: Any) -> None:
     said = wait(
         lambda: [text.text() for text in one.dock.findChildren(QtWidgets.QLabel) if "by them" in text.text()]
     )
+    wait(lambda: not cut(one.dock))
     tell(held_difference=said)
     picture(one.dock, "held")
+    (entry,) = one.session.shown.waiting
+    tell(held_all=read(lambda: one.buttons.act(Action(Do.DETAILS, "", target=str(entry.id)))))
     tell(held=[entry.reason for entry in one.session.shown.waiting], held_buttons=buttons(one.dock))
+    many(one, entry)
     press(one.dock, "Open theirs beside mine")
     beside = wait(lambda: found_open("revisions", "Held"))
     tell(held_beside=sorted(obj.Name for obj in beside.getObject("Assembly").Group))
@@ -176,6 +208,31 @@ def held(one: Any, doc: Any) -> None:
     wait(lambda: not one.session.shown.waiting and settled())
     (taken,) = (doc for doc in App.listDocuments().values() if doc.FileName == path)
     tell(held_has=sorted(obj.Name for obj in taken.getObject("Assembly").Group))
+
+
+def many(one: Any, entry: Any) -> None:
+    """Eight such commits in a low window: no line is cut, and each can be decided."""
+    shown = one.session.shown
+    (theirs,) = shown.theirs.values()
+    waiting = tuple(replace(entry, id=number) for number in range(100, 108))
+    long = replace(theirs, lines=theirs.lines * 8)
+    one.dock.setFloating(True)
+    one.dock.resize(320, 400)
+    one.dock.update_shown(replace(shown, waiting=waiting, theirs={held.id: long for held in waiting}))
+    wait(lambda: "… and 4 more" in buttons(one.dock) and not cut(one.dock))
+    picture(one.dock, "many held")
+    tell(held_height=one.dock.height(), held_cut=cut(one.dock))
+    press(one.dock, "… and 4 more")
+    wait(lambda: buttons(one.dock).count("Discard") == 8 and not cut(one.dock))
+    one.dock.update_shown(shown)
+    one.dock.setFloating(False)
+    wait(lambda: buttons(one.dock).count("Discard") == 1)
+
+
+def cut(widget: Any) -> list[str]:
+    """The texts that need more height than they have."""
+    found = [label for label in widget.findChildren(QtWidgets.QLabel) if label.isVisible() and label.text()]
+    return [label.text() for label in found if label.height() < label.heightForWidth(label.width())]
 
 
 def buttons(widget: Any) -> list[str]:
@@ -210,6 +267,8 @@ def windows(one: Any, doc: Any) -> None:
     history.revisions.setCurrentItem(history.revisions.topLevelItem(1))
     wait(lambda: "Plate" in history.change.text())
     picture(history, "history")
+    history._first([f"Bolt {number}" for number in range(20)], 12)
+    tell(history_all=len(read(lambda: press(history, "… and 8 more lines"))))
     rows = [history.revisions.topLevelItem(n) for n in range(4)]
     tell(history=[[row.text(column) for column in (0, 3)] for row in rows], change=history.change.text())
     history.revisions.setCurrentItem(history.revisions.topLevelItem(3))

@@ -76,6 +76,15 @@ def recompute() -> None:
         unmark(doc)
 
 
+def mark(doc: Any) -> None:
+    """Mark a document as changed."""
+    try:
+        Gui.getDocument(doc.Name).Modified = True
+    except AttributeError:  # FreeCAD 0.20
+        for obj in doc.Objects:
+            obj.Label = obj.Label
+
+
 def arrange(one: Any) -> None:
     """A window of a size that can still be read in a page, the pane on its right."""
     window = Gui.getMainWindow()
@@ -159,9 +168,7 @@ def part(file: str, label: str, size: tuple[float, float, float]) -> Any:
 
 def new_parts(top: Any) -> None:
     """What the designer added this afternoon; one of them is a file of somebody else's, one a copy."""
-    container = top.getObject("Assembly") or next(
-        o for o in top.Objects if o.isDerivedFrom("Assembly::AssemblyObject")
-    )
+    container = top.getObject("TopAssembly")
     made = [
         part("SensorBracket", "Sensor Bracket", (30, 12, 40)),
         part("Guard", "Guard", (200, 3, 60)),
@@ -181,7 +188,7 @@ def new_parts(top: Any) -> None:
         link.Placement.Base = App.Vector(150 + 8 * number, -60, 12)
     top.getObject("CoverBolts" if top.getObject("CoverBolts") else _named(top, "CoverBolts")).ElementCount = 6
     recompute()
-    Gui.getDocument(top.Name).Modified = True
+    mark(top)
     show(top)
 
 
@@ -254,7 +261,7 @@ def preview(one: Any, top: Any) -> None:
 
 
 def commit(one: Any, top: Any) -> None:
-    Gui.getDocument("Gearbox").Modified = True
+    mark(App.getDocument("Gearbox"))
 
     def answer(found: Any) -> None:
         found.comment.setPlainText("Guard and sensor bracket added, two more cover bolts")
@@ -273,7 +280,7 @@ def commit(one: Any, top: Any) -> None:
 
 def registering(one: Any, top: Any) -> None:
     App.getDocument("ParallelKey").getObject("Body").Length = 8
-    Gui.getDocument("ParallelKey").Modified = True
+    mark(App.getDocument("ParallelKey"))
     App.setActiveDocument(top.Name)
     Gui.runCommand("Silo_RegisterParts")
     window = wait(lambda: next(iter(one.registrations._open.values()), None))

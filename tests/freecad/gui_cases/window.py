@@ -82,6 +82,7 @@ class Window:
     answers: dict[str, Callable[[], Any]] = field(default_factory=dict)
     # Two that run at once look for free screens from here.
     screen: int = 0
+    pixels: str = "1600x1000"
 
     @property
     def vault(self) -> Path:
@@ -132,9 +133,10 @@ class Window:
         told = self.folder / "told.json"
         told.unlink(missing_ok=True)
         log = self.folder / "freecad.log"
+        first = str(FIRST_SCREEN + 100 * WORKER + self.screen)
         command = [
             self.freecad.sibling("xvfb-run"),
-            *("-n", str(FIRST_SCREEN + 100 * WORKER + self.screen), "-a", "-s", "-screen 0 1600x1000x24"),
+            *("-n", first, "-a", "-s", f"-screen 0 {self.pixels}x24"),
             self.freecad.command.replace("freecadcmd", "freecad"),
             str(SCRIPTS / script),
         ]

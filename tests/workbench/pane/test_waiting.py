@@ -89,6 +89,14 @@ def test_a_held_commit_has_the_choices_of_the_dialog(entry: Entry) -> None:
     assert [a.do for a in row.actions] == [Do.SEND_HERE, Do.SAVE_COPY, Do.DISCARD]
 
 
+def test_the_reason_that_stands_above_is_not_repeated(entry: Entry) -> None:
+    """Without a connection each row would give the same one; what can be done about it stays."""
+    failed = replace(entry, reason="nothing answers")
+    (row,) = rows([failed], HERE, said="nothing answers")
+    assert (row.reason, [a.do for a in row.actions]) == ("", [Do.SAVE_COPY, Do.DISCARD])
+    assert rows([failed], HERE, said="the disk is full")[0].reason == "nothing answers"
+
+
 def test_send_now_is_there_only_where_something_can_be_sent(entry: Entry) -> None:
     """What is held waits for a person, and what is meant for another address or no server for settings."""
     held, away = replace(entry, state=State.HELD), replace(entry, server="http://old.example")
@@ -111,5 +119,10 @@ def test_a_held_commit_shows_what_each_changed(entry: Entry) -> None:
     theirs = replace(of_held(held), base=1, lines=(ThreeLines(bolt, None, bolt),))
     (row,) = rows([held], HERE, {held.id: theirs})
     assert row.details == ("Bolt: 6 → 0 by them, as before in yours",)
+    assert row.more == ()
+    # A long one has its first lines, and a button for all of them.
+    (row,) = rows([held], HERE, {held.id: replace(theirs, lines=theirs.lines * 15)})
+    assert len(row.details) == 3
+    assert [(a.do, a.text, a.target) for a in row.more] == [(Do.DETAILS, "… and 12 more lines", "1")]
     for known in ({}, {held.id: None}):
         assert rows([held], HERE, known)[0].details == ()

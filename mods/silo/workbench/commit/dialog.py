@@ -12,14 +12,15 @@ from typing import Any
 
 from silo.workbench.commit.desk import Answer
 from silo.workbench.commit.plan import Plan, Row, State
-from silo.workbench.commit.theirs import Choice, Theirs, choice_texts, line_texts
+from silo.workbench.commit.theirs import Choice, Theirs, choice_texts, line_texts, more_text
 from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QShortcut, QtCore, QtGui, QtWidgets
 from silo.workbench.pane.activity import Tone
 from silo.workbench.words import counted, plain, tip, translate
 
 _CHOICE = 2
-_MOST_LINES = 40
+# Lines of a BOM difference; the rest is one press away, and the other files stay in sight.
+_MOST_LINES = 12
 
 
 class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
@@ -196,11 +197,16 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         item.setForeground(1, QtGui.QBrush(QtGui.QColor(widgets.colour(Tone.WARNING, self.files))))
         item.setCheckState(0, QtCore.Qt.CheckState.Unchecked)
         item.setFlags(item.flags() & ~QtCore.Qt.ItemFlag.ItemIsUserCheckable)
-        for text in self._details(theirs):
+        for text, hint in self._details(theirs):
             child = QtWidgets.QTreeWidgetItem(["", text])
-            child.setToolTip(1, tip(text))
-            child.setFirstColumnSpanned(False)
+            child.setToolTip(1, tip(hint))
             item.addChild(child)
+        if (left := len(theirs.lines) - _MOST_LINES) > 0:
+            child = QtWidgets.QTreeWidgetItem()
+            item.addChild(child)
+            more = widgets.link_button(more_text(left), partial(self._show_all, number))
+            more.setObjectName(f"more{number}")
+            self.files.setItemWidget(child, 1, more)
         item.setExpanded(True)
         box = QtWidgets.QComboBox()
         box.setObjectName(f"choice{number}")
@@ -210,13 +216,18 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         self._choices[number] = box
         self.files.setItemWidget(item, _CHOICE, box)
 
-    def _details(self, theirs: Theirs) -> list[str]:
+    def _show_all(self, number: int) -> None:
+        theirs = self._theirs[number]
+        widgets.read(self, theirs.headline, line_texts(theirs))
+
+    def _details(self, theirs: Theirs) -> list[tuple[str, str]]:
+        """The lines below a file, each with its tool tip."""
         told = []
         if theirs.revision:
             when = time.strftime("%Y-%m-%d %H:%M", time.localtime(theirs.when)) if theirs.when else ""
             said = plain(theirs.comment, 160) or translate("Silo", "(no comment)")
-            told.append(" · ".join(filter(None, (when, said))))
-        return told + line_texts(theirs, _MOST_LINES)
+            told.append((" · ".join(filter(None, (when, said))), theirs.comment))
+        return told + [(text, text) for text in line_texts(theirs, _MOST_LINES)]
 
     def _chose(self, number: int, box: Any) -> None:
         mine = Choice(box.currentData()) is Choice.ON_TOP

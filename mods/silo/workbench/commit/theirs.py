@@ -17,7 +17,7 @@ from silo.bom.changes import Assembly, ThreeLines
 from silo.bom.errors import SiloError
 from silo.bom.naming import display_name
 from silo.workbench.commit.opened import Base, Origins
-from silo.workbench.words import plain, quantity, translate
+from silo.workbench.words import counted, plain, quantity, translate
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
@@ -114,13 +114,14 @@ def line_words(line: ThreeLines, *, known: bool = True) -> str:
     return text.replace("{name}", name)
 
 
-def line_texts(theirs: Theirs, most: int) -> list[str]:
-    """Its lines in words, and how many there are beyond ``most``."""
-    texts = [line_words(line, known=theirs.base is not None) for line in theirs.lines]
-    if len(texts) <= most:
-        return texts
-    more = translate("Silo", "… and {n} more lines").replace("{n}", str(len(texts) - most))
-    return [*texts[:most], more]
+def line_texts(theirs: Theirs, most: int | None = None) -> list[str]:
+    """Its lines in words; not more than ``most``."""
+    return [line_words(line, known=theirs.base is not None) for line in theirs.lines[:most]]
+
+
+def more_text(left: int) -> str:
+    """The text of the button that shows the rest."""
+    return counted(left, translate("Silo", "… and {n} more line"), translate("Silo", "… and {n} more lines"))
 
 
 @dataclass(frozen=True)

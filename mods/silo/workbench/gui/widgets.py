@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from silo.workbench import words
 from silo.workbench.freecad import host
 from silo.workbench.gui.flow_layout import FlowLayout
-from silo.workbench.gui.qt import QtCore, QtGui, QtWidgets
+from silo.workbench.gui.qt import QtCore, QtGui, QtWidgets, run_dialog
 from silo.workbench.pane.activity import Tone
 
 # (on a light ground, on a dark ground)
@@ -134,11 +134,32 @@ def clear(layout: Any) -> None:
             clear(item.layout())
 
 
+def read(parent: Any, title: str, lines: Iterable[str]) -> None:
+    """Show all lines of something long in a window that scrolls, and wait until it is closed."""
+    window = QtWidgets.QDialog(parent)
+    window.setObjectName("SiloRead")
+    window.setWindowTitle(title)
+    window.resize(620, 420)
+    text = QtWidgets.QPlainTextEdit("\n".join(words.plain(line, 1000) for line in lines))
+    text.setReadOnly(True)
+    close = QtWidgets.QPushButton(words.translate("Silo", "Close"))
+    close.setDefault(True)
+    close.clicked.connect(window.accept)
+    buttons = QtWidgets.QHBoxLayout()
+    buttons.addStretch(1)
+    buttons.addWidget(close)
+    layout = QtWidgets.QVBoxLayout(window)
+    layout.addWidget(text)
+    layout.addLayout(buttons)
+    run_dialog(window)
+    window.deleteLater()
+
+
 def warn(parent: Any, title: str, text: str) -> None:
-    """Tell a problem and wait until it is read."""
+    """Show a problem and wait until it is read."""
     box = QtWidgets.QMessageBox(parent)
     box.setIcon(QtWidgets.QMessageBox.Icon.Warning)
     box.setWindowTitle(title)
     box.setTextFormat(QtCore.Qt.TextFormat.PlainText)
     box.setText(words.visible(text, 2000))
-    (getattr(box, "exec", None) or box.exec_)()
+    run_dialog(box)

@@ -55,6 +55,7 @@ class Do(StrEnum):
     SEND_HERE = "send here"  # send what waits for another address to the server in use
     SAVE_COPY = "save copy"  # write the file of what waits somewhere else
     DISCARD = "discard"  # drop what waits in the outbox
+    DETAILS = "details"  # show all lines of the BOM difference for which a commit is held
     STOP = "stop"  # end what a worker is doing
     SETTINGS = "settings"  # open the preferences
 

@@ -72,7 +72,7 @@ def _connection(shown: Shown) -> Banner:
         return Banner(text.replace("{host}", host), ground=_ORANGE[0], ink=_ORANGE[1])
     if kind == "offline":
         text = translate("Silo", "No connection to {host}. Commits wait here and are sent later.")
-        told = "\n".join(filter(None, (text.replace("{host}", host), reason)))
+        told = "\n".join(filter(None, (text.replace("{host}", host), reason[:1].upper() + reason[1:])))
         return Banner(told, ground=_RED[0], ink=_RED[1], actions=(again,))
     if kind == "refused":
         text = translate("Silo", "{host} does not accept the token.").replace("{host}", host)

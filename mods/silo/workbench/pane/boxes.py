@@ -14,7 +14,7 @@ from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone
 from silo.workbench.pane.banner import Banner
 from silo.workbench.pane.waiting import Row, can_send, heading, host_of, meant_for_another, rows
 from silo.workbench.session.shown import Shown
-from silo.workbench.words import plain, tip, translate
+from silo.workbench.words import plain, translate
 
 OnAction = Callable[[Action], None]
 
@@ -167,14 +167,13 @@ class BusyWidget(QtWidgets.QWidget):  # type: ignore[misc]
 class WaitingWidget(QtWidgets.QFrame):  # type: ignore[misc]
     """What is not sent yet, and why, with what can be done about it."""
 
-    # More of them would push the news out of sight; all of them are sent all the same.
+    # More of them would push the news out of sight; a button shows all, and all are sent.
     MOST = 4
-    # Lines of a BOM difference; the pointer over "… and more" shows the rest.
-    MOST_DETAILS = 3
 
     def __init__(self, on_action: OnAction) -> None:
         super().__init__()
         self._on_action = on_action
+        self._most: int | None = self.MOST
         self.setObjectName("siloWaiting")
         self.setStyleSheet("QFrame#siloWaiting { border: 1px solid palette(mid); border-radius: 4px; }")
         self._layout = QtWidgets.QVBoxLayout(self)
@@ -187,16 +186,16 @@ class WaitingWidget(QtWidgets.QFrame):  # type: ignore[misc]
         widgets.clear(self._layout)
         self.setVisible(bool(shown.waiting))
         if not shown.waiting:
+            self._most = self.MOST
             return
         self._layout.addWidget(widgets.label(heading(shown.waiting, shown.server.url), bold=True))
-        ordered = rows(shown.waiting, shown.server.url, shown.theirs)
-        for row in ordered[: self.MOST]:
+        ordered = rows(shown.waiting, shown.server.url, shown.theirs, shown.reason)
+        first = ordered[: self._most]
+        for row in first:
             self._row(row)
-        left = len(ordered) - self.MOST
-        if left > 0:
-            self._layout.addWidget(
-                widgets.label(translate("Silo", "… and {n} more").replace("{n}", str(left)), Tone.QUIET)
-            )
+        if left := len(ordered) - len(first):
+            text = translate("Silo", "… and {n} more").replace("{n}", str(left))
+            self._layout.addWidget(widgets.link_button(text, partial(self._show_all, shown)))
         send = []
         if can_send(shown.waiting, shown.server.url):
             send.append(Action(Do.RETRY, translate("Silo", "Send now")))
@@ -209,18 +208,18 @@ class WaitingWidget(QtWidgets.QFrame):  # type: ignore[misc]
         if send:
             self._layout.addLayout(buttons(send, self._on_action))
 
+    def _show_all(self, shown: Shown) -> None:
+        self._most = None
+        self.draw(shown)
+
     def _row(self, row: Row) -> None:
         what = f"{row.title} · {row.what} · {_clock(row.since)}"
         self._layout.addWidget(widgets.label(what, Tone.ERROR if row.urgent else Tone.PLAIN))
         if row.reason:
             self._layout.addWidget(widgets.label(row.reason, Tone.QUIET))
-        for text in row.details[: self.MOST_DETAILS]:
+        for text in row.details:
             self._layout.addWidget(widgets.label(text, Tone.WARNING))
-        if left := row.details[self.MOST_DETAILS :]:
-            more = widgets.label(
-                translate("Silo", "… and {n} more").replace("{n}", str(len(left))), Tone.QUIET
-            )
-            more.setToolTip(tip("; ".join(row.details)))
-            self._layout.addWidget(more)
+        if row.more:
+            self._layout.addLayout(buttons(row.more, self._on_action))
         if row.actions:
             self._layout.addLayout(buttons(row.actions, self._on_action))

@@ -20,11 +20,12 @@ FIRST, MORE = 40, 60
 
 def _waits(shown: Shown) -> object:
     """What is drawn of what waits."""
-    return shown.waiting, shown.server, shown.theirs
+    return shown.waiting, shown.server, shown.theirs, shown.reason
 
 
 class Pane(QtWidgets.QWidget):  # type: ignore[misc]
-    """The content of the dock: connection, work in progress, what waits, and the boxes, newest first."""
+    """The content of the dock: connection and work in progress; below them scrolls what waits, and the boxes,
+    newest first."""
 
     def __init__(self, on_action: OnAction) -> None:
         super().__init__()
@@ -40,7 +41,7 @@ class Pane(QtWidgets.QWidget):  # type: ignore[misc]
         self._banner = BannerWidget(on_action)
         self._busy = BusyWidget(on_action)
         self._waiting = WaitingWidget(on_action)
-        for part in (self._banner, self._busy, self._waiting):
+        for part in (self._banner, self._busy):
             layout.addWidget(part)
         layout.addWidget(self._make_list(), 1)
 
@@ -62,6 +63,8 @@ class Pane(QtWidgets.QWidget):  # type: ignore[misc]
             Tone.QUIET,
         )
         self._older = widgets.link_button(translate("Silo", "Show older…"), self._show_older)
+        # In the list: in a low window it would leave the news no room, and its own lines neither.
+        self._list.addWidget(self._waiting)
         self._list.addWidget(self._empty)
         self._list.addWidget(self._older)
         self._list.addStretch(1)
@@ -106,8 +109,8 @@ class Pane(QtWidgets.QWidget):  # type: ignore[misc]
             if entry.key not in self._boxes:
                 box = Box(entry, self._on_action)
                 self._boxes[entry.key] = (entry, box)
-                # The empty text stands first.
-                self._list.insertWidget(place + 1, box)
+                # What waits and the empty text stand first.
+                self._list.insertWidget(place + 2, box)
         self._empty.setVisible(not entries)
         self._older.setVisible(len(entries) > len(wanted))
 

@@ -18,7 +18,8 @@ from silo.workbench.words import counted, plain, translate
 if TYPE_CHECKING:
     from silo.workbench.commit.theirs import Theirs
 
-_MOST_TEXTS = 40
+# Lines of a BOM difference; a button shows all of them.
+MOST_DETAILS = 3
 
 
 @dataclass(frozen=True)
@@ -29,8 +30,9 @@ class Row:
         a person has to look at it.
     since
         seconds since 1970.
-    details
-        the BOM base → theirs → mine, for a commit that is held because of a colleague's.
+    details, more
+        the BOM base → theirs → mine, for a commit that is held because of a colleague's: its first lines, and
+        the button that shows all.
     """
 
     title: str
@@ -40,14 +42,22 @@ class Row:
     urgent: bool = False
     actions: tuple[Action, ...] = ()
     details: tuple[str, ...] = ()
+    more: tuple[Action, ...] = ()
 
 
 def rows(
-    entries: Iterable[Entry], server_url: str, theirs: Mapping[int, Theirs | None] | None = None
+    entries: Iterable[Entry],
+    server_url: str,
+    theirs: Mapping[int, Theirs | None] | None = None,
+    said: str = "",
 ) -> tuple[Row, ...]:
-    """The entries, those first that a person has to look at."""
+    """The entries, those first that a person has to look at.
+
+    said
+        the reason that the pane shows above them; no row repeats it.
+    """
     here = _address(server_url)
-    made = [_row(entry, here, (theirs or {}).get(entry.id)) for entry in entries]
+    made = [_row(entry, here, (theirs or {}).get(entry.id), said) for entry in entries]
     return tuple(sorted(made, key=lambda row: not row.urgent))
 
 
@@ -93,21 +103,25 @@ def _is_urgent(entry: Entry, here: str) -> bool:
     return entry.state is State.HELD or _is_away(entry, here)
 
 
-def _row(entry: Entry, here: str, theirs: Theirs | None) -> Row:
+def _row(entry: Entry, here: str, theirs: Theirs | None, said: str) -> Row:
     away, urgent = _is_away(entry, here), _is_urgent(entry, here)
-    text = entry.reason
+    text = "" if entry.reason == said else entry.reason
     if away:
         meant = translate("Silo", "It is meant for {there}, which is not the server in use.")
         text = "\n".join(filter(None, (meant.replace("{there}", host_of(entry.server)), text)))
     elif entry.superseded:
         text = translate("Silo", "A newer commit of it has arrived since; this one would undo it.")
-    elif entry.state is State.KEEPING and not text:
+    elif entry.state is State.KEEPING and not entry.reason:
         text = translate("Silo", "Its file is being copied.")
     details: list[str] = []
+    more: tuple[Action, ...] = ()
     if theirs is not None and theirs.lines:
-        from silo.workbench.commit.theirs import line_texts  # late: FreeCAD's start waits for this module
+        # Late: FreeCAD's start waits for this module.
+        from silo.workbench.commit.theirs import line_texts, more_text
 
-        details = line_texts(theirs, _MOST_TEXTS)
+        details = line_texts(theirs, MOST_DETAILS)
+        if (left := len(theirs.lines) - MOST_DETAILS) > 0:
+            more = (Action(Do.DETAILS, more_text(left), target=str(entry.id)),)
     return Row(
         title=plain(" ".join(filter(None, (entry.part_number, entry.label or entry.file_name))), 80),
         what=_what(entry),
@@ -116,6 +130,7 @@ def _row(entry: Entry, here: str, theirs: Theirs | None) -> Row:
         urgent=urgent,
         actions=tuple(_actions(entry, here, away=away)) if urgent or entry.reason else (),
         details=tuple(details),
+        more=more,
     )
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from silo.bom.errors import SiloError
+from silo.workbench.commit.theirs import more_text
 from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QtCore, QtGui, QtWidgets
 from silo.workbench.pane.activity import Tone
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 # Milliseconds after the last key.
 TYPING_MS = 250
 PICTURE = 128
+# Lines of what is left alone, and changes of a BOM; a button shows all of them.
+MOST_NEWS, MOST_CHANGES = 4, 12
 _DATA = QtCore.Qt.ItemDataRole.UserRole
 
 
@@ -81,6 +84,17 @@ class _Window(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
         self.setAttribute(QtCore.Qt.WidgetAttribute.WA_DeleteOnClose)
         self.finished.connect(self._end)
         self.news = widgets.label("", Tone.QUIET)
+        self._all: Sequence[str] = ()
+        self.more = widgets.link_button("", lambda: widgets.read(self, self.windowTitle(), self._all))
+        self.more.setObjectName("more")
+        self.more.hide()
+
+    def _first(self, lines: Sequence[str], most: int) -> Sequence[str]:
+        """The first lines; a button shows all of them."""
+        self._all = lines
+        self.more.setText(more_text(len(lines) - most))
+        self.more.setVisible(len(lines) > most)
+        return lines[:most]
 
     def _end(self, _result: int = 0) -> None:
         self._closed = True
@@ -101,12 +115,13 @@ class _Window(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
     def fetch(self, part_number: str, revision: int | None, folder: Path, *, overwrite: bool = False) -> None:
         """Fetch into a folder, then open it; what was left alone is said, with the way to replace it."""
         self.say(translate("Silo", "Fetching…"))
+        self._first((), 0)
 
         def done(pulled: Pulled) -> None:
             self._flow.open(str(pulled.top))
             if self._closed:
                 return
-            told = left_alone(pulled)
+            told = self._first(left_alone(pulled), MOST_NEWS)
             self.say("\n".join(told) or translate("Silo", "Opened."), Tone.WARNING if told else Tone.QUIET)
             self._offer(part_number, revision, folder, pulled)
 
@@ -143,6 +158,7 @@ class OpenDialog(_Window):
         layout.addLayout(self._make_middle(), 1)
         layout.addLayout(self._make_folder(folder))
         layout.addWidget(self.news)
+        layout.addWidget(self.more)
         row, (self.open_button, _) = _buttons(
             (
                 ("open", translate("Silo", "Open"), self._open),
@@ -281,6 +297,7 @@ class HistoryDialog(_Window):
         self.change.setObjectName("change")
         layout.addWidget(self.change)
         layout.addWidget(self.news)
+        layout.addWidget(self.more)
         row, (self.get_button, _) = _buttons(
             (
                 ("get", translate("Silo", "Get This Revision as a Copy…"), self._get),
@@ -323,10 +340,12 @@ class HistoryDialog(_Window):
         numbers = [one.revision_number for one in self._history.known.revisions]
         older = next((one for one in numbers if one < number), None)
         self.change.setText(translate("Silo", "Comparing…"))
+        self._first((), 0)
 
-        def done(text: str) -> None:
+        def done(lines: list[str]) -> None:
             if self._number() == number:
-                told = translate("Silo", "BOM: {changes}").replace("{changes}", plain(text, 600))
+                text = plain(", ".join(self._first(lines, MOST_CHANGES)), 1000)
+                told = translate("Silo", "BOM: {changes}").replace("{changes}", text)
                 self.change.setText(told if text else translate("Silo", "No change of the BOM."))
 
         def failed(error: SiloError) -> None:

@@ -296,16 +296,16 @@ class RevisionFlow:
         path: str,
         older: int | None,
         newer: int,
-        done: Callable[[str], None],
+        done: Callable[[list[str]], None],
         failed: Callable[[SiloError], None],
     ) -> None:
-        """What a revision changed in the BOM, in words; read from both files."""
+        """What a revision changed in the BOM, line by line in words; read from both files."""
 
-        def run(client: SiloClient, control: Control) -> str:
-            from silo.vault.revisions import RevisionBoms, words
+        def run(client: SiloClient, control: Control) -> list[str]:
+            from silo.vault.revisions import RevisionBoms, line_texts
 
             with RevisionBoms(client, part_number, path, control.cancelled) as boms:
-                return words(boms.change(older, newer), 40)
+                return line_texts(boms.change(older, newer))
 
         self._session.ask(translate("Silo", "Comparing revisions"), run, done, failed)
 
