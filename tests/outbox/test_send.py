@@ -574,13 +574,12 @@ def test_an_entry_that_is_not_copied_yet_keeps_its_place(outbox: Outbox, silo: F
     """A later commit of the same item waits for it; others do not."""
     outbox.copies.mkdir(parents=True, exist_ok=True)
     first = Commit(str(model), 1.0, part_number=TOP, file=model, comment="first")
-    outbox.stage(first)
-    outbox._finishing.add(first.key)  # another thread is at it
+    outbox.stage(first)  # its copy is for another thread to make
     outbox.put(silo.base_url, TOP, bom=bom(2))
     outbox.put(silo.base_url, OTHER, bom=bom(3))
     outbox.send(silo)
     assert (log_of(silo, TOP), log_of(silo, OTHER)) == ([], ["3"])
-    outbox._finishing.clear()
-    outbox.finish(first.key, model)
+    assert [entry.state for entry in outbox.entries()] == [State.KEEPING, State.WAITING]
+    assert outbox.finish(first.key, model)
     outbox.send(silo)
     assert log_of(silo, TOP) == ["first", "2"]

@@ -123,7 +123,8 @@ class _Run:
 
     def _kept(self, entry: Entry) -> Entry | None:
         """Make the copy that an earlier run of the program could not make any more."""
-        self.store.finish(entry.key)
+        if not self.store.is_coming(entry.key):
+            self.store.finish(entry.key)
         return self.store.entry(entry.id)
 
     def _is_due(self, entry: Entry) -> bool:

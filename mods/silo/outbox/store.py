@@ -64,7 +64,7 @@ class Store(Origins):
     def __init__(self, path: Path | None = None, *, clock: Callable[[], float] = time.time) -> None:
         super().__init__(path or data_folder() / "outbox.sqlite3", clock)
         self._held = self.path.parent / f"{self.path.stem}-held"
-        self._finishing: set[str] = set()
+        self._coming: set[str] = set()
 
     # -- a commit comes in ------------------------------------------------------------------------------
 
@@ -82,7 +82,8 @@ class Store(Origins):
         return held
 
     def stage(self, commit: Commit, server: str = "") -> None:
-        """Put a commit's row on disk, which takes no time; :meth:`finish` makes the copy of its file."""
+        """Put a commit's row on disk, which takes no time. The caller then calls :meth:`finish`, which makes the
+        copy of its file."""
         if commit.file is None and commit.extraction is None and not commit.request:
             raise InputError(f"{commit.path or commit.part_number}: neither a file nor a BOM to keep")
         row = {name: getattr(commit, name) for name in _AS_GIVEN} | {
@@ -95,8 +96,18 @@ class Store(Origins):
             "bom_left": bool(commit.extraction is not None or commit.request),
             "extraction": json.dumps(to_plain(commit.extraction)) if commit.extraction is not None else "",
         }
-        with self.transaction() as db:
-            insert(db, row)
+        if commit.file is not None:
+            self._coming.add(commit.key)
+        try:
+            with self.transaction() as db:
+                insert(db, row)
+        except BaseException:
+            self._coming.discard(commit.key)
+            raise
+
+    def is_coming(self, key: str) -> bool:
+        """True where this program staged a commit and is about to copy its file: nobody else does it then."""
+        return key in self._coming
 
     def finish(
         self, key: str, source: Path | None = None, origin: str = "", stamp: Stamp | None = None
@@ -111,13 +122,10 @@ class Store(Origins):
         ``origin`` replaces that of the commit: the commit before it may have been copied only now. Returns
         the file's SHA-256, "" where there is no copy of it.
         """
-        if key in self._finishing:
-            return ""
-        self._finishing.add(key)
         try:
             self._finish(key, source, origin, stamp)
         finally:
-            self._finishing.discard(key)
+            self._coming.discard(key)
         entry = self.by_key(key)
         return entry.sha256 if entry is not None else ""
 

@@ -3,17 +3,22 @@
 
 from __future__ import annotations
 
+import hashlib
 import threading
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 from desk import Office
+from server_testing import wait_until
 
 from silo.bom.errors import SiloError, UnreachableError
-from silo.durable import Stamp
-from silo.outbox.entry import Commit, State
+from silo.durable import Stamp, stamp_of
+from silo.outbox.entry import UNKNOWN, Commit, State
+from silo.outbox.send import send_all
 from silo.outbox.store import Store
+from silo.workbench.commit.opened import Base
 
 
 def commit(office: Office, name: str, content: bytes = b"content", *, hold: bool = True) -> Commit:
@@ -77,6 +82,38 @@ def test_closing_waits_for_the_disk(office: Office, slow: SlowStore) -> None:
         (f"P{number}", State.WAITING) for number in range(12)
     ]
     assert slow.copies_made == 12
+
+
+@pytest.mark.parametrize("hold", [True, False])
+def test_a_commit_that_is_being_copied_is_not_sent_by_another_worker(
+    office: Office, slow: SlowStore, *, hold: bool
+) -> None:
+    """Or the document would not know what it is made from now, and its next commit would be held."""
+    made, later = commit(office, "Bolt", hold=hold), commit(office, "Plate")
+    base = Base(made.path, stamp_of(made.path), UNKNOWN)
+    office.session.keep(later, failing)
+    office.session.keep(replace(made, origin=UNKNOWN), failing, base)
+    wait_until(lambda: len(slow.entries()) == 2, "both rows are there")
+    # The copy of the other one is under way; meanwhile the sender comes along.
+    assert not send_all(slow, office.silo).sent
+    assert [entry.state for entry in slow.entries()] == [State.KEEPING] * 2
+    slow.gate.set()
+    office.settle()
+    assert office.session.shown.waiting == ()
+    assert base.origin == hashlib.sha256(b"content").hexdigest()
+
+
+def test_a_commit_that_another_program_has_sent_is_known_as_well(office: Office, slow: SlowStore) -> None:
+    """Such as the command line, while this one was about to copy it."""
+    made, later = commit(office, "Bolt"), commit(office, "Plate")
+    base = Base(made.path, stamp_of(made.path), UNKNOWN)
+    office.session.keep(later, failing)
+    office.session.keep(replace(made, origin=UNKNOWN), failing, base)
+    wait_until(lambda: len(slow.entries()) == 2, "both rows are there")
+    assert len(send_all(Store(slow.path), office.silo).sent) == 2
+    slow.gate.set()
+    office.settle()
+    assert base.origin == hashlib.sha256(b"content").hexdigest()
 
 
 def test_who_does_not_want_to_wait_loses_nothing_either(office: Office, slow: SlowStore) -> None:

@@ -55,8 +55,11 @@ class Base:
             return self.origin
 
     def committed(self, sha256: str) -> None:
-        """A commit of the document has this content; what comes now is made from it."""
-        if sha256:
+        """A commit of the document has this content; what comes now is made from it.
+
+        "" where another program has copied and sent it: then it is the file's, unless that was written since.
+        """
+        if sha256 := sha256 or _unchanged_hash(self.path, self.stamp):
             with self._lock:
                 self.origin, self.since = sha256, time.monotonic()
 
