@@ -18,7 +18,7 @@ import pytest
 
 from silo.bom.errors import DocumentError, InputError
 from silo.bom.model import BomEntry, Extraction
-from silo.durable import Stamp, stamp_of
+from silo.durable import Stamp, replacing, stamp_of
 from silo.outbox.database import OutboxError
 from silo.outbox.entry import Commit, State, new_key
 from silo.outbox.send import send_all
@@ -116,6 +116,23 @@ def test_a_copy_whose_row_was_not_written_any_more_is_used(store: Store, documen
     store.finish(made.key)
     (after,) = store.entries()
     assert (after.state, after.sha256) == (State.WAITING, hashlib.sha256(b"whole").hexdigest())
+
+
+def test_sweeping_leaves_a_copy_that_is_being_made(store: Store, document: Path) -> None:
+    """Another thread or program may be at it; what a killed one left goes with its row."""
+    made = commit(document)
+    store.stage(made)
+    with replacing(store.copies / f"{made.key}.FCStd") as file:
+        file.write(b"half")
+        store.sweep()
+    (copy,) = store.copies.iterdir()
+    copy.rename(store.copies / f".{made.key}.FCStd.killed.part")
+    store.sweep()
+    assert [*store.copies.iterdir()]
+    (entry,) = store.entries()
+    store.discard(entry.id)
+    store.sweep()
+    assert [*store.copies.iterdir()] == []
 
 
 class Moody(Store):

@@ -82,8 +82,7 @@ class Store(Origins):
         return held
 
     def stage(self, commit: Commit, server: str = "") -> None:
-        """Put a commit's row on disk, which takes no time. The caller then calls :meth:`finish`, which makes the
-        copy of its file."""
+        """Put a commit's row on disk, which takes no time; the caller then calls :meth:`finish`."""
         if commit.file is None and commit.extraction is None and not commit.request:
             raise InputError(f"{commit.path or commit.part_number}: neither a file nor a BOM to keep")
         row = {name: getattr(commit, name) for name in _AS_GIVEN} | {
@@ -310,7 +309,8 @@ class Store(Origins):
             held = [*self._held.iterdir()] if self._held.is_dir() else []
             keys = {entry.key for entry in self.entries()}
             for file in files:
-                if file.name.split(".")[0] not in keys:
+                # Also of a copy that is being made, which has a point before its name.
+                if file.name.lstrip(".").split(".")[0] not in keys:
                     with suppress(OSError):
                         remove_patiently(file)
             for folder in held:
