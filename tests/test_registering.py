@@ -6,9 +6,11 @@ from __future__ import annotations
 import hashlib
 import zipfile
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
+from silo.bom.errors import ServerFaultError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.model import BomEntry, Extraction
 from silo.registering.offer import Candidate, Offer, Seen, State, offer
@@ -56,6 +58,20 @@ def test_an_item_registered_from_this_very_file_is_found(tmp_path: Path) -> None
     digest = _sha256(content)
     known = silo.create_item("kindred-rd", "M01", "Original", properties={"file_sha256": digest})
     assert [s.part_number for s in offered(silo, tmp_path, candidate)["Copy"].similar] == [known.part_number]
+
+
+def test_where_the_server_cannot_be_searched_the_offer_says_so(tmp_path: Path) -> None:
+    """Registering works; but "no duplicates" would be more than anybody knows."""
+
+    class Deaf(FakeSilo):
+        def find_look_alikes(self, *_: object, **__: object) -> NoReturn:
+            raise ServerFaultError("the index is broken")
+
+    head = part(tmp_path, "Base Part")
+    seen = {head.doc_path: Seen(State.READY)}
+    found = offer(Extraction(head, ()), seen, Deaf(), "kindred-rd", CONTROL)
+    assert len(found.candidates) == 1
+    assert found.unsearched == "the index is broken"
 
 
 def test_an_item_with_the_same_name_is_reported_and_stays_a_suggestion(tmp_path: Path) -> None:

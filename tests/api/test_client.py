@@ -12,13 +12,20 @@ import pytest
 from silo.api.client import SiloClient
 from silo.api.items import categories_of
 from silo.api.wire import MergeEntry, MergeRequest
-from silo.bom.errors import InputError, NotFoundError, RejectedError, RouteMissingError, UnreachableError
+from silo.bom.errors import (
+    InputError,
+    NotFoundError,
+    RejectedError,
+    RouteMissingError,
+    ServerFaultError,
+    UnreachableError,
+)
 
 UUIDS = [str(uuid4()) for _ in range(2000)]
 
 
-def item(uuid: str) -> dict[str, Any]:
-    return {"id": uuid, "part_number": f"P-{uuid[:8]}", "description": None}
+def item(uuid: str, name: str | None = None) -> dict[str, Any]:
+    return {"id": uuid, "part_number": f"P-{uuid[:8]}", "description": None, "name": name}
 
 
 def route_missing(answer: Any) -> Any:
@@ -66,6 +73,39 @@ def test_without_the_batch_a_bounded_pool_asks_and_remembers(
     assert len(client.get_items_by_uuid(UUIDS[:16])) == 16
     assert most == 8
     client.get_items_by_uuid([str(uuid4())])
+    assert len(server.paths("POST")) == 1
+
+
+def test_look_alikes_of_a_thousand_components_cost_a_request(server: Any, client: SiloClient) -> None:
+    """Whole vaults are registered; a search for each would take the night."""
+    like = {"id": UUIDS[0], "part_number": "M01-0001", "name": "Lid", "same_file": True}
+    server.on(
+        "POST /api/items/look-alikes",
+        {"look_alikes": [[like], *([[]] * 999)]},
+        {"look_alikes": [[]] * 200},
+    )
+    wanted = [(f"Lid {n}", "") for n in range(1200)]
+    found = client.find_look_alikes([*wanted, *wanted])
+    assert [key for key, likes in found.items() if likes] == [("Lid 0", "")]
+    assert [len(seen.json()["wanted"]) for seen in server.seen] == [1000, 200]
+
+
+def test_an_answer_of_another_length_is_no_answer(server: Any, client: SiloClient) -> None:
+    """The look-alikes of one component must not be taken for another's."""
+    server.on("POST /api/items/look-alikes", {"look_alikes": [[]]})
+    with pytest.raises(ServerFaultError, match="wanted 2 lists"):
+        client.find_look_alikes([("A", ""), ("B", "")])
+
+
+def test_without_that_request_each_component_is_searched_for(
+    server: Any, client: SiloClient, answer: Any
+) -> None:
+    """By name and by file, as the real Silo does; the missing route is asked for once only."""
+    server.on("POST /api/items/look-alikes", route_missing(answer))
+    server.on("GET /api/items/search", [item(UUIDS[0], "LID"), item(UUIDS[1], "Lid 2")])
+    for _ in range(2):
+        (likes,) = client.find_look_alikes([("Lid", "")]).values()
+        assert [(one.id, one.same_file) for one in likes] == [(UUIDS[0], False)]
     assert len(server.paths("POST")) == 1
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import threading
 import uuid
 from urllib.parse import quote
@@ -150,6 +151,36 @@ def test_many_uuids_in_one_request(api: Api) -> None:
     found = api.good("POST", "/api/items/by-uuid", {"uuids": asked})["items"]
     assert [item["id"] for item in found] == [ids[3], ids[0]]
     assert api.good("POST", "/api/items/by-uuid", {"uuids": []}) == {"items": []}
+
+
+def test_look_alikes_of_many_components_in_one_request(api: Api) -> None:
+    """By name as people read it or by file; each answer at its question's place; archived items are none."""
+    word = uuid.uuid4().hex[:8]
+    digest = hashlib.sha256(word.encode()).hexdigest()
+    named, archived, registered, uploaded = (
+        api.item(f"{word}-{kind}", name=name)
+        for kind, name in (("N", f"Größe {word}"), ("A", f"Größe {word}"), ("R", "other"), ("U", "third"))
+    )
+    api.good("DELETE", f"/api/items/{archived}")
+    properties = {"file_sha256": digest.upper()}
+    api.good("PATCH", f"/api/items/{registered}/properties", properties)
+    body, headers = form_body({"file": ("Part.FCStd", word.encode())})
+    api.good("POST", f"/api/items/{uploaded}/file", body=body, headers=headers)
+    wanted = [
+        {"name": f"GRÖSSE_{word}.FCStd", "sha256": ""},
+        {"name": "nothing like it " + word},
+        {"name": f"größe {word}", "sha256": digest},
+        {"name": "", "sha256": ""},
+    ]
+    found = api.good("POST", "/api/items/look-alikes", {"wanted": wanted})["look_alikes"]
+    assert [[(one["part_number"], one["same_file"]) for one in likes] for likes in found] == [
+        [(named, False)],
+        [],
+        [(registered, True), (uploaded, True), (named, False)],
+        [],
+    ]
+    assert api.good("POST", "/api/items/look-alikes", {"wanted": []}) == {"look_alikes": []}
+    api.bad(400, "POST", "/api/items/look-alikes", {"wanted": wanted * 251})
 
 
 def test_many_boms_in_one_request(api: Api) -> None:

@@ -49,6 +49,7 @@ TABLE: dict[tuple[str, str], str] = {
     ("GET", "/api/items/search"): VIEWER,
     ("POST", "/api/items"): EDITOR,
     ("GET", "/api/items/by-uuid/{uuid}"): VIEWER,
+    ("POST", "/api/items/look-alikes"): VIEWER,  # the same
     ("POST", "/api/items/by-uuid"): VIEWER,  # a look-up with a long list; changes nothing
     ("POST", "/api/items/boms"): VIEWER,  # the same
     ("GET", "/api/items/{part_number}"): VIEWER,

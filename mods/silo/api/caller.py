@@ -7,7 +7,7 @@ import json
 import logging
 import re
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
@@ -37,6 +37,8 @@ class Abilities:
         many identities in one question.
     boms
         the BOMs of many items in one question.
+    look_alikes
+        the items that many components may be already, in one question.
     strict
         it refuses keys that it does not know.
     keeps_item_ids
@@ -47,6 +49,7 @@ class Abilities:
 
     batch: bool | None = None
     boms: bool | None = None
+    look_alikes: bool | None = None
     strict: bool = False
     keeps_item_ids: bool = False
     schemas: dict[str, str] = field(default_factory=dict)
@@ -64,8 +67,8 @@ def load_abilities(path: Path, server: str, *, clock: Callable[[], float] = time
         return Abilities()
     values = {f.name: known[f.name] for f in fields(Abilities) if f.name in known}
     maybe = (bool, type(None))
-    wanted = {"batch": maybe, "boms": maybe, "strict": bool, "keeps_item_ids": bool, "schemas": dict}
-    if not all(isinstance(value, wanted[name]) for name, value in values.items()):  # type: ignore[arg-type]
+    wanted = {"strict": bool, "keeps_item_ids": bool, "schemas": dict}
+    if not all(isinstance(value, wanted.get(name, maybe)) for name, value in values.items()):
         return Abilities()
     return Abilities(**values)
 
@@ -99,6 +102,7 @@ def _seconds(value: Any) -> float:
 
 
 T = TypeVar("T")
+K = TypeVar("K", bound=Hashable)
 Body = TypeVar("Body", bound=BaseModel)
 
 LISTS = ("items", "entries", "lines", "bom", "results", "data")
@@ -197,18 +201,18 @@ class Caller:
     def _many(
         self,
         ability: str,
-        keys: Iterable[str],
-        batch: Callable[[Sequence[str]], Mapping[str, T]],
-        single: Callable[[str], T | None],
+        keys: Iterable[K],
+        batch: Callable[[Sequence[K]], Mapping[K, T]],
+        single: Callable[[K], T | None],
         cancelled: Cancel | None = None,
-    ) -> dict[str, T]:
+    ) -> dict[K, T]:
         """Ask about many things, in few requests where the server can, else in a bounded pool of single ones.
 
         ability
             the field of :class:`Abilities` that says whether the server has such a request.
         """
         wanted = list(dict.fromkeys(keys))
-        found: dict[str, T] = {}
+        found: dict[K, T] = {}
         for start in range(0, len(wanted), MAX_IN_BATCH):
             stop_if(cancelled)
             chunk = wanted[start : start + MAX_IN_BATCH]
@@ -245,10 +249,8 @@ def body(kind: type[Body], values: Mapping[str, Any], thing: str) -> Body:
         raise InputError(f"these values do not fit {thing}: {wrong}") from error
 
 
-def _one_by_one(
-    keys: Sequence[str], single: Callable[[str], T | None], cancelled: Cancel | None
-) -> dict[str, T]:
-    def one(key: str) -> T | None:
+def _one_by_one(keys: Sequence[K], single: Callable[[K], T | None], cancelled: Cancel | None) -> dict[K, T]:
+    def one(key: K) -> T | None:
         stop_if(cancelled)
         return single(key)
 

@@ -20,7 +20,8 @@ from silo.api.address import ServerAddress
 from silo.api.boms import BomCalls
 from silo.api.caller import Abilities, load_abilities, save_abilities
 from silo.api.events import SILENCE, HttpEventStream, open_stream
-from silo.api.files import FileCalls, Origin, Progress
+from silo.api.files import Origin, Progress
+from silo.api.look_alikes import LookAlikeCalls
 from silo.api.policy import Retries
 from silo.api.sse import ServerEvent
 from silo.api.transport import Call, Cancel, Timeouts, Transport, stop_if
@@ -28,7 +29,7 @@ from silo.api.wire import MergeRequest, MergeResult, Revision, ServerState, User
 from silo.bom.errors import SiloError
 
 
-class SiloClient(FileCalls, BomCalls):
+class SiloClient(LookAlikeCalls, BomCalls):
     """A Silo server.
 
     base_url

@@ -56,6 +56,11 @@ def clean_name(text: str) -> str:
     return " ".join(printable.replace("_", " ").split())[:200]
 
 
+def name_key(text: str) -> str:
+    """What two names have in common that read as one: cleaned, in any case."""
+    return clean_name(text).casefold()
+
+
 def crowded_files(entries: Iterable[BomEntry]) -> frozenset[str]:
     """Files that give more than one component of this tree; standard parts need no place in a file."""
     files = Counter(entry.doc_path for entry in walk_entries(entries) if not entry.is_standard)

@@ -157,6 +157,8 @@ def _offer(extraction: Extraction, client: SiloClient, schema: str, args: argpar
     found = offer(
         extraction, seen, client, schema, _Told(), journal.pending(), most=None, own_file=not folder
     )
+    if found.unsearched:
+        print(f"silo-mod: Silo was not searched for probable duplicates: {found.unsearched}", file=sys.stderr)
     candidates = [one for one in found.candidates if not folder or one.entry.key != extraction.assembly.key]
     if args.category:
         candidates = [

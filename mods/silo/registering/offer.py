@@ -11,28 +11,28 @@ import hashlib
 import re
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, Protocol
 
 from silo.api.revisions import other_name
 from silo.bom.declare import Modelled
-from silo.bom.errors import NotFoundError, SiloError
+from silo.bom.errors import CancelledError, NotFoundError, SiloError
 from silo.bom.findings import FindingCode
 from silo.bom.identity import meta_key, walk_entries
 from silo.bom.model import BomEntry, Extraction
-from silo.bom.naming import Proposal, clean_name, propose, propose_all
+from silo.bom.naming import Proposal, propose, propose_all
 from silo.declaring import modelled
 from silo.files import content_hash
 from silo.registration import component_key
 
 ITEM_TYPES = ("part", "assembly", "consumable", "tool")
-# Looking for look-alikes costs a request each; beyond this many nobody reads them.
+# Servers without a request for many are asked for each; beyond this many nobody reads them in a dialog.
 MOST_LOOKED_UP = 100
 # What a single file may offer.
 MOST_MODELLED = 200
-_AT_ONCE = 6
+# Components that are looked up in one go, between two words of progress.
+_IN_ONE = 500
 _SAVED_AT = re.compile(rb'name="LastModifiedDate"[^>]*>\s*<String value="([^"]{0,40})"')
 
 
@@ -132,12 +132,15 @@ class Offer:
         category → the number that its next item would get.
     registered
         key of a component (of a standard part: "" and its designation) → the number that it has.
+    unsearched
+        why probable duplicates could not be looked for; "" where they were.
     """
 
     candidates: tuple[Candidate, ...]
     categories: Mapping[str, str]
     numbers: Mapping[str, str] = field(default_factory=dict)
     registered: Mapping[tuple[str, str], str] = field(default_factory=dict)
+    unsearched: str = ""
 
 
 # --- which components, and what of them -------------------------------------------------------------------
@@ -195,13 +198,14 @@ def offer(
     candidates.sort(key=lambda candidate: candidate.entry.is_standard)
     candidates += _modelled(extraction, seen, categories) if own_file else []
     control.check()
-    looked = _with_look_alikes(candidates, api, control, begun or {}, most)
+    looked, unsearched = _with_look_alikes(candidates, api, control, begun or {}, most)
     registered = {
         (("", entry.standard) if entry.standard else entry.key): numbers[entry.silo_uuid.lower()]
         for entry in walk_entries(tree)
         if entry.silo_uuid and entry.silo_uuid.lower() in numbers
     }
-    return Offer(_with_twins(looked), categories, _next_numbers(looked, api, schema), registered)
+    numbers_next = _next_numbers(looked, api, schema)
+    return Offer(_with_twins(looked), categories, numbers_next, registered, unsearched)
 
 
 def _perhaps_copies(extraction: Extraction, numbers: Mapping[str, str], api: Any) -> tuple[BomEntry, ...]:
@@ -294,49 +298,37 @@ def sha256_or_nothing(path: str) -> str:
 
 def _with_look_alikes(
     candidates: Sequence[Candidate], api: Any, control: Control, begun: Mapping[str, str], most: int | None
-) -> list[Candidate]:
-    first, rest = (candidates, ()) if most is None else (candidates[:most], candidates[most:])
-
-    def one(candidate: Candidate) -> Candidate:
-        # An item of a standard part's designation is joined, whoever made it.
-        if candidate.entry.is_standard or candidate.declared:
-            return candidate
-        control.check()
-        own = begun.get(component_key(candidate.entry), "")
-        return replace(candidate, similar=_look_alikes(candidate, api, own))
-
-    if not first:
-        return list(rest)
-    with ThreadPoolExecutor(_AT_ONCE, "silo-look-alikes") as pool:
-        looked = []
-        for candidate in pool.map(one, first):
-            looked.append(candidate)
-            control.progress(candidate.proposal.name, len(looked) / len(first))
-    return [*looked, *rest]
-
-
-def _look_alikes(candidate: Candidate, api: Any, own: str) -> tuple[Similar, ...]:
-    name = candidate.proposal.name
+) -> tuple[list[Candidate], str]:
+    """The candidates with what they may be already; why nobody knows, where the server did not say."""
+    # An item of a standard part's designation is joined, whoever made it.
+    asked = [one for one in candidates[:most] if not one.entry.is_standard and not one.declared]
+    found: dict[tuple[str, str], list[Any]] = {}
     try:
-        named = api.search_items(name, limit=8)
-        # A server that does not search by content finds nothing; what has the name is compared all the same.
-        with_file = api.search_items(candidate.sha256, limit=4) if candidate.sha256 else []
-        told = []
-        for item in {item.id: item for item in (*with_file, *named)}.values():
-            same_name = clean_name(item.name).casefold() == name.casefold()
-            same_file = bool(candidate.sha256) and candidate.sha256 in _checksums(item, api)
-            if (same_name or same_file) and item.part_number != candidate.same_as and item.id != own:
-                told.append(Similar(item.part_number, item.id, item.name, same_file))
-    except SiloError:
-        # Suggestions are a courtesy; registering must not fail for want of them.
-        return ()
-    return tuple(sorted(told, key=lambda similar: not similar.same_file))
+        for start in range(0, len(asked), _IN_ONE):
+            some = asked[start : start + _IN_ONE]
+            control.check()
+            control.progress(some[0].proposal.name, start / len(asked))
+            found |= api.find_look_alikes(_searched(one) for one in some)
+    except CancelledError:
+        raise
+    except SiloError as error:
+        # Registering must not fail for want of suggestions; but that there are none is no news of the server.
+        return list(candidates), str(error)
+
+    def of(one: Candidate) -> tuple[Similar, ...]:
+        own = begun.get(component_key(one.entry), "")
+        return tuple(
+            Similar(like.part_number, like.id, like.name, like.same_file)
+            for like in found.get(_searched(one), ())
+            if like.part_number != one.same_as and like.id != own
+        )
+
+    looked = {id(one) for one in asked}
+    return [replace(one, similar=of(one)) if id(one) in looked else one for one in candidates], ""
 
 
-def _checksums(item: Any, api: Any) -> set[str]:
-    known = {str(item.properties.get("file_sha256", ""))}
-    known.update((r.file_checksum or "").removeprefix("sha256:") for r in api.revisions(item.part_number))
-    return known - {""}
+def _searched(candidate: Candidate) -> tuple[str, str]:
+    return candidate.proposal.name, candidate.sha256
 
 
 def _with_twins(candidates: Iterable[Candidate]) -> tuple[Candidate, ...]:

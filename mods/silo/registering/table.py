@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -25,12 +26,26 @@ COLUMNS = (
     *("note", "fingerprint"),
 )
 _AS_THEY_ARE = ("file", "object", "standard")
+_AS_UTF_8 = "save the table as CSV (UTF-8)"
 _ANSWERS = {"yes": True, "y": True, "no": False, "n": False}
 _FILES = {
     State.READ_ONLY: "the file is read-only",
     State.ELSEWHERE: "the file is open in FreeCAD",
     State.MISSING: "the file is missing",
 }
+
+# What a spreadsheet would take for a number, a date, a time or a truth: "00123" comes back as 123, "1E5" as
+# 100000, "3-4" and "MAR1" as days. An apostrophe before it makes it text, as before a formula.
+_MONTH = (
+    "(?:jan|feb|fév|mar|mär|mrz|apr|abr|avr|may|mai|mag|jun|jui|giu|jul|lug|aug|aoû|ago|sep|set|oct|okt|ott|nov|"
+    r"dec|dez|déc|dic|ene|gen)[^\W\d_]*"
+)
+_NO_TEXT = re.compile(
+    r"'*(?:(?=\D*\d)[-+\d.,:/%$€ ]+(?:e[-+]?\d+)?(?: ?[ap]m?)?"
+    rf"|\d{{1,4}}[-./ ]*{_MONTH}[-./ \d]*|{_MONTH}[-./ ]*\d{{1,4}}"
+    r"|true|false|wahr|falsch|vrai|faux)",
+    re.IGNORECASE,
+)
 
 # File and object, or the designation of a standard part.
 Key = tuple[str, str]
@@ -91,10 +106,25 @@ def write_table(offer: Offer, wanted: Callable[[Candidate], bool], base: str) ->
             "category": proposal.category,
             "part_number": "",
             "note": "; ".join(remarks(candidate, offer.candidates[:number])),
-            "fingerprint": "" if entry.is_standard else fingerprint(entry.doc_path),
+            "fingerprint": _fingerprint(candidate),
         }
-        writer.writerow({column: safe_cell(text) for column, text in row.items()})
+        writer.writerow({column: _as_text(text) for column, text in row.items()})
     return b"\xef\xbb\xbf" + out.getvalue().encode("utf-8", "surrogateescape")
+
+
+def _as_text(cell: str) -> str:
+    return "'" + cell if _NO_TEXT.fullmatch(cell) else str(safe_cell(cell))
+
+
+def _as_written(cell: str) -> str:
+    """What :func:`_as_text` was given."""
+    return cell[1:] if cell.startswith("'") and _NO_TEXT.fullmatch(cell) else plain_cell(cell)
+
+
+def _fingerprint(candidate: Candidate) -> str:
+    """A letter first: sixteen digits alone are a number to a spreadsheet, which rounds it."""
+    found = "" if candidate.entry.is_standard else fingerprint(candidate.entry.doc_path)
+    return found and f"x{found}"
 
 
 @dataclass(frozen=True)
@@ -116,7 +146,7 @@ def read_table(data: bytes, name: str) -> list[Row]:
     text = _decoded(data, name)
     first = text.split("\n", 1)[0]
     delimiter = max(",;\t", key=first.count)
-    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
     begins, problems, rows = 1, [], []
     header: list[str] | None = None
     try:
@@ -127,17 +157,21 @@ def read_table(data: bytes, name: str) -> list[Row]:
             if header is None:
                 header = [cell.strip().lower() for cell in cells]
                 continue
+            while len(cells) > len(header) and not cells[-1].strip():
+                cells.pop()  # what a spreadsheet leaves behind on the right
             if len(cells) != len(header):
                 problems.append(f"line {line}: wanted {len(header)} cells as in the header, got {len(cells)}")
                 continue
             # The name of a file may begin with a space; what people write does not.
-            row = {c: plain_cell(t) for c, t in zip(header, cells, strict=True)}
+            row = {c: _as_written(t) for c, t in zip(header, cells, strict=True)}
             rows.append(Row(line, {c: t if c in _AS_THEY_ARE else t.strip() for c, t in row.items()}))
     except csv.Error as error:
-        raise InputError(f"{name}: line {reader.line_num} cannot be read as CSV: {error}") from None
+        raise InputError(f"{name}: the row of line {begins} cannot be read as CSV: {error}") from None
     lacking = [column for column in COLUMNS if column not in (header or ())]
     if lacking:
         raise InputError(f"{name} is no table of --plan: it has no column {', '.join(lacking)}")
+    twice = sorted(column for column, count in Counter(header).items() if count > 1 and column)
+    problems[:0] = [f"line 1: the column {column} is there more than once" for column in twice]
     if problems:
         raise InputError(f"{name} cannot be read; nothing was registered", problems)
     return rows
@@ -174,6 +208,7 @@ def orders_of(rows: Sequence[Row], offer: Offer, base: str, api: Any, name: str)
     counts = Counter(row.key for row in rows)
     problems: list[str] = []
     orders = []
+    joined: dict[str, list[Order]] = {}
     done = 0
     for row in rows:
         told: list[str] = []
@@ -184,12 +219,15 @@ def orders_of(rows: Sequence[Row], offer: Offer, base: str, api: Any, name: str)
             told.append("the component is there more than once")
         candidate = candidates.get(row.key)
         if candidate is not None and wanted:
-            orders.append(_order(row, candidate, offer, api, told))
+            orders.append(order := _order(row, candidate, offer, api, told))
+            if order is not None and order.existing is not None:
+                told += _joined_before(order, joined.setdefault(order.existing.item_id, []))
         elif candidate is None and row.key in registered and wanted:
             done += 1
         elif candidate is None and wanted:
             what = row.cells["standard"] or f"{row.cells['file']}#{row.cells['object']}"
-            told.append(f"{what} is no component here")
+            hint = "" if what.isprintable() else f"; {_AS_UTF_8}"
+            told.append(f"{what} is no component here{hint}")
         problems += [f"line {row.line}: {words}" for words in told]
     if problems:
         raise InputError(f"{name}: nothing was registered, for not all of it can be", problems)
@@ -225,9 +263,19 @@ def _order(row: Row, candidate: Candidate, offer: Offer, api: Any, told: list[st
     return Order(candidate, cells["name"], cells["type"], cells["category"], existing)
 
 
+def _joined_before(order: Order, earlier: list[Order]) -> list[str]:
+    """A number that was copied down a column makes one item of several parts."""
+    others = [one for one in earlier if one.candidate.sha256 != order.candidate.sha256]
+    earlier.append(order)
+    number = order.existing.part_number if order.existing else ""
+    return [
+        f"part_number: {number} is already for {one.name!r} above, another file; register one of them with it"
+        for one in others[:1]
+    ]
+
+
 def _changed(before: str, candidate: Candidate) -> bool:
-    known = bool(before) and not candidate.entry.is_standard
-    return known and before != fingerprint(candidate.entry.doc_path)
+    return bool(before) and before != _fingerprint(candidate)
 
 
 def wrong_name(name: str, candidate: Candidate) -> str:
@@ -239,7 +287,9 @@ def wrong_name(name: str, candidate: Candidate) -> str:
     try:
         name.encode("utf-8")
     except UnicodeEncodeError:
-        return f"name: {name!r} is no UTF-8; save the table as CSV (UTF-8)"
+        return f"name: {name!r} is no UTF-8; {_AS_UTF_8}"
+    if "\ufffd" in name:
+        return f"name: {name!r} has lost letters (\ufffd); {_AS_UTF_8}"
     if len(name) > 200 or not name.isprintable():
         return f"name: wanted one line of at most 200 characters that can be seen, got {name[:50]!r}"
     return ""

@@ -19,6 +19,7 @@ from silo.api.boms import LineBody
 from silo.api.caller import body
 from silo.api.files import Origin, Progress
 from silo.api.items import ItemBody, ItemChanges
+from silo.api.look_alikes import LookAlike
 from silo.api.merging import result_of
 from silo.api.sse import MERGE, STATE
 from silo.api.transport import Cancel, stop_if
@@ -42,6 +43,7 @@ from silo.bom.errors import (
     VersionConflictError,
 )
 from silo.bom.merge import apply_merge, plan_merge, summary
+from silo.bom.naming import name_key
 from silo.testing.store import (
     CATEGORIES,
     FakeStore,
@@ -123,6 +125,21 @@ class FakeSilo(FakeStore):
             and item_type in (None, stored.item.item_type)
         ]
         return found[offset : offset + limit]
+
+    def find_look_alikes(
+        self, wanted: Iterable[tuple[str, str]], /, *, cancelled: Cancel | None = None
+    ) -> dict[tuple[str, str], list[LookAlike]]:
+        return {(name, digest): self._look_alikes(name, digest) for name, digest in wanted}
+
+    def _look_alikes(self, name: str, digest: str) -> list[LookAlike]:
+        found = []
+        for _, stored in sorted(self.items.items()):
+            item, same_file = stored.item, bool(digest) and digest in stored.hashes()
+            if same_file or (name and name_key(item.name) == name_key(name)):
+                found.append(
+                    LookAlike(id=item.id, part_number=item.part_number, name=item.name, same_file=same_file)
+                )
+        return sorted(found, key=lambda one: not one.same_file)[:12]
 
     def create_item(
         self,

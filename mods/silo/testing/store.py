@@ -47,8 +47,12 @@ class Stored:
 
     def search_text(self) -> str:
         """What a search looks into: number, name, and the hashes of its files."""
-        hashes = [self.item.properties.get("file_sha256"), *(r.file_checksum for r in self.revisions)]
-        return "\n".join(map(str, (self.item.part_number, self.item.name, *filter(None, hashes)))).casefold()
+        return "\n".join((self.item.part_number, self.item.name, *self.hashes())).casefold()
+
+    def hashes(self) -> list[str]:
+        """The SHA-256 of its files, as far as they are known."""
+        known = [self.item.properties.get("file_sha256"), *(r.file_checksum for r in self.revisions)]
+        return [str(one).removeprefix("sha256:") for one in known if one]
 
 
 def check_base(stored: Stored, base: int | None, checksum: str | None) -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Annotated, Any
 
 import anyio.to_thread
@@ -26,6 +27,8 @@ from silo_server.routes.models import (
     ItemChangeBody,
     ItemOut,
     ItemsOut,
+    LookAlikesBody,
+    LookAlikesOut,
     NewItemBody,
     NumberBody,
     NumberOut,
@@ -35,6 +38,7 @@ from silo_server.routes.models import (
 )
 from silo_server.schema.catalog import describe, describe_form, find_schema, schemas
 from silo_server.services import items as service
+from silo_server.services import search
 from silo_server.services.bom.last_sync import NEVER, LastSync, last_sync, last_syncs
 from silo_server.services.numbering import preview_number
 from silo_server.values import Item, to_wire
@@ -129,6 +133,14 @@ def get_items_by_uuid(server: ServerDep, caller: Viewer, body: UuidsBody) -> Res
         found = service.get_by_uuids(tx, body.uuids)
         last = last_syncs(tx, [item.id for item in found])
     return json_answer({"items": [item_to_wire(item, last.get(item.id, NEVER)) for item in found]})
+
+
+@router.post("/items/look-alikes", response_model=LookAlikesOut, responses=READ_ERRORS)
+def find_look_alikes(server: ServerDep, caller: Viewer, body: LookAlikesBody) -> Response:
+    """The items that have a component's name or its very file, for many components. Reads only."""
+    with server.db.read(caller) as tx:
+        found = search.find_look_alikes(tx, [(one.name, one.sha256) for one in body.wanted])
+    return json_answer({"look_alikes": [[asdict(like) for like in likes] for likes in found]})
 
 
 @router.get("/items/{part_number}", response_model=ItemOut, responses=READ_ERRORS)

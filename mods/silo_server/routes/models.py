@@ -138,6 +138,19 @@ class UuidsBody(Body):
     uuids: list[Short] = Field(max_length=10_000)
 
 
+class Wanted(Body):
+    """A component that may be an item already: its name, and the SHA-256 of its file."""
+
+    name: Short
+    sha256: Short = ""
+
+
+class LookAlikesBody(Body):
+    """``POST /api/items/look-alikes``."""
+
+    wanted: list[Wanted] = Field(max_length=1000)
+
+
 class NumbersBody(Body):
     """``POST /api/items/boms``."""
 
@@ -190,6 +203,21 @@ class ItemsOut(BaseModel):
     """The items that were found; what is missing is absent."""
 
     items: list[ItemOut]
+
+
+class LookAlikeOut(BaseModel):
+    """An item with the name of a component, or with its very file."""
+
+    id: str
+    part_number: str
+    name: str
+    same_file: bool
+
+
+class LookAlikesOut(BaseModel):
+    """For each component, in the order asked; at most twelve, those with the same file first."""
+
+    look_alikes: list[list[LookAlikeOut]]
 
 
 class RevisionOut(BaseModel):

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -22,6 +22,7 @@ from sqlalchemy import ColumnElement, Integer, case, column, func, literal_colum
 from sqlalchemy.dialects.postgresql import TSQUERY, TSVECTOR
 from sqlalchemy.sql.expression import cast, literal
 
+from silo.bom.naming import name_key
 from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx, get_state, put_state
 from silo_server.db.tables import items, revisions
@@ -245,3 +246,47 @@ def _texts(value: Any) -> Iterator[str]:
             waiting += one
         elif isinstance(one, str) and len(one) <= LONGEST_PROPERTY:
             yield one
+
+
+MOST_LOOK_ALIKES = 12
+
+
+@dataclass(frozen=True, slots=True)
+class LookAlike:
+    """An item with the name of a component, or with its very file."""
+
+    id: str
+    part_number: str
+    name: str
+    same_file: bool
+
+
+def find_look_alikes(tx: Tx, wanted: Sequence[tuple[str, str]]) -> list[list[LookAlike]]:
+    """For each (name, SHA-256 of the file or ""): what it may be already, the same file first.
+
+    One pass over the names of all items: a name is compared as people read it, without suffix, in any case.
+    """
+    names: dict[str, list[Any]] = {name_key(name): [] for name, _ in wanted if name}
+    files: dict[str, dict[int, Any]] = {digest.lower(): {} for _, digest in wanted if digest}
+    has_hash = items.c.properties.like('%"file_sha256"%')
+    kept = case((has_hash, items.c.properties), else_=None).label("properties")
+    columns = (items.c.id, items.c.uuid, items.c.part_number, items.c.name)
+    live = items.c.archived_at.is_(None)
+    for row in tx.conn.execute(select(*columns, kept).where(live).order_by(items.c.part_number_key)):
+        same = names.get(name_key(row.name))
+        if same is not None and len(same) < MOST_LOOK_ALIKES:
+            same.append(row)
+        digest = str(loads(row.properties).get("file_sha256")).lower() if row.properties and files else ""
+        if digest in files:
+            files[digest][row.id] = row
+    query = select(*columns, revisions.c.file_checksum).join(items).where(live)
+    for row in tx.conn.execute(query.where(one_of(tx, revisions.c.file_checksum, list(files)))):
+        files[row.file_checksum][row.id] = row
+
+    def of(name: str, digest: str) -> list[LookAlike]:
+        same_file = files.get(digest.lower(), {})
+        others = [row for row in names.get(name_key(name), ()) if row.id not in same_file]
+        rows = [*((row, True) for row in same_file.values()), *((row, False) for row in others)]
+        return [LookAlike(row.uuid, row.part_number, row.name, same) for row, same in rows[:MOST_LOOK_ALIKES]]
+
+    return [of(name, digest) for name, digest in wanted]
