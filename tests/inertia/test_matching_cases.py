@@ -299,3 +299,25 @@ def test_case_32_row_total_instead_of_unit_mass(assemble: Fixture, compute: Fixt
     report = compute(asm, HEAD + "1,4,,steel,31.4 kg,b\n")
     assert codes(report) == ["row_total"]
     assert "4 times" in report.warnings[0].message
+
+
+def test_different_shapes_with_one_mass_under_two_spellings(
+    assemble: Fixture, compute: Fixture, codes: Fixture
+) -> None:
+    """The row is matched exactly by one, by its other spelling by the other: neither is sure."""
+    asm = assemble(("l/a", cube("bolt")), ("l/b", cube("Bolt", 0.02)), ("l/c", cube("bolt (2)")))
+    report = compute(asm, HEAD + "1,3,,,2.70 g,bolt\n")
+    assert all("ambiguous" in codes(report, name) for name in ("bolt", "Bolt", "bolt (2)"))
+    same = assemble(("l/a", cube("bolt")), ("l/b", cube("Bolt")))
+    assert codes(compute(same, HEAD + "1,2,,,2.70 g,bolt\n")) == []
+
+
+@pytest.mark.parametrize(
+    ("product", "row"), [("gear 1:5", "gear 1:10"), ("cover (2)", "cover (3)"), ("leg <1>", "leg <2>")]
+)
+def test_of_two_different_marks_neither_is_an_occurrence(
+    assemble: Fixture, compute: Fixture, codes: Fixture, product: str, row: str
+) -> None:
+    """A ratio or a running number tells parts apart."""
+    report = compute(assemble(("l/a", cube(product))), HEAD + f"1,1,,,2.70 g,{row}\n")
+    assert set(codes(report)) == {"not_in_bom", "row_unused"}

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import copy
 import json
+import pickle
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -102,6 +104,7 @@ def test_what_a_person_sees(report: Any) -> None:
     assert "<th>mass</th><td>2 kg</td>" in report.bodies["base"]._repr_html_()
     table = report._repr_html_()
     assert "<td>base</td><td>2</td>" in table
+    assert repr(report) == "InertiaReport('asm': 2 links, 2.5 kg, 3 warnings)"
     report.add_warning("arm", "<b>", "a warning", "x")
     assert "<b>" not in report._repr_html_()
 
@@ -141,3 +144,42 @@ def test_a_dict_is_taken_by_the_one_call_too() -> None:
     assert list(report.bodies) == ["all"]
     assert report.total is not None
     assert report.bodies["all"].mass == pytest.approx(report.total.mass)
+
+
+def test_copies_are_equal_and_read_only(report: Any) -> None:
+    """By pickle (other processes), by copy, through JSON; equal means every number and the frame."""
+    body = report.bodies["arm"]
+    back = MassProps.from_dict(json.loads(json.dumps(body.to_dict())))
+    for other in (pickle.loads(pickle.dumps(body)), copy.deepcopy(body), copy.copy(body), back):
+        assert (other, hash(other)) == (body, hash(body))
+        assert not any(array.flags.writeable for array in (other.com, other.inertia))
+    assert pickle.loads(pickle.dumps(report)).bodies == report.bodies
+    for name, value in (
+        ("mass", 9),
+        ("center_mass", [0, 0, 9]),
+        ("moment_inertia", np.eye(3)),
+        ("frame", "x"),
+    ):
+        assert MassProps.from_dict({**body.to_dict(), name: value}) != body
+    assert body != "arm"
+
+
+@pytest.mark.parametrize("density", [0, -1000, float("nan"), float("inf"), 7.85, 1e30])
+def test_a_default_density_that_no_solid_has_is_refused(density: float) -> None:
+    """7.85 is steel in g/cm³, and would make a robot of aerogel."""
+    with pytest.raises(InputError, match="wanted a default density from 25 to 23000"):
+        inertia.compute_link_inertials(ARM / "arm.step", density=density)
+
+
+def test_a_bom_that_was_read_before_is_taken() -> None:
+    """So that the parser's options (columns, units) reach the one call."""
+    table = inertia.BOMParser(decimal=".").parse(ARM / "bom.csv")
+    one, two = (inertia.compute_link_inertials(ARM / "arm.step", bom) for bom in (table, ARM / "bom.csv"))
+    assert one.bodies == two.bodies
+    assert one.bom == two.bom
+
+
+def test_what_is_no_placement_is_refused(report: Any) -> None:
+    for bad in ("x", None, np.eye(3), np.zeros((4, 4)), [[1, 2], [3]]):
+        with pytest.raises(InputError, match="a placement"):
+            report.bodies["arm"].transformed(bad)

@@ -164,9 +164,10 @@ def material_table(args: argparse.Namespace) -> MaterialTable:
 
 def check_options(args: argparse.Namespace, *, asks_server: bool) -> None:
     """Bad numbers, output files and a missing server are reported before minutes of reading, not after."""
-    density = args.default_density
-    if density is not None and not (density > 0 and math.isfinite(density)):
-        raise InputError(f"--default-density: wanted kg/m³ above 0, got {density:g}")
+    from silo.inertia.materials.density import checked_density
+
+    if args.default_density is not None:
+        checked_density(args.default_density)
     if not (args.timeout >= 0 and math.isfinite(args.timeout)):
         raise InputError(f"--timeout: wanted seconds, 0 for no limit, got {args.timeout:g}")
     if asks_server:

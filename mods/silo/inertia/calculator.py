@@ -245,7 +245,7 @@ EnhancedInertiaCalculator = InertiaCalculator
 
 def compute_link_inertials(
     step_path: Path | str,
-    bom_path: Path | str | None = None,
+    bom_path: Path | str | Mapping[str, BOMEntry] | None = None,
     *,
     links: LinkMap | Mapping[str, Any] | Path | str | None = None,
     density: float = 1000.0,
@@ -256,6 +256,8 @@ def compute_link_inertials(
 ) -> InertiaReport:
     """Every link of an assembly file (spec bom-inertia, Task 5).
 
+    bom_path
+        a file, or what :class:`BOMParser` made of one.
     links
         a link map, its file, or a dict of link → patterns; None: each first-level sub-assembly is a link.
     density
@@ -263,7 +265,9 @@ def compute_link_inertials(
 
     Numbers are in the assembly's frame unless ``frame`` or the link map says otherwise.
     """
-    table = BOMParser().parse(bom_path) if bom_path is not None else None
+    table = None
+    if bom_path is not None:
+        table = as_table(bom_path) if isinstance(bom_path, Mapping) else BOMParser().parse(bom_path)
     task = Task(
         materials if materials is not None else load_materials(),
         Options(density, step_density),

@@ -67,6 +67,20 @@ class MassProps:
         object.__setattr__(self, "com", _frozen(self.com, (3,), "com"))
         object.__setattr__(self, "inertia", _frozen(self.inertia, (3, 3), "inertia"))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # By the constructor, so that copies are read-only as well.
+        return type(self), (self.mass, self.com, self.inertia, self.frame)
+
+    def _values(self) -> tuple[Any, ...]:
+        return self.mass, *self.com, *self.inertia.flat, self.frame
+
+    def __eq__(self, other: object) -> bool:
+        """Equal to the last bit, in one frame; ``np.allclose`` compares with a tolerance."""
+        return self._values() == other._values() if isinstance(other, MassProps) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(self._values())
+
     @classmethod
     def nothing(cls) -> MassProps:
         """No mass at all; the neutral element of :func:`combine`."""
@@ -316,7 +330,10 @@ def is_rigid(placement: Floats, tolerance: float = RIGID_TOLERANCE) -> bool:
 
 def as_placement(value: ArrayLike) -> Floats:
     """A (4, 4) placement, checked: finite, last row 0 0 0 1, invertible (InputError otherwise)."""
-    matrix = np.asarray(value, float)
+    try:
+        matrix = np.asarray(value, float)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"a placement is a 4 x 4 matrix of numbers ({error})") from error
     if matrix.shape != (4, 4):
         raise InputError(f"a placement is a 4 x 4 matrix, got the shape {matrix.shape}")
     if not np.isfinite(matrix).all() or not np.allclose(matrix[3], (0, 0, 0, 1), atol=1e-12):

@@ -16,6 +16,7 @@ from silo.inertia.codes import Decided, MassCode, Rule, Source
 from silo.inertia.doubts import GivenMass, Note, density_doubts, expectation, mass_doubts, zero_doubt
 from silo.inertia.matching import Match
 from silo.inertia.materials import MaterialHit, MaterialTable
+from silo.inertia.materials.density import checked_density
 from silo.inertia.model import Prototype
 from silo.inertia.names import Suggester
 
@@ -39,6 +40,9 @@ class Options:
     step_density: bool = False
     unknown_is_zero: bool = False
     own_bom: bool = False
+
+    def __post_init__(self) -> None:
+        checked_density(self.default_density)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from itertools import count
 from typing import TypeVar
@@ -22,7 +22,7 @@ from silo.inertia.bom.rows import BOMEntry, BomTable
 from silo.inertia.codes import Decided, Rule
 from silo.inertia.model import Product
 from silo.inertia.names import bare, could_be, is_lossy, plain
-from silo.inertia.wording import counted
+from silo.inertia.wording import counted, listed
 
 MASS_TOLERANCE = 0.02
 """Relative: how well density times volume must fit a mass to decide between rows (quantum apart)."""
@@ -171,13 +171,7 @@ def _one_bundle(products: list[Product], bundle: Bundle, density: DensityOf) -> 
         fitting = [p for p in products if _mass_fits(p, bundle, density)]
         if len(fitting) == 1:
             return [Pair(fitting[0], bundle, Decided.MASS)]
-    doubt = ""
-    if bundle.row.has_mass and _shapes_differ(products):
-        doubt = (
-            f"{len(products)} different shapes are named “{products[0].name}” and the BOM has one mass "
-            "for all of them; each got it"
-        )
-    return [Pair(product, bundle, decided, doubt) for product in products]
+    return [Pair(product, bundle, decided) for product in products]
 
 
 def _settle(state: _Open, decided: Decided, fits: Callable[[Product, Bundle], bool]) -> None:
@@ -323,6 +317,24 @@ def _tiers(
             for pair in assign(same, theirs, table, density, claims.read):
                 claims.take(pair)
                 found[pair.product.key] = Match(pair.bundle, rule, pair.decided, pair.doubt)
+    return _with_doubtful_shapes(products, found)
+
+
+def _with_doubtful_shapes(products: Sequence[Product], found: dict[str, Match]) -> dict[str, Match]:
+    """A row has one mass; of the different shapes that got it, one at most can weigh that."""
+    by_row: dict[int, list[Product]] = defaultdict(list)
+    for product in products:
+        if product.key in found and found[product.key].row.has_mass and product.volume_m3 > 0:
+            by_row[id(found[product.key].row)].append(product)
+    for same in by_row.values():
+        if _shapes_differ(same):
+            names = listed(list(dict.fromkeys(product.name for product in same)))
+            words = (
+                f"{len(same)} different shapes are named {names} and the BOM has one mass for all of them; "
+                "each got it"
+            )
+            for key, match in ((p.key, found[p.key]) for p in same):
+                found[key] = replace(match, doubt=match.doubt or words)
     return found
 
 
@@ -341,6 +353,12 @@ def _finders(rows: Sequence[BOMEntry]) -> Iterable[tuple[Rule, Finder]]:
             return [row for row in rows if could_be(product.name, row.name)]
         return [row for row in lossy_rows if could_be(row.name, product.name)]
 
+    def one_mark(product: Product) -> list[BOMEntry]:
+        # Of two different marks ("1:5", "1:10") neither is an occurrence.
+        name = product.name
+        rows = by_bare.get(bare(name), ())
+        return [row for row in rows if plain(row.name) == bare(name) or plain(name) == bare(row.name)]
+
     def number(product: Product) -> list[BOMEntry]:
         # A product may be named by its number, or carry a number that the BOM shows as the name.
         keys = [plain(text) for text in (product.part_number, product.name) if _tells_apart(text)]
@@ -348,7 +366,7 @@ def _finders(rows: Sequence[BOMEntry]) -> Iterable[tuple[Rule, Finder]]:
 
     yield Rule.EXACT, lambda product: by_name.get(product.name, ())
     yield Rule.NORMALISED, lambda product: by_plain.get(plain(product.name), ())
-    yield Rule.NORMALISED, lambda product: by_bare.get(bare(product.name), ())
+    yield Rule.NORMALISED, one_mark
     yield Rule.WILDCARD, wildcard
     yield Rule.PART_NUMBER, number
 

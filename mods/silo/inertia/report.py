@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from silo.inertia.codes import Decided, Rule, Source
 from silo.inertia.types import InertialProperties
+from silo.inertia.wording import counted
 
 if TYPE_CHECKING:
     from silo.inertia.core import MassProps, TensorProblem
@@ -120,7 +121,7 @@ class LinkResult:
     problems: tuple[TensorProblem, ...] = ()
 
 
-@dataclass
+@dataclass(repr=False)
 class InertiaReport:
     """What a calculation found. Filled once, in a stable order: links as mapped, parts as placed.
 
@@ -161,8 +162,7 @@ class InertiaReport:
         """All warnings by link, in words."""
         if not self.warnings:
             return "No warnings: every part has its mass from the BOM."
-        count = len(self.warnings)
-        lines = [f"{count} {'warning' if count == 1 else 'warnings'}:"]
+        lines = [f"{counted(len(self.warnings), 'warning')}:"]
         by_link: dict[str, list[PartWarning]] = {}
         for warning in self.warnings:
             by_link.setdefault(warning.link_name, []).append(warning)
@@ -184,6 +184,11 @@ class InertiaReport:
     def bodies(self) -> dict[str, MassProps]:
         """Link → mass properties in the link's frame: numpy arrays, sums, moves, principal axes."""
         return {name: link.props for name, link in self.links.items()}
+
+    def __repr__(self) -> str:
+        mass = f", {self.total.mass:.6g} kg" if self.total is not None else ""
+        words = f"{counted(len(self.links), 'link')}{mass}, {counted(len(self.warnings), 'warning')}"
+        return f"InertiaReport({self.assembly!r}: {words})"
 
     def _repr_html_(self) -> str:
         """The links as a table, where a notebook shows it."""

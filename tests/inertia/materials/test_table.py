@@ -206,6 +206,10 @@ def test_no_alias_names_two_densities() -> None:
         for alias in (row.name, *row.aliases):
             other = seen.setdefault(words(alias), row)
             assert other is row, f"“{alias}” is {row.name} and {other.name}"
+    joined: dict[str, Material] = {}
+    for key, row in seen.items():
+        other = joined.setdefault("".join(key), row)
+        assert other.density == row.density, f"{key} is {row.name} and {other.name} when written as one word"
 
 
 def test_user_table_wins(tmp_path: Path) -> None:
@@ -398,3 +402,66 @@ def test_short_words_do_not_make_a_material_of_a_mixture(text: str) -> None:
     """The new names are short; a mixture stays unknown, or in doubt."""
     found = load_materials(freecad=False).find(text)
     assert not isinstance(found, MaterialHit) or found.doubt
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("Gold anodized", "silver painted", "Titanium white", "Carbon black", "Nickel grey", "gold colour"),
+        *(
+            "metal PLA",
+            "PLA - metal",
+            "Steel with plastic",
+            "plastic coated steel",
+            "Gold 18k",
+            "Tungsten alloy",
+        ),
+        *("Steel?", "~Steel", "Steel (?)", "≈ brass", "Stahl geh?rtet"),
+    ],
+)
+def test_words_that_deny_a_material_leave_a_doubt(materials: MaterialTable, text: str) -> None:
+    """A colour, a class of other materials, an alloy of a pure one, a question mark."""
+    found = materials.find(text)
+    assert isinstance(found, MaterialHit)
+    assert found.doubt
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("Steel coated with rubber", "Rubber coated steel", "PVC coated steel", "Steel TiN coated"),
+        *("Aluminium, gold anodized", "PEEK 450CA30", "PA12 30GL", "coated with steel", "plated in gold"),
+    ],
+)
+def test_coats_that_count_and_fills_are_no_material(materials: MaterialTable, text: str) -> None:
+    assert isinstance(materials.find(text), MaterialMiss)
+
+
+@pytest.mark.parametrize(
+    ("text", "density"),
+    [
+        *(
+            ("Steel plated with zinc", 7850),
+            ("Steel coated in nickel, painted", 7850),
+            ("Metal: Steel", 7850),
+        ),
+        *(("Copper, silver plated", 8960), ("Brass nickel plated", 8500), ("Carbon fiber black", 1600)),
+        *(("Titanium Grade 5 black anodized", 4430), ("copper natural", 8960), ("plastic ABS", 1050)),
+        *(("GG-25", 7200), ("AISI316L", 8000), ("EN-AW 6082-T6", 2700), ("C 45", 7850), ("SUS440C", 7700)),
+        *(("TiN", 5220), ("TIN", 7290), ("4140", 7850), ("8.8", 7850), ("Duralumin", 2780), ("ADC12", 2710)),
+        *(("Soft PVC", 1250), ("Ultem 2300", 1510), ("silicon steel", 7650), ("zn plated steel", 7850)),
+    ],
+)
+def test_platings_grades_and_spellings(materials: MaterialTable, text: str, density: float) -> None:
+    """What is known is said without a doubt."""
+    found = materials.find(text)
+    assert isinstance(found, MaterialHit)
+    assert (found.material.density, found.doubt) == (density, "")
+
+
+@pytest.mark.parametrize("text", ["Air", "FEB", "Pb", "XY", "PZ"])
+def test_short_texts_are_like_nothing(materials: MaterialTable, text: str) -> None:
+    """Three letters are near to any three others; "Air" is no "acier"."""
+    found = materials.find(text)
+    assert isinstance(found, MaterialMiss)
+    assert found.nearest is None

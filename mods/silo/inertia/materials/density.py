@@ -7,6 +7,7 @@ import math
 import re
 from typing import NamedTuple
 
+from silo.bom.errors import InputError
 from silo.bom.numbers import LONGEST, parse_number, plain, plain_text, read_number
 from silo.inertia.bom.masses import MASS_UNITS
 
@@ -15,6 +16,9 @@ LIGHTEST = 5.0
 
 DENSEST = 23_000.0
 """[kg/m^3] nothing that parts are made of is denser (osmium has 22 590)."""
+
+UNIT_NEEDED_BELOW = 25.0
+"""[kg/m^3] a number below this needs its unit: who writes 7.85 alone means g/cm³."""
 
 _VOLUMES = {"m": 1.0, "dm": 1e-3, "cm": 1e-6, "mm": 1e-9, "in": 0.0254**3, "ft": 0.3048**3, "l": 1e-3}
 _SHAPE = re.compile(
@@ -32,6 +36,16 @@ class DensityCell(NamedTuple):
     value: float | None
     problem: str = ""
     has_unit: bool = False
+
+
+def checked_density(value: float) -> float:
+    """A density that a caller gives as a number [kg/m^3]. InputError where it is not that of a solid."""
+    if UNIT_NEEDED_BELOW <= value <= DENSEST:
+        return value
+    hint = f"; {value:g} g/cm³ are {value * 1000:g} kg/m³" if 0.01 < value < UNIT_NEEDED_BELOW else ""
+    raise InputError(
+        f"wanted a default density from {UNIT_NEEDED_BELOW:g} to {DENSEST:g} kg/m³, got {value:g}{hint}"
+    )
 
 
 def unit_factor(unit: str) -> float | None:

@@ -14,12 +14,9 @@ from typing import Any
 
 from silo.bom.errors import ConfigError
 from silo.bom.numbers import parse_number
-from silo.inertia.materials.density import read_density, unit_factor
+from silo.inertia.materials.density import UNIT_NEEDED_BELOW, read_density, unit_factor
 from silo.inertia.materials.table import Material
 from silo.inertia.materials.words import Words, words
-
-UNIT_NEEDED_BELOW = 25.0
-"""[kg/m^3] a user's number below this needs its unit: who writes 7.85 alone means g/cm³."""
 
 
 @cache

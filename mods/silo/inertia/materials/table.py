@@ -10,7 +10,15 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
 
-from silo.inertia.materials.words import Words, compound, find, not_understood, uncovered, words
+from silo.inertia.materials.words import (
+    Words,
+    compound,
+    contradiction,
+    find,
+    not_understood,
+    uncovered,
+    words,
+)
 
 
 class Found(StrEnum):
@@ -117,10 +125,13 @@ class _Index:
                 key = words(alias)
                 if key:
                     self.exact.setdefault(key, row)
+        self._joined = {"".join(key): row for key, row in reversed(self.exact.items())}
         self._single = frozenset(key[0] for key in self.exact if len(key) == 1)
 
     def find(self, tokens: Words) -> MaterialHit | MaterialMiss:
         equal = self.exact.get(tokens)
+        if equal is None and not (joined := "".join(tokens)).isdecimal():
+            equal = self._joined.get(joined)  # "GG-25", "AISI316L"
         if equal is not None:
             return MaterialHit(equal, Found.NAME)
         text = uncovered(tokens, self._single)
@@ -139,13 +150,12 @@ class _Index:
             return MaterialMiss(f"“{turn}” makes it something else than {left[0].name}", left[0])
         if len({row.density for row in left}) > 1:
             return MaterialMiss("it names more than one material: " + " and ".join(row.name for row in left))
+        start, end = next((start, end) for start, end, row in hits if row is left[0])
+        doubt = contradiction(left[0].name, text[start:end], left[0].density, tokens, rest)
         strange = not_understood(rest)
-        if not strange:
-            return MaterialHit(left[0], Found.WORDS)
-        shown = " ".join(strange)
-        return MaterialHit(
-            left[0], Found.WORDS, f"“{shown}” in it is not understood, and may make it another"
-        )
+        if strange and not doubt:
+            doubt = f"“{' '.join(strange)}” in it is not understood, and may make it another"
+        return MaterialHit(left[0], Found.WORDS, doubt)
 
     def _hits(self, text: Words) -> list[tuple[int, int, Material]]:
         hits = [
@@ -166,6 +176,8 @@ class _Index:
     def _alike(self, tokens: Words) -> Material | None:
         """The row with the most similar spelling and the same digits: 6063 is another alloy than 6061."""
         wanted = " ".join(tokens)
+        if len(wanted) < 4:
+            return None  # "Air" is not like "acier"
         digits = re.sub(r"\D+", " ", wanted)
         names = {" ".join(key): row for key, row in self.exact.items()}
         near = (name for name in difflib.get_close_matches(wanted, names, n=5, cutoff=0.75))

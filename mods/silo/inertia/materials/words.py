@@ -18,8 +18,8 @@ from silo.bom.numbers import plain_text
 
 Words = tuple[str, ...]
 
-# A number keeps its point (1.4301, A356.0), a percent sign counts; everything else separates words.
-_WORD = re.compile(r"[^\W_]+(?:\.\d+)*|%")
+# A number keeps its point (1.4301, A356.0); percent signs and marks of doubt count; all else separates.
+_WORD = re.compile(r"[^\W_]+(?:\.\d+)*|[%?~≈]")
 
 _COMPOUNDS = {
     "foam", "foamed", "foaming", "schaum", "sponge", "honeycomb", "wabe", "porous", "expanded", "lw",
@@ -36,7 +36,7 @@ _COMPOUNDS = {
     "fibre", "fibers", "fibres", "faser", "chips", "flakes", "dust", "whisker", "nano",
 }  # fmt: skip
 _COMPOUND_SHAPES = re.compile(
-    r"(?:cf|gf|gk|md|mf|td)\d{1,2}|\d{1,2}(?:cf|gf|gk)|t[1-4]0"
+    r"\d*(?:ca|cf|gb|gf|gk|gl|md|mf|td)\d{1,2}|\d{1,2}(?:ca|cf|gb|gf|gk|gl)|t[1-4]0"
     r"|\w+fills?|\w+filled|\w+gefüllt|\w+verstärkt|\w+schaum"
 )
 # "zinc plated steel" is steel: the word before is what lies on it.
@@ -57,8 +57,22 @@ _COVERS = {
 _COATS = {
     "powder", "chrome", "chromium", "epoxy", "paint", "enamel", "lacquer", "oxide", "pvd", "dlc", "e",
     "ptfe", "teflon", "hard", "black", "white", "zinc", "nickel", "nitride", "conversion", "chromate",
-    "phosphate", "cadmium", "clear", "wax", "oil", "rubber", "pvc", "plastic",
+    "phosphate", "cadmium", "clear", "wax", "oil",
 }  # fmt: skip
+# These lie so thick on a part that they count.
+_THICK = {
+    "rubber",
+    "gummi",
+    "pvc",
+    "plastic",
+    "kunststoff",
+    "silicone",
+    "silikon",
+    "pu",
+    "polyurethane",
+    "foam",
+}
+_WITH = {"with", "in", "by", "mit", "avec", "con"}
 _FINISHES = (("black", "oxide"), ("oxide", "finish"), ("hot", "dip"), ("hot", "dipped"))
 
 _COLOURS = {
@@ -96,10 +110,25 @@ _PLAIN_WORDS = {
 }  # fmt: skip
 _HARMLESS = _COLOURS | _PLAIN_WORDS
 
+_PLASTIC = {"plastic", "plastics", "kunststoff", "thermoplastic", "elastomer", "polyamide"}
+_METALLIC = {"metal", "alloy", "legierung", "alliage"}
+# Materials that name a colour as well, and what makes a colour of them.
+_COLOUR_METALS = {
+    "gold", "silver", "silber", "bronze", "copper", "kupfer", "titanium", "titan", "carbon", "nickel",
+}  # fmt: skip
+_HUES = {
+    "black", "white", "grey", "gray", "red", "green", "blue", "yellow", "orange", "brown", "pink", "color",
+    "colour", "coloured", "colored", "farbe", "schwarz", "weiß", "weiss", "grau", "rot", "blau", "gelb",
+}  # fmt: skip
+_DYED = {"anodized", "anodised", "eloxiert", "painted", "lackiert", "anodisé", "anodizado"}
+# Their alloys and carats are far lighter.
+_PURE = {"gold", "tungsten"}
+
 
 def words(text: str) -> Words:
     """The words of a material's name in plain characters, case-folded; a percent sign is one."""
-    return tuple(_WORD.findall(plain_text(text).casefold()))
+    # The only symbol that is another material without its capitals.
+    return tuple(_WORD.findall(plain_text(re.sub(r"\bTiN\b", "titanium nitride", text)).casefold()))
 
 
 def uncovered(text: Words, known: Set[str]) -> Words:
@@ -109,12 +138,16 @@ def uncovered(text: Words, known: Set[str]) -> Words:
         words that name a material by themselves.
     """
     kept: list[str] = []
-    for word in text:
+    with_what = False
+    for index, word in enumerate(text):
+        if with_what and word not in _THICK and (word in known or word in _COATS or word in _WITH):
+            continue
+        with_what = word in _COVERS_WITH and bool(_WITH & set(text[index + 1 : index + 2]))
         if word in _COVERS or (kept and (kept[-1], word) in _FINISHES):
             if word not in _COVERS:
                 kept.pop()
         elif word in _COVERS_WITH:
-            if kept and (kept[-1] in known or kept[-1] in _COATS):
+            if kept and not with_what and kept[-1] not in _THICK and (kept[-1] in known | _COATS):
                 kept.pop()
         else:
             kept.append(word)
@@ -129,8 +162,29 @@ def compound(rest: Words) -> str | None:
 def not_understood(rest: Words) -> Words:
     """The words that may make something else of a material: no colour, form, treatment or grade."""
     return tuple(
-        word for word in rest if len(word) > 1 and word not in _HARMLESS and not re.search(r"\d", word)
+        word
+        for word in rest
+        if word in "?~≈" or (len(word) > 1 and word not in _HARMLESS and not re.search(r"\d", word))
     )
+
+
+def contradiction(name: str, hit: Words, density: float, text: Words, rest: Words) -> str:
+    """Why the words around a material deny it, in words that end a sentence; "" where they do not.
+
+    name, hit, density
+        the material [kg/m^3], and the words that it was found by.
+    text, rest
+        all words, and those that are not ``hit`` and no platings.
+    """
+    words_around = set(rest)
+    for kind, wrong in ((_PLASTIC, density > 2300), (_METALLIC, density < 1700)):
+        if wrong and kind & words_around:
+            return f"“{min(kind & words_around)}” in it is not said of {name}"
+    if len(hit) == 1 and hit[0] in _COLOUR_METALS and (_HUES & words_around or _DYED & set(text)):
+        return f"“{hit[0]}” in it may be a colour"
+    if name in _PURE and rest:
+        return f"“{' '.join(rest)}” in it may be an alloy or another purity"
+    return ""
 
 
 def find(needle: Words, hay: Words) -> int | None:
