@@ -31,6 +31,7 @@ def test_the_table(told: dict[str, Any]) -> None:
     assert second[6] == "no material with a density"
     assert told["texts"][0] == "94.8 g in 3 pieces, centre of mass at 5.00, 10.00, 45.00 mm"
     assert told["texts"][1] == "1 part has no mass; it is missing from the sum."
+    assert told["empty"] == ["No part of this assembly has a material with a density."]
 
 
 def test_the_clipboard_is_for_a_spreadsheet(told: dict[str, Any]) -> None:

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.workbench import words
-from silo.workbench.words import breakable, counted, plain, quantity, tip, visible
+from silo.workbench.words import breakable, counted, plain, quantity, tip, told_apart, visible
 
 
 @pytest.mark.parametrize(
@@ -105,3 +105,25 @@ def test_a_long_word_can_be_broken_anywhere_sensible() -> None:
     found = breakable(text)
     assert found.replace("\u200b", "") == text
     assert max(map(len, re.split("[ \u200b]", found))) <= 26
+
+
+def test_files_of_one_name_are_told_apart_by_their_folders() -> None:
+    """As many of them as it takes; one file in several rows needs none."""
+    same = [
+        "/p/a/Lid.FCStd",
+        "/p/b/Lid.FCStd",
+        "/q/b/Lid.FCStd",
+        "/p/Box.FCStd",
+        "/p/Box.FCStd",
+        "",
+        "Lid.FCStd",
+    ]
+    assert list(told_apart(same).values()) == [
+        "Box.FCStd",
+        "",
+        "Lid.FCStd",
+        "a/Lid.FCStd",
+        "p/b/Lid.FCStd",
+        "q/b/Lid.FCStd",
+    ]
+    assert told_apart(["C:\\\\v\\\\a\\\\Lid.FCStd"]) == {"C:\\\\v\\\\a\\\\Lid.FCStd": "Lid.FCStd"}

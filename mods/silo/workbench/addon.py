@@ -317,11 +317,11 @@ class AddOn:
         from silo.workbench.revisions.dialog import HistoryDialog
 
         doc = host.active_document()
-        if doc is None or not doc.FileName:
+        if doc is None:
             return
         identity = self.desk.identity(doc)
-        if not identity:
-            name = plain(os.path.basename(doc.FileName), 80)
+        if not doc.FileName or not identity:
+            name = plain(os.path.basename(doc.FileName) or doc.Label, 80)
             text = translate("Silo", "{name} has no Silo part number yet. Register it first.")
             self.desk.warn(translate("Silo", "History"), text.replace("{name}", name))
             return

@@ -9,7 +9,8 @@ is that function, elsewhere the text stays as it is. What comes from files and s
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Iterable
 
 Translate = Callable[[str, str], str]
 
@@ -37,6 +38,19 @@ def plain(text: str, most: int = 200) -> str:
     head = text[: most * 4]
     shown = " ".join("".join(" " if unicodedata.category(c) in _HIDDEN else c for c in head).split())
     return shown if len(shown) <= most and len(text) <= most * 4 else shown[: most - 1].rstrip() + "…"
+
+
+def told_apart(paths: Iterable[str]) -> dict[str, str]:
+    """Path → the file's name; with as many of its folders as it takes where several have that name."""
+    left, shown, depth = {path: path.replace("\\", "/").split("/") for path in paths}, {}, 0
+    while left:
+        depth += 1
+        tails = {path: "/".join(parts[-depth:]) for path, parts in left.items()}
+        times = Counter(tails.values())
+        alone = {path: tail for path, tail in tails.items() if times[tail] == 1 or depth >= len(left[path])}
+        shown |= alone
+        left = {path: parts for path, parts in left.items() if path not in alone}
+    return shown
 
 
 # Longer words get places where a line may end.

@@ -78,6 +78,11 @@ def table() -> None:
     tell(copied=QtWidgets.QApplication.clipboard().text())
     found.close()
     wait(lambda: window() is None)
+    App.newDocument("Empty")
+    Gui.runCommand("Silo_Mass")
+    tell(empty=labels(wait(window)))
+    window().close()
+    wait(lambda: window() is None)
 
 
 def long_one() -> None:

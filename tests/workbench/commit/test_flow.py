@@ -59,7 +59,7 @@ def test_a_document_that_was_closed_meanwhile_stops_no_other(office: Office, flo
     office.settle()
     assert [sent.entry.label for sent in office.sent] == ["Fine", "Later"]
     (lost,) = [e for e in office.session.shown.activity.entries if e.title == "Not committed: Gone"]
-    assert "ReferenceError" in lost.lines[0].text
+    assert "closed before it was saved" in lost.lines[0].text
     assert not flow.running
 
 

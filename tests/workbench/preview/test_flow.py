@@ -55,6 +55,21 @@ def test_compare_sync_and_compare_again(office: Office, flow: PreviewFlow, top: 
     assert not window.filled[1].top.diff.drifted
 
 
+def test_a_closed_document_is_reported_in_its_window(
+    office: Office, flow: PreviewFlow, top: Document
+) -> None:
+    """Comparing again, with Silo and with the 3D view, needs it; a sync of what is shown does not."""
+    flow.start(top)
+    office.settle()
+    (window,) = office.desk.previews
+    office.desk.open.remove(top)
+    window.wishes.refresh()
+    window.wishes.verify(window.filled[0])
+    assert [str(error) for error in window.failed] == [
+        "Top.FCStd is not open any more. Open it, then compare again."
+    ] * 2
+
+
 def test_one_window_per_document(office: Office, flow: PreviewFlow, top: Document) -> None:
     """It comes to the front; closed, a new one is opened."""
     flow.start(top)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -16,7 +15,7 @@ from silo.workbench.commit.theirs import Choice, Theirs, choice_texts, line_text
 from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QShortcut, QtCore, QtGui, QtWidgets
 from silo.workbench.pane.activity import Tone
-from silo.workbench.words import counted, plain, tip, translate
+from silo.workbench.words import counted, plain, tip, told_apart, translate
 
 _CHOICE = 2
 # Lines of a BOM difference; the rest is one press away, and the other files stay in sight.
@@ -98,8 +97,9 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         tree.setWordWrap(True)
         tree.itemChanged.connect(lambda _item, _column: self._update_commit())
         tree.setSelectionMode(QtWidgets.QAbstractItemView.SelectionMode.NoSelection)
+        names = told_apart(row.path for row in self._plan.rows)
         for number, row in enumerate(self._plan.rows):
-            item = QtWidgets.QTreeWidgetItem([plain(os.path.basename(row.path) or row.label, 80), row.note])
+            item = QtWidgets.QTreeWidgetItem([plain(names[row.path] or row.label, 80), row.note])
             item.setToolTip(0, tip(row.path))
             item.setToolTip(1, tip(row.note))
             item.setData(0, QtCore.Qt.ItemDataRole.UserRole, number)

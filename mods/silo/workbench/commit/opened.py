@@ -13,9 +13,17 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
-from silo.durable import Stamp, stamp_of
+if TYPE_CHECKING:
+    from silo.durable import Stamp
+
+
+def stamp_of(path: str) -> Stamp | None:
+    """What changes when a file is written; None where there is none. FreeCAD's start does not import it."""
+    from silo.durable import stamp_of as found
+
+    return found(path)
 
 
 class Origins(Protocol):

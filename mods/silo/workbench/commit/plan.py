@@ -289,7 +289,10 @@ class Taker:
                 taken = self._one(row)
             except SiloError as error:
                 taken = Taken(row, error=error)
-            except Exception as error:  # noqa: BLE001  # such as the ReferenceError of a document that was closed
+            except ReferenceError:
+                text = translate("Silo", "It was closed before it was saved: open it and commit it again.")
+                taken = Taken(row, error=SiloError(text))
+            except Exception as error:  # noqa: BLE001  # one document's trouble is not that of the others
                 problem = f"unexpected problem ({type(error).__name__}: {error})"
                 taken = Taken(row, error=SiloError(problem))
             yield taken

@@ -120,7 +120,8 @@ def _stored(obj: Any, name: str) -> Any:
     (measured in FreeCAD 1.0 and 1.1): FreeCAD takes every call of a value that it handed out as an attribute
     for a change of it. A value got by name is nobody's.
     """
-    if name not in obj.PropertiesList:
+    # A document without an assembly stands for itself, and has none of these.
+    if name not in getattr(obj, "PropertiesList", ()):
         return None
     return getattr(obj, "real", obj).getPropertyByName(name)
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -14,7 +15,7 @@ from silo.workbench.commit.snapshot import Snapshot
 from silo.workbench.preview.rows import Preview, ask, to_sync
 from silo.workbench.preview.window import PreviewDesk, Window, Wishes
 from silo.workbench.session.session import Session
-from silo.workbench.words import translate
+from silo.workbench.words import plain, translate
 
 # Of many sub-assemblies that differ, the first ones.
 _MOST_ACCOUNTS = 4
@@ -56,9 +57,18 @@ class PreviewFlow:
 
     def again(self, path: str) -> None:
         """Compare anew where a window is open: what it shows has changed."""
-        doc = self._desk.find(path)
-        if path in self._open and doc is not None and (taken := self._take(doc)) is not None:
+        if path in self._open and (taken := self._taken_again(path)) is not None:
             self._ask(taken)
+
+    def _taken_again(self, path: str) -> Snapshot | None:
+        """The document of an open window as it is now; the window says where it was closed."""
+        doc = self._desk.find(path)
+        if doc is None:
+            text = translate("Silo", "{name} is not open any more. Open it, then compare again.")
+            error = SiloError(text.replace("{name}", plain(os.path.basename(path), 80)))
+            self._with_dialog(path, lambda dialog: dialog.fail(error))
+            return None
+        return self._take(doc)
 
     def _take(self, doc: Any) -> Snapshot | None:
         try:
@@ -106,8 +116,7 @@ class PreviewFlow:
     def _verify(self, preview: Preview) -> None:
         """Compare what FreeCAD shows with the BOM as it is now, and select what no line explains."""
         path = preview.snapshot.path
-        doc = self._desk.find(path)
-        taken = self._take(doc) if doc is not None else None
+        taken = self._taken_again(path)
         if taken is None or taken.extraction is None:
             return
         try:

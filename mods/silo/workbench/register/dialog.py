@@ -29,7 +29,7 @@ from silo.workbench.register.rows import (
     type_words,
 )
 from silo.workbench.register.window import Wishes
-from silo.workbench.words import plain, tip, translate
+from silo.workbench.words import plain, tip, told_apart, translate
 
 # Rows have buttons, and nobody decides on a thousand parts at once; the next ones come after these.
 MOST_ROWS = 400
@@ -151,7 +151,9 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
             code: f"{code} {plain(text, 60)}".strip() for code, text in offer.categories.items()
         }
         self._drawn.clear()
-        self._rows = [EditedRow.of(candidate) for candidate in offer.candidates[:MOST_ROWS]]
+        candidates = offer.candidates[:MOST_ROWS]
+        names = told_apart(candidate.entry.doc_path for candidate in candidates)
+        self._rows = [EditedRow.of(one, names[one.entry.doc_path]) for one in candidates]
         self._filling = True
         self._lay_out()
         for number, row in enumerate(self._rows):

@@ -61,6 +61,8 @@ def state_words() -> dict[State, str]:
 class EditedRow:
     """A component with what the person chose for it.
 
+    file
+        the name of its file, such that no other row has it.
     number
         NEW for a new item, else the part number of an item to join. A copied identity begins with ASK, until
         the person says NEW or SAME (keep it).
@@ -72,13 +74,14 @@ class EditedRow:
     name: str
     item_type: str
     category: str
+    file: str
     number: str = NEW
     checked: bool = True
     running: bool = False
     result: Registration | None = None
 
     @classmethod
-    def of(cls, candidate: Candidate) -> EditedRow:
+    def of(cls, candidate: Candidate, file: str = "") -> EditedRow:
         """A row as it is offered."""
         proposal = candidate.proposal
         return cls(
@@ -86,6 +89,7 @@ class EditedRow:
             name=proposal.name,
             item_type=proposal.item_type,
             category=proposal.category,
+            file=file or os.path.basename(candidate.entry.doc_path),
             number=ASK if candidate.same_as else NEW,
             checked=candidate.wanted,
         )
@@ -160,8 +164,7 @@ class EditedRow:
             text = plain(entry.label, 60)
             copies = translate("Silo", "{name} ({n} copies)").replace("{n}", str(len(article.objects)))
             return copies.replace("{name}", text) if len(article.objects) > 1 else text
-        file = os.path.basename(entry.doc_path)
-        return plain(f"{file} · {entry.label}" if self.candidate.shares_file else file, 80)
+        return plain(f"{self.file} · {entry.label}" if self.candidate.shares_file else self.file, 80)
 
     def number_text(self, numbers: Mapping[str, str], taken: int) -> str:
         """The number that it has, or would get; ``taken`` rows before it want one of the same category."""
