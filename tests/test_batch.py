@@ -3,16 +3,26 @@
 
 from __future__ import annotations
 
+import os
+import re
+import shutil
+import subprocess
 from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from markdown_it import MarkdownIt
 
 from silo.batch import Options, TopResult, stopped_by, sync_top
-from silo.bom.errors import AuthError, DocumentError, NotFoundError, SiloError
+from silo.batch_report import cell
+from silo.bom.errors import AuthError, DocumentError, InputError, NotFoundError, SiloError
 from silo.bom.model import BomEntry, Extraction
 from silo.bom_sync import Status
+from silo.fcstd import Library
 from silo.files import documents_in
+from silo.folders import scratch_folder
 from silo.testing import FakeSilo
 
 
@@ -41,6 +51,114 @@ def test_a_folder_is_its_documents_without_backups_and_what_is_ignored(tmp_path:
     assert found() == everything
     (tmp_path / ".siloignore").write_text("# what nobody orders\n/old/\n*trial*\n!keep*\ndeep/**\n")
     assert found() == ["a.FCStd", "b.fcstd", "x/keep trial.FCStd", "x/old/d.FCStd"]
+
+
+NAMES = ("a", "b", "old", "a b", "x[1]", "T.FCStd", "u.fcstd", "T .FCStd", "#q.FCStd", "!n.FCStd", "B.FCStd")
+PATTERNS = (
+    *(
+        "a",
+        "a/",
+        "/a",
+        "b/*",
+        "!b/T.FCStd",
+        "*.FCStd",
+        "!T.FCStd",
+        "**/old",
+        "old/**",
+        "a/**/T.FCStd",
+        "T.FCStd ",
+    ),
+    *(
+        "T\\ .FCStd",
+        "T .FCStd",
+        "\\#q.FCStd",
+        "#q.FCStd",
+        "\\!n.FCStd",
+        "!n.FCStd",
+        "x[1]",
+        "x[[]1]",
+        "?.FCStd",
+    ),
+    *("[a-b]", "", "   ", "/", "//", "a//b", "*", "/*", "!*/", "!/a", "[", "**", "!a/", "*/T.FCStd", "a\\ b"),
+    *("*.[Ff][cC]std", "a**", "!old", "{a,b}", "a/.", "./a", "a/../b", "\x0cT.FCStd", "T.FCStd\r", "\ufeffa"),
+)
+
+
+@pytest.mark.skipif(shutil.which("git") is None, reason="git is not on this machine")
+@pytest.mark.usefixtures("needs_case")
+@pytest.mark.filterwarnings("ignore::FutureWarning")
+@settings(max_examples=25, deadline=None)
+@given(
+    folders=st.lists(st.lists(st.sampled_from(NAMES[:5]), max_size=3), min_size=1, max_size=5),
+    names=st.lists(st.sampled_from(NAMES[5:]), min_size=1, max_size=6),
+    rules=st.lists(st.lists(st.sampled_from(PATTERNS), min_size=1, max_size=4), min_size=1, max_size=3),
+)
+def test_what_is_ignored_is_what_git_would_ignore(
+    folders: list[list[str]], names: list[str], rules: list[list[str]]
+) -> None:
+    """Files of patterns in several folders; the oracle is git with the same files under its own name."""
+    with scratch_folder("silo-ignore-") as scratch:
+        base = Path(scratch)
+        subprocess.run(["git", "init", "-q", base], check=True)
+        for number, steps in enumerate(folders):
+            folder = base.joinpath(*steps)
+            folder.mkdir(parents=True, exist_ok=True)
+            for name in names:
+                (folder / name).touch()
+            if number < len(rules):
+                for file in (".gitignore", ".siloignore"):
+                    (folder / file).write_bytes("\n".join(rules[number]).encode())
+        command = ["git", "-C", base, "ls-files", "-oz", "--exclude-per-directory=.gitignore"]
+        listed = subprocess.run(command, capture_output=True, check=True).stdout.split(b"\0")
+        wanted = {os.fsdecode(name) for name in listed if name.lower().endswith(b".fcstd")}
+        assert {Path(one).relative_to(base).as_posix() for one in documents_in([scratch])} == wanted
+
+
+def test_patterns_that_nobody_can_read_are_an_error(tmp_path: Path) -> None:
+    """Git would leave them out without a word; a comment in another encoding is none of them."""
+    (tmp_path / "a.FCStd").touch()
+    (tmp_path / ".siloignore").write_bytes(b"# f\xfcr Gro\xdfe\n\xfc.FCStd\n")
+    assert len(documents_in([str(tmp_path)])) == 1
+    (tmp_path / ".siloignore").write_text("old/\n!\n")
+    with pytest.raises(InputError, match=r"\.siloignore cannot be read"):
+        documents_in([str(tmp_path)])
+
+
+def test_what_was_deleted_or_belongs_to_the_system_is_left_out(tmp_path: Path) -> None:
+    """A deleted assembly in a recycle bin has the identity of the one that took its place."""
+    bins = (".Trash-1000/files", "#recycle", "$RECYCLE.BIN/S-1", ".snapshot/daily", "sub/@Recycle")
+    for name in ("T.FCStd", *(f"{folder}/T.FCStd" for folder in bins), "._T.FCStd", ".#T.FCStd"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).touch()
+    assert documents_in([str(tmp_path)]) == [str(tmp_path / "T.FCStd")]
+    hidden = tmp_path / ".Trash-1000"
+    assert documents_in([str(hidden)]) == [str(hidden / "files/T.FCStd")], "asked for by name"
+
+
+@pytest.mark.usefixtures("needs_symlinks")
+def test_what_cannot_be_listed_or_followed_is_not_left_out(tmp_path: Path) -> None:
+    """A folder without its files, or a link to a file that was not fetched, must not read as in order."""
+    (tmp_path / "link.FCStd").symlink_to("annex/not-here")
+    (tmp_path / "loop.FCStd").symlink_to("loop.FCStd")
+    name = "n" * 200
+    try:
+        deep = os.open(tmp_path, os.O_RDONLY)
+        for _ in range(25):  # deeper than a path may be long
+            os.mkdir(name, dir_fd=deep)
+            inner = os.open(name, os.O_RDONLY, dir_fd=deep)
+            os.close(deep)
+            deep = inner
+        os.close(deep)
+    except (OSError, NotImplementedError):
+        pytest.skip("this system makes no folders that deep")
+    found = documents_in([str(tmp_path)])
+    assert found[:2] == [str(tmp_path / "link.FCStd"), str(tmp_path / "loop.FCStd")]
+    (lost,) = found[2:]
+    assert lost.endswith(name)
+    for path in found:
+        with pytest.raises(DocumentError):
+            Library().open(path)
+    shutil.rmtree(tmp_path / name)
 
 
 def extraction(silo: FakeSilo, folder: Path, *, gone: str = "") -> Extraction:
@@ -105,3 +223,22 @@ def test_no_token_is_shown_in_a_repr() -> None:
 
     values: list[Any] = [Known("u", "silo_x"), Server("u", "silo_x"), Wanted("u", "silo_x", True)]
     assert all("silo_x" not in repr(value) for value in values)
+
+
+@given(st.text(st.sampled_from("ab1 |`*_[]()<>#@&;~$\\-+.!\n\t\x00\u202e\ud800é:"), max_size=30))
+@settings(max_examples=200, deadline=None)
+def test_text_of_others_is_shown_in_markdown_and_does_nothing(text: str) -> None:
+    """In a table, a list and a heading; the oracle is a reader of Markdown. Nobody is notified by a name."""
+    shown = " ".join("".join(c if c.isprintable() else " " for c in text).split())
+    assume(shown)
+    for before, kind in (("| | x |\n|---|---|\n| y | ", "table"), ("- ", "list_item"), ("### ", "heading")):
+        written = f"{before}{cell(text)}{' |' if kind == 'table' else ''}\n"
+        assert written.count("\n") == before.count("\n") + 1
+        tokens = MarkdownIt("commonmark").enable(["table", "strikethrough"]).parse(written)
+        opened = ("table_open", "list_item_open", "heading_open", "code_block", "hr")
+        assert [token.type for token in tokens if token.type in opened] == [f"{kind}_open"]
+        said = [token for token in tokens if token.type == "inline"][-1].children or []
+        assert {token.type for token in said} <= {"text", "text_special"}
+        words = "".join(token.content for token in said)
+        assert not re.search(r"[@#]\w", words)
+        assert " ".join(words.replace("\u200b", "").split()) == shown

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
@@ -37,11 +38,13 @@ _WORDS = {
 
 
 def cell(text: str) -> str:
-    """Text of others as a table cell: one line, no markup."""
-    text = "".join(c if c.isprintable() else " " for c in text)
-    for sign in "\\`*_[]<>|#":
-        text = text.replace(sign, "\\" + sign)
-    return text
+    """Text of others as Markdown that shows it and does nothing: one line, no markup, nobody is notified.
+
+    On GitHub ``@team`` and ``#12`` mean somebody, escaped or not; a space without width parts them.
+    """
+    text = "".join(c if c.isprintable() else " " for c in text).strip().replace("&", "&amp;")
+    text = re.sub(r"([@#])(?=\w)", "\\1\u200b", text)
+    return re.sub(r"([\\\\`*_\[\]<>|~$#])|^(\d*)([-+.)=])", r"\2\\\1\3", text)
 
 
 @dataclass

@@ -6,7 +6,8 @@ from __future__ import annotations
 import glob
 import hashlib
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from codecs import BOM_UTF8
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 
@@ -15,11 +16,15 @@ from silo.spelling import Spelling
 
 IGNORE_FILE = ".siloignore"
 
+Check = Callable[[str], bool | None]
+
 
 def documents_in(tops: Iterable[str]) -> list[str]:
-    """The files that are meant, each once: a folder stands for all FCStd files below it, backups left out.
+    """The files that are meant, each once: a folder stands for all FCStd files below it.
 
-    What the folder's ``.siloignore`` names (in the syntax of ``.gitignore``) is left out. A pattern
+    Left out are backups, hidden files and folders, recycle bins, and what a ``.siloignore`` in the folder or
+    below it names (in the syntax of ``.gitignore``). A folder that cannot be listed is in the result itself,
+    so that whoever reads the files reports it. A pattern
     (``*.FCStd``) stands for what fits it: the shells of Windows hand patterns over as they are. InputError
     names all that is not there.
     """
@@ -31,6 +36,7 @@ def documents_in(tops: Iterable[str]) -> list[str]:
         real = spelling.real(top)  # a file may be named in several ways
         if not os.path.isdir(top):
             once.setdefault(real, top)
+            continue
         for path in sorted(_below(top)):
             once.setdefault(os.path.join(real, os.path.relpath(path, top)), path)
     return list(once.values())
@@ -49,22 +55,51 @@ def _quoted(path: str) -> str:
     return path if path.strip() else repr(path)
 
 
-def _below(folder: str) -> Iterator[str]:
-    ignored = _ignored(os.path.join(folder, IGNORE_FILE))
-    for here, folders, names in os.walk(folder):
-        inner = os.path.relpath(here, folder)
-        inner = "" if inner == os.curdir else inner.replace(os.sep, "/") + "/"
-        folders[:] = sorted(name for name in folders if name != ".git" and not ignored(f"{inner}{name}/"))
-        for name in names:
-            path = os.path.join(here, name)
-            if name.lower().endswith(".fcstd") and not ignored(inner + name) and os.path.isfile(path):
+# What file systems and file managers keep beside the files of people: what was deleted, and older states.
+_NOT_OURS = ("#recycle", "#snapshot", "$recycle.bin", "@recycle", "@recently-snapshot", "~snapshot")
+
+
+def _below(folder: str, rules: tuple[tuple[int, Check], ...] = (), inner: str = "") -> Iterator[str]:
+    """The FCStd files below a folder. One that cannot be listed stands for itself, so that reading it fails.
+
+    rules
+        of the folders above: where paths below each begin in ``inner``, and its patterns.
+    inner
+        the folder as seen from the first one; "" or ending in ``/``.
+    """
+    try:
+        with os.scandir(folder) as found:
+            entries = sorted(found, key=lambda entry: entry.name)
+    except OSError:
+        yield folder
+        return
+    own = os.path.join(folder, IGNORE_FILE)
+    if os.path.isfile(own):
+        rules = (*rules, (len(inner), _patterns(own)))
+    for entry in entries:
+        if entry.name.startswith(".") or entry.name.lower() in _NOT_OURS:
+            continue
+        if entry.is_dir(follow_symlinks=False):
+            name = f"{inner}{entry.name}/"
+            if not _ignored(name, rules):
+                yield from _below(entry.path, rules, name)
+        elif entry.name.lower().endswith(".fcstd") and not _ignored(inner + entry.name, rules):
+            path = entry.path
+            # A link to nothing is reported.
+            if entry.is_file(follow_symlinks=False) or os.path.isfile(path) or not os.path.exists(path):
                 yield path
 
 
-def _ignored(path: str) -> Callable[[str], bool]:
-    """What a file of patterns leaves out."""
-    if not os.path.isfile(path):
-        return lambda _name: False
+def _ignored(name: str, rules: Sequence[tuple[int, Check]]) -> bool:
+    """As git decides it: the last pattern of the innermost file that says anything about a name."""
+    for begin, check in reversed(rules):
+        if (decided := check(name[begin:])) is not None:
+            return decided
+    return False
+
+
+def _patterns(path: str) -> Check:
+    """What a file of patterns says of a name: True to leave it out, False to keep it, None for nothing."""
     try:
         from pathspec import GitIgnoreSpec
     except ImportError as error:  # inside FreeCAD
@@ -72,10 +107,13 @@ def _ignored(path: str) -> Callable[[str], bool]:
             f"{path} is there, but the Python package pathspec, which reads it, is not"
         ) from error
     try:
-        lines = Path(path).read_text(encoding="utf-8").splitlines()
-        return GitIgnoreSpec.from_lines(lines).match_file
+        # Names need not be valid Unicode, and a pattern with a form feed is one pattern.
+        text = os.fsdecode(Path(path).read_bytes().removeprefix(BOM_UTF8))
+        lines = [line.removesuffix("\r") for line in text.split("\n")]
+        spec = GitIgnoreSpec.from_lines(lines)
     except (OSError, ValueError) as error:
         raise InputError(f"{path} cannot be read: {error}") from error
+    return lambda name: spec.check_file(name).include
 
 
 def _meant(top: str) -> list[str]:

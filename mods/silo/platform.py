@@ -14,6 +14,7 @@ import os
 import signal
 import socket
 import stat
+import struct
 import subprocess
 import sys
 import time
@@ -32,6 +33,7 @@ _IN_USE = (5, 32, 33)
 _IGNORE_MERGE_ERRORS = 0x2  # ReplaceFileW: a right that cannot be copied is no reason to fail
 _CANNOT_MERGE = 1175  # ERROR_UNABLE_TO_REMOVE_REPLACED
 _COPYFILE_ACL, _COPYFILE_XATTR = 1, 4  # copyfile.h of macOS
+_LOCKED_BYTE = 1 << 30
 _WAITS_S = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6)
 
 
@@ -181,10 +183,17 @@ def hold_lock(path: str | os.PathLike[str], *, shared: bool = False) -> BinaryIO
         except ImportError:
             if not shared:
                 modes: Any = importlib.import_module("msvcrt")
-                file.seek(1 << 30)  # locks of Windows keep others from reading; nobody reads there
+                file.seek(_LOCKED_BYTE)  # locks of Windows keep others from reading
                 modes.locking(file.fileno(), modes.LK_NBLCK, 1)
             return file
-        fcntl.flock(file, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+        if not NAME.startswith("linux"):
+            fcntl.flock(file, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+            return file
+        # The kind of lock that servers of NFS and SMB take for their clients: flock(2) does not see those. Of
+        # one byte where nothing is read: a lock keeps readers of SMB out.
+        kind = fcntl.F_RDLCK if shared else fcntl.F_WRLCK
+        wanted = struct.pack("@hhqqi4x", kind, os.SEEK_SET, _LOCKED_BYTE, 1, 0)
+        fcntl.fcntl(file, fcntl.F_OFD_SETLK, wanted)
         return file
     except OSError as error:
         file.close()

@@ -118,3 +118,38 @@ def test_a_folder_that_is_not_there_is_an_error(run: Any, tmp_path: Path) -> Non
     ran = run("bom-diff", tmp_path, tmp_path / "nowhere")
     assert ran.code == 2
     assert "nowhere" in ran.err
+
+
+def test_a_folder_that_uses_what_lies_beside_it(run: Any, tmp_path: Path) -> None:
+    """Its parts are read, though only its own BOMs are compared; also where it is gone by now."""
+
+    def git(*words: str) -> None:
+        who = ("-c", "user.name=t", "-c", "user.email=t", "-c", "commit.gpgsign=false")
+        subprocess.run(["git", *who, *words], cwd=tmp_path, capture_output=True, check=True)
+
+    def assembly(*files: str) -> Doc:
+        doc = Doc("asm")
+        for number, file in enumerate(files):
+            doc.add("App::Link", f"L{number}", LinkedObject=XLink(file, "Box"))
+        return doc.add("App::Part", "Assembly", Group=locals_(*doc.objects))
+
+    for folder in ("parts", "asm", "old"):
+        (tmp_path / folder).mkdir()
+    Doc("part").add("Part::Box", "Box").save(tmp_path / "parts/P.FCStd")
+    assembly("../parts/P.FCStd").save(tmp_path / "asm/A.FCStd")
+    assembly("../parts/P.FCStd").save(tmp_path / "old/O.FCStd")
+    (tmp_path / ".siloignore").write_text("old/\n")
+    git("init", "-q", "-b", "main")
+    git("add", "-A")
+    git("commit", "-qm", "first")
+    # What is ignored is ignored on both sides.
+    assert run("bom-diff", "--git", "HEAD", tmp_path, "--check").code == 0
+    assembly("../parts/P.FCStd", "../parts/P.FCStd").save(tmp_path / "asm/A.FCStd")
+    ran = run("bom-diff", "--git", "HEAD", tmp_path / "asm", "--json")
+    assert changes(ran.json()) == {"A.FCStd": {"Box": (1, 2)}}
+    assert ran.json()["new"]["complete"] is True
+    shutil.rmtree(tmp_path / "asm")
+    ran = run("bom-diff", "--git", "HEAD", tmp_path / "asm", "--json")
+    assert changes(ran.json()) == {"A.FCStd": {"Box": (1, None)}}
+    assert not (tmp_path / "asm").exists()
+    assert run("bom-diff", "--git", "HEAD", tmp_path / "nowhere").code == 2

@@ -15,7 +15,9 @@ from typing import Any
 
 import pytest
 from fault_proxy import Fault, Proxy, fault_proxy
+from fcstd_writer import Doc, locals_, part
 
+from silo.fcstd import Library
 from silo.vault.lock import NAME, only_job
 
 BUSY = b'{"error": "busy", "message": "later"}'
@@ -141,3 +143,76 @@ def test_a_lock_that_is_a_link_is_not_followed(tmp_path: Path) -> None:
     with only_job(str(vault)) as doubt:
         assert "symbolic link" in doubt
     assert mine.read_text() == "dear"
+
+
+# --- files that moved -----------------------------------------------------------------------------------
+
+
+def moves(run: Any, folder: Path, *words: object) -> list[tuple[str, str]]:
+    """What a sync reports as moved."""
+    ran = run("sync", folder, "--json", *words)
+    assert ran.code == 0, ran.out + ran.err
+    return [(one["from"], one["to"]) for one in ran.json()["summary"]["moved"]]
+
+
+@pytest.fixture
+def parts(silo: Any, run: Any, tmp_path: Path) -> Path:
+    """A vault with an assembly of two parts that was synced once."""
+    folder = tmp_path / "vault"
+    (folder / "p").mkdir(parents=True)
+    for name in ("a", "b"):
+        part(name, uuid=silo.client.create_item("kindred-rd", "M01", name).id).save(
+            folder / f"p/{name}.FCStd"
+        )
+    item = silo.client.create_item("kindred-rd", "A01", "top", item_type="assembly")
+    top(folder, item.id, "p/a.FCStd", "p/b.FCStd")
+    assert moves(run, folder) == []
+    return folder
+
+
+def top(folder: Path, identity: str, *files: str) -> None:
+    """The assembly, with links to these files."""
+    doc = Doc("top", meta={"SiloUUID": identity})
+    for number, file in enumerate(files):
+        doc.link(f"L{number}", file, "Box")
+    doc.add("Assembly::AssemblyObject", "Assembly", Group=locals_(*(f"L{n}" for n in range(len(files)))))
+    doc.save(folder / "top.FCStd")
+
+
+def test_a_renamed_file_is_reported_once_by_the_run_that_syncs(run: Any, parts: Path) -> None:
+    """A dry run reports it, and takes it from nobody."""
+    with Library() as library:
+        identity = library.open(str(parts / "top.FCStd")).Meta["SiloUUID"]
+    (parts / "p/a.FCStd").rename(parts / "c.FCStd")
+    top(parts, identity, "c.FCStd", "p/b.FCStd")
+    wanted = [("p/a.FCStd", "c.FCStd")]
+    assert moves(run, parts, "--dry-run") == wanted
+    assert [moves(run, parts), moves(run, parts)] == [wanted, []]
+
+
+def test_two_files_that_change_places_are_reported_as_moved(run: Any, parts: Path) -> None:
+    """The old names are there, with other items behind them."""
+    one, two = parts / "p/a.FCStd", parts / "p/b.FCStd"
+    one.rename(parts / "x")
+    two.rename(one)
+    (parts / "x").rename(two)
+    assert sorted(moves(run, parts)) == [("p/a.FCStd", "p/b.FCStd"), ("p/b.FCStd", "p/a.FCStd")]
+    assert moves(run, parts) == []
+
+
+def test_a_name_that_is_not_unicode_is_the_same_name_in_the_next_night(run: Any, parts: Path) -> None:
+    name = os.fsdecode(b"top \xff.FCStd")
+    try:
+        (parts / "top.FCStd").rename(parts / name)
+    except OSError:
+        pytest.skip("names on this disk are Unicode")
+    assert moves(run, parts) == [("top.FCStd", name)]
+    assert moves(run, parts) == []
+
+
+@pytest.mark.usefixtures("needs_symlinks")
+def test_a_folder_that_is_named_twice_is_one_job(run: Any, parts: Path) -> None:
+    """Also where one of the names is a link to it."""
+    (parts.parent / "link").symlink_to(parts)
+    ran = run("sync", parts, parts.parent / "link", f"{parts}/.", "--json")
+    assert (ran.code, ran.json()["summary"]["files"]) == (0, 3), ran.err

@@ -5,8 +5,6 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from itertools import chain
 from pathlib import Path
 from typing import Any, Literal
@@ -187,9 +185,7 @@ def run_bom_diff(args: argparse.Namespace) -> int:
     """Print the comparison. 1 where a BOM could not be read whole, and with ``--check`` where one changed."""
     if args.json and args.markdown:
         raise InputError("--json and --markdown exclude each other; take one.")
-    with _two_folders(args) as (old_folder, new_folder, root):
-        old = read_folder(old_folder, root=old_folder if root else None)
-        new = read_folder(new_folder, root=new_folder if root else None)
+    old, new = _two_states(args)
     changes = compare_assemblies(old.assemblies, new.assemblies)
     if args.json:
         common.print_json(_changes_json(changes, old, new))
@@ -201,27 +197,38 @@ def run_bom_diff(args: argparse.Namespace) -> int:
     return Exit.UNDONE if not new.complete or (args.check and changes) else Exit.DONE
 
 
-@contextmanager
-def _two_folders(args: argparse.Namespace) -> Iterator[tuple[Path, Path, bool]]:
-    """The folders to read, and whether links may not leave them."""
+def _two_states(args: argparse.Namespace) -> tuple[FolderBoms, FolderBoms]:
+    """What is to be compared. Raises InputError."""
     if args.git is None:
         if len(args.folders) != 2:
             raise InputError("Name two folders, OLD and NEW, or two revisions with --git A..B.")
-        yield Path(args.folders[0]), Path(args.folders[1]), False
-        return
+        return read_folder(args.folders[0]), read_folder(args.folders[1])
     if len(args.folders) > 1:
         raise InputError("With --git name at most one folder, the part of the repository to compare.")
     from silo.vault.git import lay_out, parse_range, top_of
 
-    top, below = top_of(args.folders[0] if args.folders else ".")
+    top, below, work_tree = top_of(args.folders[0] if args.folders else ".")
     chosen = parse_range(top, args.git)
+    if chosen.new is None and not work_tree:
+        raise InputError(f"{top} has no work tree to compare with. Name two revisions, A..B.")
+    laid: dict[str, Path] = {}
     with scratch_folder("silo-bom-diff-") as scratch:
-        old, new = Path(scratch, "old"), Path(scratch, "new")
-        for revision, target in ((chosen.old, old), (chosen.new, new)):
-            if revision is not None:
-                (target / below).mkdir(parents=True)
-                lay_out(top, revision, below, target)
-        yield old / below, (new if chosen.new is not None else Path(top)) / below, True
+
+        def state(name: str, revision: str | None) -> tuple[Path, list[tuple[str, str]]]:
+            """The whole repository as it was: the folder may use what lies beside it."""
+            folder = Path(top) if revision is None else Path(scratch, name)
+            return folder, [] if revision is None else lay_out(top, revision, folder, laid)
+
+        states = [state("old", chosen.old), state("new", chosen.new)]
+        if not any((folder / below).is_dir() for folder, _ in states):
+            raise InputError(f"There are no FreeCAD files in {below or top}, before or after.")
+        nothing = Path(scratch, "nothing")
+        nothing.mkdir()
+        old, new = (
+            read_folder(there if (there := folder / below).is_dir() else nothing, root=folder, lost=lost)
+            for folder, lost in states
+        )
+    return old, new
 
 
 # --- what people see ------------------------------------------------------------------------------------

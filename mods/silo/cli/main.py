@@ -91,9 +91,9 @@ def _run(argv: Sequence[str] | None) -> int:
     except KeyboardInterrupt:
         print("\nCancelled.", file=sys.stderr)
         return Exit.CANCELLED
-    except BrokenPipeError:
-        return Exit.DONE  # of a command that only ends with its reader
     except OSError as error:
+        if isinstance(error, BrokenPipeError) and getattr(sys.stdout, "failure", None) is error:
+            return Exit.DONE  # of a command that only ends with its reader
         return _system_said_no(error)
     except CancelledError:
         print("Cancelled.", file=sys.stderr)

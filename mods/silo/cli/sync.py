@@ -92,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
     stop = threading.Event()
     with ExitStack() as stack:
         stack.enter_context(_terminated())
-        for folder in folders:
+        for folder in {os.path.realpath(folder): folder for folder in folders}.values():
             summary.notes += filter(None, [stack.enter_context(only_job(folder))])
         client = stack.enter_context(
             common.client_of(args, busy_tries=_BUSY_TRIES, longest=_LONGEST_S, stop=stop)
@@ -174,7 +174,8 @@ def _results(
         summary.notes += filter(None, [reading.index.trouble])
         if summary.base:
             summary.moved += moved(reading.index.places(summary.base), plan.places, summary.base)
-            reading.index.keep_places(summary.base, plan.places)
+            if not options.dry_run:  # a look takes no news from the report of the night
+                reading.index.keep_places(summary.base, plan.places)
             reading.index.forget(summary.base, {os.path.realpath(top) for top in tops})
 
 
@@ -281,15 +282,17 @@ def _show_summary(summary: Summary) -> None:
 
 
 def moved(before: dict[str, set[str]], now: set[tuple[str, str]], base: str) -> list[tuple[str, str, str]]:
-    """Files that carry on the identity of one that is gone: (name, before, now)."""
+    """Files that carry on the identity of one that is gone or another item's by now: (name, before, now)."""
     from silo.bom.paths import relative
 
     here: dict[str, set[str]] = {}
     for uuid, path in now:
         here.setdefault(uuid, set()).add(path)
+    taken = {path for _, path in now}
     found = []
     for uuid, paths in sorted(before.items()):
-        gone = {path for path in paths - here.get(uuid, set()) if not os.path.lexists(path)}
+        left = paths - here.get(uuid, set())
+        gone = {path for path in left if path in taken or not os.path.lexists(path)}
         new = here.get(uuid, set()) - paths
         if len(gone) == len(new) == 1:
             (old_path,), (new_path,) = gone, new

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -41,8 +41,13 @@ class FolderBoms:
         return not self.unreadable and not self.findings
 
 
-def read_folder(folder: Path | str, *, root: Path | str | None = None) -> FolderBoms:
+def read_folder(
+    folder: Path | str, *, root: Path | str | None = None, lost: Sequence[tuple[str, str]] = ()
+) -> FolderBoms:
     """Read all assemblies below a folder. ``root``: no file outside of it is read.
+
+    lost
+        file and reason of what is known not to be there.
 
     Raises InputError where there is no such folder. A file that cannot be read is reported in the result.
     """
@@ -50,7 +55,7 @@ def read_folder(folder: Path | str, *, root: Path | str | None = None) -> Folder
     if not os.path.isdir(base):
         raise InputError(f"{folder} is no folder. Name a folder of FreeCAD files.")
     assemblies: dict[tuple[str, str], Assembly] = {}
-    unreadable: list[tuple[str, str]] = []
+    unreadable = list(lost)
     findings: dict[Finding, None] = {}
     with Library(root) as library:
         for path in documents_in([base]):

@@ -3,7 +3,8 @@
 
 Blobs are streamed from ``git cat-file --batch``, so that no checkout, filter or hook runs. For a Git LFS
 pointer the file itself is taken where the repository has fetched it (``git lfs fetch``); else the pointer is
-laid out as it is, and the reader reports that the file is not there.
+laid out as it is, and the reader reports that the file is not there. Symbolic links that stay inside are laid
+out, and sub-modules from where this machine has them.
 """
 
 from __future__ import annotations
@@ -13,18 +14,24 @@ import re
 import shutil
 import subprocess
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path, PurePosixPath
 from typing import BinaryIO
 
 from silo.bom.errors import InputError
+from silo.durable import remove_patiently
+from silo.files import IGNORE_FILE
 from silo.platform import WINDOWS, child_options
 
 _CHUNK = 1 << 20
 _POINTER = re.compile(rb"version https://git-lfs\.github\.com/spec/v1\n(?:.*\n)*?oid sha256:([0-9a-f]{64})\n")
 _POINTER_SIZE = 1024  # by the Git LFS specification
-_FILES = (b"100644", b"100755")  # neither symlinks nor sub-modules
+_FILES = (b"100644", b"100755")
+_LINK, _SUBMODULE = b"120000", b"160000"
+# A hook's git commands name its repository here. The one that is meant is that of the folder.
+_OF_HOOKS = ("GIT_DIR", "GIT_WORK_TREE", "GIT_INDEX_FILE", "GIT_PREFIX", "GIT_COMMON_DIR")
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,44 +57,121 @@ def parse_range(repository: str, text: str) -> Range:
     return Range(_commit(repository, text), None)
 
 
-def top_of(folder: Path | str) -> tuple[str, str]:
-    """The work tree that a folder lies in, and the folder below it with ``/`` ("" for the top itself)."""
-    real = os.path.realpath(folder)
+def top_of(folder: Path | str) -> tuple[str, str, bool]:
+    """The repository that a folder lies in, the folder below it with ``/`` ("" for the top itself), and
+    whether there is a work tree.
+
+    The folder may be gone: a revision may have it. Raises InputError.
+    """
+    wanted = real = os.path.realpath(folder)
+    while not os.path.isdir(real) and os.path.dirname(real) != real and not os.path.lexists(real):
+        real = os.path.dirname(real)
     if not os.path.isdir(real):
         raise InputError(f"{folder} is no folder. Name a folder inside a git repository.")
-    top = os.path.realpath(os.fsdecode(_git(real, "rev-parse", "--show-toplevel").rstrip(b"\n")))
-    below = os.path.relpath(real, top)
-    return top, "" if below == os.curdir else below.replace(os.sep, "/")
+    if _git(real, "rev-parse", "--is-bare-repository").strip() == b"true":
+        return _path(real, "--absolute-git-dir"), "", False
+    top = _path(real, "--show-toplevel")
+    below = os.path.relpath(wanted, top)
+    return top, "" if below == os.curdir else below.replace(os.sep, "/"), True
 
 
-def lay_out(repository: str, revision: str, below: str, target: Path) -> None:
-    """Write the FreeCAD files of a revision below ``target``. Raises InputError, OSError."""
-    blobs = list(_listed(repository, revision, below))
-    if not blobs:
-        return
+def _path(repository: str, option: str) -> str:
+    return os.path.realpath(os.fsdecode(_git(repository, "rev-parse", option).rstrip(b"\n")))
+
+
+def lay_out(
+    repository: str, revision: str, target: Path, laid: dict[str, Path] | None = None
+) -> list[tuple[str, str]]:
+    """Write what a reader needs of a revision below ``target``: FreeCAD files, links, ``.siloignore``.
+
+    laid
+        blob → where it lies already; such a file is linked, not written again.
+
+    Returns path and reason of what is not there. Raises InputError, OSError.
+    """
+    laid = {} if laid is None else laid
+    lost: list[tuple[str, str]] = []
+    links: list[tuple[Path, str]] = []
+    entries = list(_listed(repository, revision))
+    if not entries:
+        return lost
     common = Path(repository, os.fsdecode(_git(repository, "rev-parse", "--git-common-dir").rstrip(b"\n")))
     with _batch(repository) as (ask, answer):
-        for blob, name in blobs:
+        for kind, blob, name in entries:
             path = target.joinpath(*PurePosixPath(name).parts)
+            if kind == _SUBMODULE:
+                lost += _submodule(common, Path(repository, name), name, blob, path, laid)
+                continue
+            if kind == _LINK:
+                links.append((path, os.fsdecode(_content(ask, answer, blob, name))))
+                continue
             path.parent.mkdir(parents=True, exist_ok=True)
-            ask.write(blob.encode() + b"\n")
-            ask.flush()
-            _copy(answer, path, name)
+            if blob in laid:
+                _link_or_copy(laid[blob], path)
+                continue
+            with path.open("wb") as file:
+                _copy(ask, answer, blob, name, file)
             _take_from_lfs(common / "lfs" / "objects", path)
+            laid[blob] = path
+    for path, to in links:  # last, so that nothing is written through one
+        _lay_link(path, to, target)
+    for path, _ in links:  # one may lead outside by way of another
+        if path.is_symlink() and not _is_below(path, target):
+            remove_patiently(path)
+    return lost
 
 
-def _listed(repository: str, revision: str, below: str) -> Iterator[tuple[str, str]]:
-    words = ["ls-tree", "-r", "-z", "--full-tree", revision, "--", *([below] if below else [])]
-    for record in _git(repository, *words).split(b"\0"):
+def _listed(repository: str, revision: str) -> Iterator[tuple[bytes, str, str]]:
+    """Mode, object and path of what is to be laid out."""
+    for record in _git(repository, "ls-tree", "-r", "-z", "--full-tree", revision).split(b"\0"):
         head, _, raw = record.partition(b"\t")
         name = os.fsdecode(raw)
-        if not name.lower().endswith(".fcstd") or head.split()[0] not in _FILES:
-            continue
         parts = PurePosixPath(name).parts
+        if not parts:
+            continue
+        kind, _, blob = head.split()
+        needed = name.lower().endswith(".fcstd") or parts[-1] == IGNORE_FILE
+        if kind not in (_LINK, _SUBMODULE) and not (kind in _FILES and needed):
+            continue
         # Git refuses such names; a repository made by something else may hold them.
         if name.startswith("/") or ".." in parts or (WINDOWS and any(c in name for c in ":\\")):
             raise InputError(f"The revision {revision} holds a file named {name!r}, which leaves its folder.")
-        yield head.split()[2].decode(), name
+        yield kind, blob.decode(), name
+
+
+def _submodule(
+    common: Path, here: Path, name: str, commit: str, target: Path, laid: dict[str, Path]
+) -> list[tuple[str, str]]:
+    """Lay out a sub-module at its commit."""
+    known = [one for one in (here, common / "modules" / name) if (one / ".git").exists() or one != here]
+    for repository in filter(os.path.isdir, known):
+        try:
+            lost = lay_out(os.fspath(repository), _commit(os.fspath(repository), commit), target, laid)
+        except InputError:
+            continue
+        return [(f"{name}/{path}", why) for path, why in lost]
+    return [(name, f"this sub-module is not here at {commit[:12]} (git submodule update --init --recursive)")]
+
+
+def _lay_link(path: Path, to: str, target: Path) -> None:
+    """A symbolic link that stays inside. Where a system makes no links, its file is missing."""
+    meant = os.path.join(os.path.dirname(path), to)
+    inside = _is_below(path.parent, target) and _is_below(Path(os.path.normpath(meant)), target)
+    if inside and not os.path.isabs(to) and not os.path.lexists(path):
+        with suppress(OSError):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.symlink_to(to)
+
+
+def _is_below(path: Path, folder: Path) -> bool:
+    return Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder))
+
+
+def _link_or_copy(source: Path, target: Path) -> None:
+    try:
+        os.link(source, target)
+    except OSError:
+        shutil.copyfile(source, target)
 
 
 @contextmanager
@@ -95,6 +179,7 @@ def _batch(repository: str) -> Iterator[tuple[BinaryIO, BinaryIO]]:
     with subprocess.Popen(
         ["git", "cat-file", "--batch"],
         cwd=repository,
+        env=_environment(),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         **child_options(),
@@ -104,18 +189,29 @@ def _batch(repository: str) -> Iterator[tuple[BinaryIO, BinaryIO]]:
         yield process.stdin, process.stdout  # type: ignore[misc]
 
 
-def _copy(answer: BinaryIO, path: Path, name: str) -> None:
-    head = answer.readline().split()
+def _content(ask: BinaryIO, answer: BinaryIO, blob: str, name: str) -> bytes:
+    held = BytesIO()
+    _copy(ask, answer, blob, name, held)
+    return held.getvalue()
+
+
+def _copy(ask: BinaryIO, answer: BinaryIO, blob: str, name: str, file: BinaryIO) -> None:
+    """What git has of an object. Raises InputError."""
+    try:
+        ask.write(blob.encode() + b"\n")
+        ask.flush()
+        head = answer.readline().split()
+    except BrokenPipeError:
+        head = [b"git ended"]
     if len(head) != 3:
         raise InputError(f"git has no content of {name}: {b' '.join(head).decode(errors='replace')}")
     left = int(head[2])
-    with path.open("wb") as file:
-        while left > 0:
-            piece = answer.read(min(left, _CHUNK))
-            if not piece:
-                raise InputError(f"git stopped in the middle of {name}.")
-            file.write(piece)
-            left -= len(piece)
+    while left > 0:
+        piece = answer.read(min(left, _CHUNK))
+        if not piece:
+            raise InputError(f"git stopped in the middle of {name}.")
+        file.write(piece)
+        left -= len(piece)
     answer.read(1)  # the line feed behind each object
 
 
@@ -135,18 +231,30 @@ def _commit(repository: str, revision: str) -> str:
     return found.decode().strip()
 
 
+def _environment() -> dict[str, str]:
+    return {name: value for name, value in os.environ.items() if name not in _OF_HOOKS}
+
+
 def _git(repository: str, *words: str) -> bytes:
     program = shutil.which("git")
     if program is None:
         raise InputError("git is not on the PATH; it is needed to read revisions.")
     command = [program, *words]
     done: subprocess.CompletedProcess[bytes] = subprocess.run(
-        command, cwd=repository, capture_output=True, check=False, **child_options()
+        command, cwd=repository, env=_environment(), capture_output=True, check=False, **child_options()
     )
     if done.returncode:
-        said = done.stderr.decode(errors="replace").strip() or "it does not know this revision"
+        said = done.stderr.decode(errors="replace").strip() or _no_answer(repository, words)
         raise InputError(f"git {words[0]} {_last(words)} failed in {repository}: {said}")
     return done.stdout
+
+
+def _no_answer(repository: str, words: Sequence[str]) -> str:
+    """Why git may have said nothing."""
+    said = "there is no common ancestor" if words[0] == "merge-base" else "it does not know this revision"
+    if _git(repository, "rev-parse", "--is-shallow-repository").strip() == b"true":
+        said += "; the clone is shallow, so fetch more of it (git fetch --unshallow)"
+    return said
 
 
 def _last(words: Sequence[str]) -> str:

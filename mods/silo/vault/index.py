@@ -231,12 +231,12 @@ class Index:
         """Identity → files that carried it when the vault was last read."""
         found: dict[str, set[str]] = {}
         for uuid, path in self._select("SELECT uuid, path FROM places WHERE vault = ?", _text(vault)):
-            found.setdefault(uuid, set()).add(path)
+            found.setdefault(uuid, set()).add(os.fsdecode(path))
         return found
 
     def keep_places(self, vault: str, places: Iterable[tuple[str, str]]) -> None:
         """Replace what is known of a vault."""
-        rows = [(_text(vault), uuid, _text(path)) for uuid, path in set(places)]
+        rows = [(_text(vault), uuid, os.fsencode(path)) for uuid, path in set(places)]
         self._write(
             ("DELETE FROM places WHERE vault = ?", [(_text(vault),)]),
             ("INSERT OR REPLACE INTO places VALUES (?, ?, ?)", rows),
@@ -245,7 +245,8 @@ class Index:
     def forget(self, folder: str, but: Collection[str]) -> None:
         """Forget the files of a folder but these, and what older code has found out."""
         rows = self._select("SELECT path FROM files WHERE path >= ? AND path < ?", *_below(folder))
-        gone = [path for (path,) in rows if path not in but]
+        kept = {path for path in but if path.isascii()} | {_text(path) for path in but if not path.isascii()}
+        gone = [path for (path,) in rows if path not in kept]
         self._write(
             ("DELETE FROM files WHERE path = ?", [(path,) for path in gone]),
             ("DELETE FROM facts WHERE path = ?", [(path,) for path in gone]),

@@ -56,6 +56,8 @@ def only_job(folder: str) -> Iterator[str]:
         held.truncate(0)
         held.write(f"{_who()} since {time.strftime('%Y-%m-%d %H:%M:%S')}\n".encode())
         held.flush()
+        with suppress(OSError):  # NFS keeps it here otherwise
+            os.fsync(held.fileno())
         try:
             yield doubt
         finally:
