@@ -42,7 +42,9 @@ def plain(text: str, most: int = 200) -> str:
 
 def told_apart(paths: Iterable[str]) -> dict[str, str]:
     """Path → the file's name; with as many of its folders as it takes where several have that name."""
-    left, shown, depth = {path: path.replace("\\", "/").split("/") for path in paths}, {}, 0
+    left = {path: path.replace("\\", "/").split("/") for path in paths}
+    shown: dict[str, str] = {}
+    depth = 0
     while left:
         depth += 1
         tails = {path: "/".join(parts[-depth:]) for path, parts in left.items()}
