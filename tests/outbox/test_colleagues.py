@@ -349,7 +349,7 @@ def test_another_server_knows_nothing_of_the_old_ones_revisions(vault: Vault) ->
     (moved,) = vault.waiting()
     assert (moved.server, moved.on_top_of, moved.base_revision, moved.comment) == (
         canonical("http://other.example"),
-        None,
+        "",
         None,
         "",
     )
@@ -378,3 +378,19 @@ def test_a_copy_under_another_name_sends_neither_file_nor_bom_unasked(vault: Vau
     assert (contents(vault), vault.lines()) == ([b"one"], {"F01-0001": 3})
     (held,) = vault.waiting()
     assert (held.file_left, held.bom_left) == (True, True)
+
+
+def test_on_top_of_what_a_person_saw_and_of_nothing_else(vault: Vault) -> None:
+    """The server is restored between the person's word and the sending."""
+    file_only(vault, b"one", UNKNOWN)
+    vault.send()
+    theirs(vault, b"one less", 1)
+    entry = file_only(vault, b"one other", sha(b"one"))
+    vault.send()
+    vault.outbox.retry(entry.id)
+    restored(vault, 1)
+    theirs(vault, b"another one", 1)
+    vault.send()
+    (held,) = vault.waiting()
+    assert (held.state, held.newer["file_checksum"]) == (State.HELD, sha(b"another one"))
+    assert contents(vault) == [b"one", b"another one"]

@@ -22,7 +22,8 @@ from silo.outbox.entry import Commit
 from silo.outbox.send import send_all
 from silo.outbox.store import Store
 from silo.testing import FakeSilo
-from silo.vault.pull import Pulled, Rules, State, fetched, lay_out, place
+from silo.vault.fetch import fetched
+from silo.vault.pull import Pulled, Rules, State, lay_out, place
 from silo.vault.revisions import RevisionBoms, words
 
 

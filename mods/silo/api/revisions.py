@@ -66,7 +66,7 @@ def has_file(revision: Revision) -> bool:
 
 
 def standing(
-    revisions: Iterable[Revision], origin: str, known: int | None = None, seen: int | None = None
+    revisions: Iterable[Revision], origin: str, known: int | None = None, seen: str = ""
 ) -> Standing:
     """How a file that was made from ``origin`` (a SHA-256) stands.
 
@@ -74,17 +74,15 @@ def standing(
         the number of that revision, for a server that keeps no checksums. Else the checksum decides: a server
         that was restored from a backup gives the same numbers to other files.
     seen
-        the newest revision that a person has seen and decided about.
+        the newest revision that a person has seen and decided about: its number and its checksum.
     """
     files = sorted((r for r in revisions if has_file(r)), key=lambda r: r.revision_number)
     mine = [
         r
         for r in files
-        if r.revision_number == seen
+        if seen == f"{r.revision_number} {checksum_of(r)}".strip()
         or (checksum_of(r) == origin if checksum_of(r) else r.revision_number == known)
     ]
-    # What a person saw may be gone from the list, or have no file: the newest up to it then.
-    mine += [r for r in files if seen is not None and r.revision_number <= seen]
     base = max(mine, key=lambda r: r.revision_number, default=None)
     return Standing(base, files[-1] if files else None)
 

@@ -69,7 +69,8 @@ def run_pull(args: argparse.Namespace) -> int:
     """1 where a file was left alone, or is not in Silo."""
     from silo.open_in_freecad import open_in_any
     from silo.outbox.store import Store
-    from silo.vault.pull import Rules, fetched, place, pulled_json
+    from silo.vault.fetch import fetched
+    from silo.vault.pull import Rules, place, pulled_json
 
     store, into = Store(), Path(args.into)
     opened = open_in_any()

@@ -21,7 +21,7 @@ from silo.api.address import canonical
 from silo.bom.errors import DocumentError, InputError
 from silo.durable import private_file, sync_folder
 
-VERSION = 3
+VERSION = 4
 # What a saved file was made from is forgotten after two years.
 _REMEMBERED = 2 * 366 * 86400.0
 # A copy of a file that was replaced is kept for so long, or until a person deletes it.
@@ -54,7 +54,7 @@ CREATE TABLE entry (
     base_revision INTEGER,
     revision INTEGER,
     origin TEXT NOT NULL DEFAULT '',
-    on_top_of INTEGER,
+    on_top_of TEXT NOT NULL DEFAULT '',    -- number and SHA-256
     newer TEXT NOT NULL DEFAULT '',        -- JSON; "" where there is none
     place TEXT NOT NULL DEFAULT '',
     links TEXT NOT NULL DEFAULT '',        -- JSON; "" where nobody looked

@@ -64,6 +64,8 @@ class Commit:
     stamp
         of the document at the commit, where it is copied itself: what is written into it later is no part of
         the commit.
+    sha256
+        of a document whose file is committed already, so that only the BOM goes.
     extraction
         the BOM as it was at the commit; compared with the server's and merged when it is sent.
     request
@@ -76,7 +78,7 @@ class Commit:
         SHA-256 of the committed file that this one was made from, :data:`UNKNOWN`, or "": nobody asks whether
         a colleague's newer revision is there (a file that has only just got its item).
     on_top_of
-        the newest revision that a person saw and sends this one on top of.
+        the newest revision that a person saw and sends this one on top of (:func:`silo.outbox.store.seen`).
     """
 
     path: str
@@ -88,13 +90,14 @@ class Commit:
     comment: str = ""
     file: Path | None = None
     stamp: Stamp | None = None
+    sha256: str = ""
     properties: Mapping[str, Any] = field(default_factory=dict)
     extraction: Extraction | None = None
     request: str = ""
     allow_missing: bool = False
     remark: str = ""
     origin: str = ""
-    on_top_of: int | None = None
+    on_top_of: str = ""
 
 
 @dataclass(frozen=True)
@@ -107,7 +110,8 @@ class Entry:
     file_left, bom_left
         what is still to be sent.
     file_name, copy, sha256, size
-        of its file; ``sha256`` is "" while the copy is being made.
+        of its file; ``sha256`` is "" while the copy is being made, and that of the document where only the
+        BOM goes.
     base_revision
         the server's latest revision before the first attempt; None before that.
     revision
@@ -151,7 +155,7 @@ class Entry:
     base_revision: int | None = None
     revision: int | None = None
     origin: str = ""
-    on_top_of: int | None = None
+    on_top_of: str = ""
     newer: Mapping[str, Any] = field(default_factory=dict)
     place: str = ""
     links: str = ""

@@ -53,3 +53,11 @@ class Report:
     failed: list[Entry] = field(default_factory=list)
     stopped_by: SiloError | None = None
     busy: bool = False
+
+
+def went_alone(entry: Entry) -> list[str]:
+    """Says which half of a commit with file and BOM the server has, where the other one was refused."""
+    if not entry.has_file or entry.file_left == entry.bom_left:
+        return []
+    there, left = ("BOM", "file") if entry.file_left else ("file", "BOM")
+    return [f"Its {there} is in Silo; only the {left} is not"]

@@ -31,12 +31,7 @@ from silo.api.revisions import (
     standing,
 )
 from silo.api.transport import Cancel, stop_if
-from silo.api.wire import (
-    LinkedFile,
-    MergeRequest,
-    Revision,
-    SourceDocument,
-)
+from silo.api.wire import LinkedFile, MergeRequest, Revision, SourceDocument
 from silo.bom.errors import (
     CancelledError,
     ConflictError,
@@ -51,7 +46,7 @@ from silo.bom.report import from_plain, project_folder
 from silo.bom_sync import Resolved, Status, decide, merge_request, resolve, server_lines
 from silo.outbox.database import OutboxError
 from silo.outbox.entry import ASKED, SAME_PART, Entry, State
-from silo.outbox.report import Report, Sent
+from silo.outbox.report import Report, Sent, went_alone
 from silo.outbox.store import Store
 
 PAUSES = Backoff(first=5.0, longest=900.0)
@@ -171,18 +166,10 @@ class _Run:
             self.report.stopped_by = error
 
     def _hold(self, entry: Entry, errors: Sequence[SiloError]) -> None:
-        reasons = [*map(str, errors), *self._went_alone(entry)]
+        now = self.store.entry(entry.id) or entry
+        reasons = [*map(str, errors), *(went_alone(now) if any(self.store.bom(entry.id)) else ())]
         self.store.update(entry.id, state=State.HELD, reason="\n".join(reasons))
         self.report.held.append(self.store.entry(entry.id) or entry)
-
-    def _went_alone(self, entry: Entry) -> list[str]:
-        """Says which half of a commit the server has, where the other one was refused."""
-        now = self.store.entry(entry.id) or entry
-        if not now.has_file or not any(self.store.bom(entry.id)) or now.file_left == now.bom_left:
-            return []
-        if now.file_left:
-            return ["Its BOM is in Silo; only the file is not"]
-        return ["Its file is in Silo; only the BOM is not"]
 
     # -- one entry --------------------------------------------------------------------------------------
 
@@ -248,8 +235,8 @@ class _Run:
             self._learn(entry, newest[0])
             self.store.arrived(entry, "file", number)
             # The BOM is the BOM of that revision, also where this commit did not make it.
-            arrived = number if entry.base_revision is not None else None
-            return replace(sent, entry=replace(entry, revision=number), revision=arrived)
+            new = None if entry.base_revision is None else number
+            return replace(sent, entry=replace(entry, revision=number), revision=new)
         if entry.base_revision is None:
             known = self._revisions(sent.part_number)
             self._check_name(entry, known)
@@ -277,11 +264,8 @@ class _Run:
         self.store.learn(entry.server, entry.sha256, entry.identity, revision.revision_number)
 
     def _base(self, entry: Entry, known: Sequence[Revision]) -> int | None:
-        """The revision that the file was made from; None where nobody asks.
-
-        Raises :class:`NewerRevisionError` where sending it would undo a colleague's revision. The server
-        looks again, if it can: between this look and the upload somebody may commit.
-        """
+        """The revision that the file was made from; None where nobody asks. NewerRevisionError where sending
+        it would undo a colleague's; the server looks again, for somebody may commit before the upload."""
         if not entry.origin:
             return None
         number = self.store.known_revision(entry.server, entry.origin, entry.identity)
@@ -351,10 +335,10 @@ class _Run:
                 self.store.arrived(entry, "bom", note=decided.status is Status.UNCHANGED)
                 return sent
             request = merge_request(resolved, entry.key).model_dump_json(by_alias=True, exclude_none=True)
-        wanted = self._named(entry, request)
-        # As it is sent now it is sent again: the server knows a merge by its sync_id and its content.
-        self.store.update(entry.id, request=wanted.model_dump_json(by_alias=True, exclude_none=True))
         try:
+            wanted = self._named(self._at_revision(entry), request)
+            # As it is sent now it is sent again: the server knows a merge by its sync_id and its content.
+            self.store.update(entry.id, request=wanted.model_dump_json(by_alias=True, exclude_none=True))
             result = self.client.merge_bom(sent.part_number, wanted, cancelled=self.cancelled)
         except NewerRevisionError as error:
             # The colleague's file was made from this one, so their BOM has this one's changes.
@@ -365,6 +349,22 @@ class _Run:
             return replace(sent, status=None, entry=replace(entry, remark=remark))
         self.store.arrived(entry, "bom")
         return replace(sent, status=Status.MERGED, result=result, sync_id=wanted.sync_id or "")
+
+    def _at_revision(self, entry: Entry) -> Entry:
+        """An entry without a file, with the revision that its document is or was made from."""
+        if entry.has_file or not entry.origin or entry.revision is not None:
+            return entry
+        known = self._revisions(entry.part_number)
+        stands = max(
+            (
+                standing(known, one, self.store.known_revision(entry.server, one, entry.identity))
+                for one in (entry.sha256, entry.origin)
+            ),
+            key=lambda one: one.base_number,
+        )
+        if stands.newer is not None:
+            raise stands.refusal(entry.part_number)
+        return replace(entry, revision=stands.base.revision_number if stands.base is not None else None)
 
     def _named(self, entry: Entry, request: str) -> MergeRequest:
         """The request with its name and its document, where it does not have them yet."""

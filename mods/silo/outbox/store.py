@@ -50,7 +50,7 @@ _SELECT = f"""SELECT {_COLUMNS}, EXISTS (
 # What of a commit goes into its row as it is.
 _AS_GIVEN = (
     *("key", "path", "label", "identity", "part_number", "taken_at", "comment", "allow_missing", "remark"),
-    *("request", "origin", "on_top_of"),
+    *("sha256", "request", "origin", "on_top_of"),
 )
 
 
@@ -180,11 +180,11 @@ class Store(Origins):
         changed: dict[str, Any] = {"state": ready, "reason": "", "next_attempt": 0.0}
         changed["renamed"] = SAME_PART if entry.renamed == ASKED else entry.renamed
         if entry.newer:
-            changed |= {"on_top_of": entry.newer["revision_number"], "newer": ""}
+            changed |= {"on_top_of": seen(entry.newer), "newer": ""}
             changed["comment"] = on_top(entry.comment, entry.newer)
         if server is not None and canonical(server) != entry.server:
             # What was seen of the old server says nothing of the new one.
-            changed |= {"server": canonical(server), "base_revision": None, "on_top_of": None}
+            changed |= {"server": canonical(server), "base_revision": None, "on_top_of": ""}
             changed |= {"revision": None, "comment": entry.comment}
         if self.bom(entry_id)[0]:
             # What was refused is made anew: the missing part may have its number now.
@@ -354,6 +354,12 @@ def on_top(comment: str, newer: Mapping[str, Any]) -> str:
     who = f" by {newer['created_by']}" if newer.get("created_by") else ""
     note = f"(on top of revision {newer['revision_number']}{who}, which is not in it)"
     return f"{comment} {note}".strip()
+
+
+def seen(newer: Mapping[str, Any]) -> str:
+    """What names a colleague's revision that a person saw: by its content, where the server knows that; a
+    server that was restored gives the same number to another file."""
+    return f"{newer['revision_number']} {newer.get('file_checksum') or ''}".strip()
 
 
 def _place(copy: Path, path: str) -> dict[str, str]:

@@ -255,7 +255,7 @@ class AddOn:
 
             self._hook = CommitHook(
                 host,
-                ended=lambda doc: self.commits.sync_only(doc),
+                ended=lambda doc: self.commits.sync_only(doc, by_fork=True),
                 has_identity=self.commits.has_identity,
                 later=qt.later,
             )

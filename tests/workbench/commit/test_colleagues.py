@@ -22,7 +22,7 @@ from silo.outbox.send import send_all
 from silo.workbench.commit.desk import Answer, Look
 from silo.workbench.commit.flow import CommitFlow
 from silo.workbench.commit.opened import Opened
-from silo.workbench.commit.plan import Plan
+from silo.workbench.commit.plan import Plan, plan
 from silo.workbench.commit.theirs import Choice, Theirs, line_words
 from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone
 from silo.workbench.pane.waiting import rows
@@ -394,3 +394,67 @@ def test_a_commit_is_what_comes_after_it_is_made_from(tmp_path: Path) -> None:
     opened.slotDeletedDocument(doc)
     assert opened.of(doc).origin == ""
     assert opened.of(doc).stamp == stamp_of(str(path))
+
+
+def two_bolts(office: Office, flow: CommitFlow) -> tuple[Document, Document]:
+    """Top with two bolts, committed as revision 1, and the bolt."""
+    bolt, top = office.document("Bolt"), office.document("Top", b"two bolts")
+    top.parts[bolt] = 2
+    flow.start(top)
+    office.settle()
+    return top, bolt
+
+
+def bolts(office: Office) -> list[float | None]:
+    return [line.quantity for line in office.silo.get_bom(number_of(office, "Top"))]
+
+
+def test_a_bom_alone_is_that_of_the_file_in_silo(office: Office, flow: CommitFlow) -> None:
+    """A question about a part was answered, or the parts were registered: unsaved edits do not go along."""
+    top, bolt = two_bolts(office, flow)
+    top.parts[bolt] = 3
+    edit(top, b"three bolts")
+    flow.sync_only(top)
+    office.settle()
+    assert bolts(office) == [2]
+    (box,) = [e for e in office.session.shown.activity.entries if e.title == "Not committed: Top"]
+    assert "not as it was committed. Commit it" in box.lines[0].text
+    top.recomputed = True  # nothing differs from the file
+    flow.sync_only(top)
+    office.settle()
+    assert bolts(office) == [3]
+
+
+def test_a_bom_alone_does_not_undo_a_colleagues(office: Office, flow: CommitFlow) -> None:
+    """Here it is known what the document was made from; where a fork has committed the file, the file says
+    it."""
+    top, bolt = two_bolts(office, flow)
+    colleague(office, "Top", b"one less", 1)
+    top.parts[bolt] = 3
+    flow.sync_only(top)
+    office.settle()
+    assert (bolts(office), office.session.shown.waiting) == ([2], ())
+    assert "alice has committed revision 2 since" in office.sent[-1].entry.remark
+    edit(top, b"on top of it")
+    office.desk.documents.save(top)
+    colleague(office, "Top", b"on top of it", 2)
+    flow.sync_only(top)
+    office.settle()
+    assert bolts(office) == [3]
+
+
+def test_a_file_that_is_replaced_while_the_person_decides(office: Office, flow: CommitFlow) -> None:
+    """It is in no row of the dialog: the commit does not write over it."""
+    doc = committed(office, flow, "Plate", b"one")
+    edit(doc, b"mine")
+    rows = plan(doc, office.desk.documents).wanted
+    Path(doc.FileName).write_bytes(b"by somebody on the same share")
+    flow.run(rows)
+    office.settle()
+    assert Path(doc.FileName).read_bytes() == b"by somebody on the same share"
+    assert office.files("Plate") == [b"one"]
+    (box,) = [e for e in office.session.shown.activity.entries if e.title == "Not committed: Plate"]
+    assert "choose which one counts" in box.lines[0].text
+    flow.run(plan(doc, office.desk.documents).rows)
+    office.settle()
+    assert office.files("Plate") == [b"one", b"mine"]

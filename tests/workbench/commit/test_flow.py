@@ -182,3 +182,16 @@ def test_a_save_before_the_copy_is_made_is_no_part_of_the_commit(office: Office,
     flow.start(doc)
     office.settle()
     assert office.files("Plate") == [b"as saved later"]
+
+
+def test_the_bom_is_that_of_the_file_whatever_is_edited_meanwhile(office: Office, flow: CommitFlow) -> None:
+    """A document that was saved when the commit was asked for, and is edited before its turn comes."""
+    bolt, top = office.document("Bolt"), office.document("Top", b"one bolt")
+    top.parts[bolt] = 1
+    office.desk.documents.save(top)
+    flow.start(top)
+    top.parts[bolt], top.content, top.changed = 2, b"two bolts", True
+    office.settle()
+    number = next(s.item.part_number for s in office.silo.items.values() if s.item.name == "Top")
+    assert office.files("Top") == [b"two bolts"]
+    assert [line.quantity for line in office.silo.get_bom(number)] == [2]

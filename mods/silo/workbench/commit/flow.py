@@ -21,13 +21,13 @@ from pathlib import Path
 from typing import Any
 
 from silo.bom.changes import Assembly
-from silo.bom.errors import SiloError
+from silo.bom.errors import DocumentError, SiloError
 from silo.outbox.entry import UNKNOWN, Commit, new_key
-from silo.outbox.store import on_top
+from silo.outbox.store import on_top, seen
 from silo.spelling import one_path
 from silo.workbench.commit.decisions import Decisions
 from silo.workbench.commit.desk import Answer, Desk
-from silo.workbench.commit.plan import Plan, Row, State, Taken, Taker, plan, refusal
+from silo.workbench.commit.plan import MOST_S, Plan, Row, State, Taken, Taker, plan, refusal
 from silo.workbench.commit.snapshot import Snapshot
 from silo.workbench.commit.theirs import Asked, Choice, Theirs, look
 from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone
@@ -177,16 +177,27 @@ class CommitFlow:
         while self._turns:
             self._step()
 
-    def sync_only(self, doc: Any) -> None:
-        """Sync the BOM of a document whose file somebody else has committed (``Origin_Commit`` of a fork)."""
+    def sync_only(self, doc: Any, *, by_fork: bool = False) -> None:
+        """Sync the BOM of a document whose file is committed already: its parts were registered, or a
+        question about them was answered. ``by_fork``: a fork's ``Origin_Commit`` did it, in its own way."""
+        from silo.files import sha256_of  # late: FreeCAD's start waits for this module
+
+        base, documents = self._desk.documents.base(doc), self._desk.documents
         try:
             taken = self.snapshot(doc)
+            if not (taken.identity and taken.is_assembly):
+                return
+            edited = documents.is_modified(doc) and documents.is_edited(doc, time.thread_time() + MOST_S)
+            if not by_fork and (edited or base.replaced):
+                told = translate("Silo", "Its BOM was not synced: it is not as it was committed. Commit it.")
+                raise DocumentError(taken.path, told)
+            content = "" if by_fork else sha256_of(taken.path)
         except SiloError as error:
             self._tell_error(str(doc.Label), str(error))
             return
-        if taken.identity and taken.is_assembly:
-            row = Row(doc, taken.path, taken.label, State.SAVED)
-            self._keep(Taken(row, taken, new_key()), "", with_file=False)
+        row = Row(doc, taken.path, taken.label, State.SAVED)
+        made = Taken(row, taken, new_key(), base=None if by_fork else base)
+        self._keep(made, "", with_file=False, content=content)
 
     def send(self, doc: Any, comment: str) -> None:
         """Send a document that has just been saved, as it is."""
@@ -220,7 +231,8 @@ class CommitFlow:
         else:
             self._keep(taken, comment)
 
-    def _keep(self, taken: Taken, comment: str, *, with_file: bool = True) -> None:
+    def _keep(self, taken: Taken, comment: str, *, with_file: bool = True, content: str = "") -> None:
+        """``content``: the SHA-256 of a file that is committed already, so that only the BOM goes."""
         if taken.snapshot is None:
             return
         if taken.row.is_top and with_file:
@@ -235,15 +247,17 @@ class CommitFlow:
         )
         if commit is None:
             return
-        commit = replace(commit, stamp=taken.stamp)
+        commit = replace(commit, stamp=taken.stamp, sha256=content)
         base = taken.base
-        if base is not None and with_file and not taken.row.is_new:
+        if base is not None and not taken.row.is_new:
             commit = replace(commit, origin=base.origin or UNKNOWN)
         if newer := taken.row.on_top:
             said = on_top(comment, newer)
-            commit = replace(commit, on_top_of=newer["revision_number"], comment=said)
+            commit = replace(commit, on_top_of=seen(newer), comment=said)
         label = taken.row.label
-        self._session.keep(commit, failed=lambda error: self._tell_error(label, str(error)), base=base)
+        # What only a BOM was sent of is made from what it was made from before.
+        made = base if with_file else None
+        self._session.keep(commit, failed=lambda error: self._tell_error(label, str(error)), base=made)
 
     def _tell_error(self, label: str, text: str) -> None:
         self._session.add(

@@ -15,7 +15,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, Protocol
 
-from silo.bom.errors import SiloError
+from silo.bom.errors import DocumentError, SiloError
 from silo.durable import Stamp, stamp_of
 from silo.spelling import one_path
 from silo.workbench.commit.opened import Base
@@ -297,10 +297,18 @@ class Taker:
                 taken = Taken(row, error=SiloError(problem))
             yield taken
 
+    def _is_edited(self, doc: Any) -> bool:
+        documents = self.documents
+        return documents.is_modified(doc) and documents.is_edited(doc, time.thread_time() + MOST_S)
+
     def _one(self, row: Row) -> Taken:
         base = self.documents.base(row.document)
-        # What somebody else has written is no file of ours: ours is written anew, at a person's word.
-        if row.state in (State.CHANGED, State.RECOMPUTED) or base.replaced:
+        # What somebody else has written is no file of ours: ours is written anew, at a person's word. What
+        # was edited while documents before it were saved goes along: the BOM is that of the file.
+        if row.state is not State.SAVED or base.replaced or self._is_edited(row.document):
+            if base.replaced and not row.replaced:
+                told = "somebody has written it since this commit was asked for; nothing was saved over it. "
+                raise DocumentError(row.path, told + "Commit it again, and choose which one counts")
             if base.replaced:
                 self.keep_aside(row.path)
             self.documents.save(row.document)

@@ -240,7 +240,8 @@ class RevisionFlow:
         outbox = self._session.outbox
 
         def run(client: SiloClient, control: Control) -> Pulled:
-            from silo.vault.pull import Rules, fetched, place
+            from silo.vault.fetch import fetched
+            from silo.vault.pull import Rules, place
 
             def progress(name: str, count: int) -> None:
                 control.progress(f"{count + 1}: {plain(name, 60)}", None)
