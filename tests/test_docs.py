@@ -25,6 +25,12 @@ _OTHERS = re.compile(
 )
 
 
+TREES = ("mods", "tests", "scripts", "benchmarks", "examples")
+# Of the Fasteners workbench; and what a translator makes.
+THEIRS = ("FastenersBillOfMaterials.py", "FSutils.py")
+MADE = ("mods/silo/workbench/resources/translations/silo_de.ts",)
+
+
 def commands() -> dict[str, argparse.ArgumentParser]:
     """The sub-commands of ``silo-mod``."""
     actions = build_parser()._subparsers._group_actions  # type: ignore[union-attr]
@@ -61,7 +67,7 @@ def test_every_link_leads_somewhere(page: Path) -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=IDS)
 def test_every_module_and_target_exists(page: Path) -> None:
-    """``silo.x.y``, ``mods/…`` and ``make x`` are there."""
+    """``silo.x.y`` and ``make x`` are there."""
     text = page.read_text("utf-8")
     for name in re.findall(r"`(silo(?:_server)?(?:\.[a-z_]+)+)`", text):
         # The last word may be a name in a module.
@@ -71,6 +77,17 @@ def test_every_module_and_target_exists(page: Path) -> None:
     targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE))
     for target in re.findall(r"(?:^|`)make ([a-z-]+)", text, re.MULTILINE):
         assert target in targets, f"{page.name}: make {target}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=IDS)
+def test_every_path_exists(page: Path) -> None:
+    """A program (`api/policy.py`), or a path below a folder of the project (`tests/data/control`)."""
+    folders = {part.name for part in ROOT.iterdir() if part.is_dir()}
+    for name in re.findall(r"`([\w.-]+(?:/[\w.-]+)*/?)`", page.read_text("utf-8")):
+        program = name.endswith((".py", ".sh")) and name not in THEIRS
+        if program or (name.partition("/")[0] in folders and name not in MADE):
+            found = [path for home in TREES for path in (ROOT / home).glob(f"**/{name}")]
+            assert found or (ROOT / name).exists(), f"{page.name}: {name}"
 
 
 def test_every_command_is_in_the_readme_or_a_page() -> None:
