@@ -14,7 +14,7 @@ hostile   10 000 links to parts with markup and endless names, missing files, ri
           snapshot, the longest other block of the commit, filling preview and Register Parts, and selecting
           all instances.
 
-Each time is told twice: processor time, and on the wall, which other programs disturb.
+Each time is given twice: processor time, and on the wall, which other programs disturb.
 """
 
 from __future__ import annotations

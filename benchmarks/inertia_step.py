@@ -4,14 +4,14 @@
     python benchmarks/inertia_step.py [FILE.step …] [--repeats 5] [--data FOLDER]
 
 Without files: the example arm, and the public STEP files where they are at hand. Every measurement is a
-process of its own, ours and the usual way in turn. Told are medians of CPU time (the machine may have other
+process of its own, ours and the usual way in turn. It reports medians of CPU time (the machine may have other
 work); ratios are medians of the pairs.
 
 ours     each product measured once (tolerance 1e-8, instances placed in numpy), without and with the mesh
          cross-check, which the usual way does not have
 usual    volume, centre and tensor of every instance by the kernel's default integration, as CadQuery,
          build123d and FreeCAD do it: three integrations per instance
-imports  are not counted in either (inertia_aggregate.py tells them)
+imports  are not counted in either (inertia_aggregate.py reports them)
 read     the kernel's own reading of the file, which both need; not in the ratios
 error    of the whole assembly's volume, against an integration at 1e-11
 """

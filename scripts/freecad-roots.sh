@@ -9,7 +9,7 @@
 #   scripts/freecad-roots.sh run NAME COMMAND…      run a command of that root (freecadcmd, freecad, xvfb-run …)
 #   scripts/freecad-roots.sh remove NAME            delete a root
 #
-# A build can be stopped at any time and started again: it goes on where it was. Mounts are made in a mount
+# A build can be stopped at any time and started again: it continues where it was. Mounts are made in a mount
 # namespace of the running command only, so nothing stays mounted, however the command ends.
 #
 # SILO_FREECAD_ROOTS     where the roots are kept (default: the user's cache folder)

@@ -20,7 +20,7 @@ COMMITS = 6
 
 
 def commits(one: Any, doc: Any) -> None:
-    """The first commit imports modules, which is done once per FreeCAD; it is told apart."""
+    """The first commit imports modules, once per FreeCAD; it is reported apart."""
     from silo.workbench.freecad import live_desk
 
     pulse = Pulse()

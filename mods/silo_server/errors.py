@@ -27,7 +27,7 @@ class TooManyAttemptsError(RemoteError):
 
 
 class InDoubtError(UnreachableError):
-    """503 without ``Retry-After``: nobody knows whether the change was stored."""
+    """503 without ``Retry-After``: it is not known whether the change was stored."""
 
     status_hint = 503
     code = "unavailable"

@@ -99,7 +99,7 @@ class BodyLimit:
             nonlocal taken, whole
             if whole:
                 return await receive()
-            # A body must come at some pace: half a request, kept open, would be kept for ever.
+            # A body must come at some pace: else half a request could be kept open without end.
             left = begun + self.settings.request_body_seconds + taken / BODY_PACE - time.monotonic()
             try:
                 part = await asyncio.wait_for(receive(), max(left, 0.01))

@@ -5,7 +5,7 @@
 
 ``tests/data/freecad/corpus-<version>.zip`` per FreeCAD, and the control cases as plain files in
 ``tests/data/control``, built by FreeCAD 1.0; what FreeCAD's own BOM answers on
-these, and the page that tells it.
+these, and the page that shows it.
 """
 
 from __future__ import annotations

@@ -42,7 +42,7 @@ def is_the_example(found: Extraction) -> None:
 
 
 def test_the_files_hold_the_assembly_of_the_specification() -> None:
-    """Two gearboxes with four gears each, twelve bolts, and one construction link that is told."""
+    """Two gearboxes with four gears each, twelve bolts, and one construction link that is reported."""
     with Library() as library:
         is_the_example(extract(choose_assembly(library.open(TOP))))
 

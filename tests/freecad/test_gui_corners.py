@@ -67,7 +67,7 @@ def test_a_document_without_a_file_is_told(corners: dict[str, Any]) -> None:
 
 
 def test_a_copied_identity_asks(corners: dict[str, Any]) -> None:
-    """The box tells it and offers the decision."""
+    """The box says so and offers the decision."""
     box = corners["copied_box"]
     assert "2 files carry the same Silo identity" in box
     assert "[Same part] [New part…]" in box

@@ -56,7 +56,7 @@ def _page(
 
 
 def test_without_a_server_it_says_how_to_get_one(page: dict[str, Any]) -> None:
-    """And FreeCAD's own file is told to be a plain one."""
+    """And FreeCAD's own file is said to be a plain one."""
     assert page["before"]["in_use"] == "No server is set up. To try it out, run: silo-mod serve"
     assert page["before"]["places"] == ["FreeCAD's preferences (a plain file)"]
 

@@ -110,7 +110,7 @@ def test_a_merge_of_somebody_else_is_heard(day: Told) -> None:
     assert day["heard"].splitlines()[:2] == [f"BOM Updated: {day['other']}", "⚠1 unreferenced"]
 
 
-def test_offline_is_told_and_nothing_is_lost(day: Told) -> None:
+def test_offline_is_shown_and_nothing_is_lost(day: Told) -> None:
     """The banner says what happens to commits, the list what waits."""
     texts = "\n".join(day["offline"])
     assert "Commits wait here and are sent later." in texts

@@ -134,7 +134,7 @@ def test_one_bad_file_does_not_stop_a_folder(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """A truncated file is told, parts are left alone, the rest is synced; exit code 1 and a report."""
+    """A truncated file is reported, parts are left alone, the rest is synced; exit code 1 and a report."""
     _use(machines.need(version), tmp_path, monkeypatch)
     good = (vault.folder / "plate.FCStd").read_bytes()
     (vault.folder / "aaa broken.FCStd").write_bytes(good[: len(good) // 2])
@@ -218,7 +218,7 @@ FreeCAD.addDocumentObserver(Deadly())
 
 @pytest.mark.parametrize("version", WANTED)
 def test_freecad_that_dies_of_a_file_loses_that_one_only(vault: Vault, version: str, tmp_path: Path) -> None:
-    """The run goes on in a new process, and what is done is in the reports while it runs."""
+    """The run continues in a new process, and what is done is in the reports while it runs."""
     freecad = machines.need(version)
     profile = freecad.profile(tmp_path / "profile", dependencies=True)
     deadly = tmp_path / "profile" / "Mod" / "Deadly"

@@ -76,7 +76,7 @@ def test_a_part_closed_by_hand_never_reads_as_removed(session: dict[str, Any]) -
 
 
 def test_a_lost_original_of_a_changed_copy_is_named(session: dict[str, Any]) -> None:
-    """FreeCAD shows the copy and says nothing; the file that a person has to bring back is told."""
+    """FreeCAD shows the copy and says nothing; the file that a person must bring back is reported."""
     answer = session["lost_original"]
     assert (answer["bom"], answer["findings"], answer["blocked"]) == ({"Bolt": 1}, ["missing_file"], True)
     assert "copy_on_change/bolt.FCStd is missing (it is the original of a changed copy)" in answer["message"]

@@ -168,7 +168,7 @@ def test_what_cannot_be_read_is_one_sentence(in_freecad: Callable[..., Assembly]
 
 
 def test_progress_and_cancelling(built: Callable[[Path], Path], in_freecad: Callable[..., Assembly]) -> None:
-    """Stages are told while FreeCAD works; cancelling ends it."""
+    """Stages are reported while FreeCAD works; cancelling ends it."""
     path = built(PLACES) / "top.FCStd"
     heard: list[Progress] = []
     in_freecad(path, progress=heard.append)

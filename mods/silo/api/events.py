@@ -251,7 +251,7 @@ class EventListener:
         thread = self._thread
         if thread is not None and thread is not threading.current_thread():
             thread.join(timeout)
-            # A callback that still runs is waited for, but not for ever: it may be waiting for us.
+            # Wait for a callback that still runs, but only so long: it may be waiting for us.
             if self._calling.acquire(timeout=timeout):
                 self._calling.release()
         self.state = ConnectionState(Connection.STOPPED)

@@ -255,7 +255,7 @@ def as_json(data: object) -> bytes:
 
 def read_some(response: requests.Response) -> bytes:
     """What has arrived, decoded; waits for the first byte only; empty at the end."""
-    # `iter_content` would wait until a chunk is full, and a server that drips could hold us for ever.
+    # `iter_content` waits until a chunk is full, so a slow server could hold us up without end.
     raw: Any = response.raw
     if hasattr(raw, "read1"):
         return bytes(raw.read1(_CHUNK, decode_content=True) or b"")

@@ -104,7 +104,7 @@ def proposed_category(entry: BomEntry, name: str, categories: Mapping[str, str])
         if rule.category in fitting and rule.fits(frozenset(words)):
             return Guess(rule.category, 1.0)
     if entry.is_assembly:
-        # What the name says of an assembly is what it is for, not of which kind it is.
+        # The name of an assembly says what it is for, not which kind it is.
         return Guess(fitting[0], SURE)
     scores = {code: _score(words, _stems(categories[code])) for code in fitting}
     best = max(scores.values())
@@ -119,7 +119,7 @@ def proposed_category(entry: BomEntry, name: str, categories: Mapping[str, str])
 
 
 def assembly_categories(categories: Mapping[str, str]) -> frozenset[str]:
-    """The codes that are for assemblies: by their names, and those of a group of which most are.
+    """The codes that are for assemblies: by their names, or because most of their group are.
 
     A group is what begins with the same letter: "Top-level product" stands among the assemblies.
     """

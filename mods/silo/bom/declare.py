@@ -24,7 +24,7 @@ from silo.bom.roots import silent_reader
 from silo.bom.walk.consumed import consumed
 from silo.bom.walk.kinds import Kind, flattened
 
-# FreeCAD tells copies apart by a number of three digits.
+# FreeCAD numbers copies with three digits.
 _NUMBER = re.compile(r"\d{3}$")
 
 
@@ -123,7 +123,7 @@ def _counts(top: Any, offered: Sequence[Any]) -> dict[str, int]:
 
 
 def label_stem(label: str, labels: Set[str]) -> str:
-    """A label without the number by which FreeCAD tells copies apart; "" where that says nothing.
+    """A label without the number that FreeCAD gives to copies; "" where that says nothing.
 
     labels
         all labels: a number is FreeCAD's only where the label without it is there too.
@@ -134,7 +134,7 @@ def label_stem(label: str, labels: Set[str]) -> str:
 
 
 def _alike(objects: Iterable[Any], shape_of: Callable[[Any], str]) -> list[tuple[list[Any], str]]:
-    """Equal objects together: those of one shape, and those of one label that no shape tells apart."""
+    """Equal objects together: those of one shape, and those of one label whose shapes do not differ."""
     groups: list[tuple[list[Any], str]] = []
     by_shape: dict[tuple[str, str], int] = {}
     by_stem: dict[str, int] = {}

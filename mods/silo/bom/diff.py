@@ -139,7 +139,7 @@ def lines_of_missing(
 
     Those that stood for one of them in the last sync. Where a missing component stood for no line (a server
     that does not keep that, lines of an old version), any line that the assembly does not have now may be its
-    own, so all those stay whose components nobody knows.
+    own, so all lines whose components are not known stay.
 
     local
         the part numbers that the assembly has now.

@@ -75,7 +75,7 @@ def property_names(obj: object) -> frozenset[str] | tuple[str, ...] | None:
 
 def same_document(a: object, b: object) -> bool:
     """True where both are one document: the same object, or two objects of one file."""
-    # Not by ==, which plain objects that hold each other do for ever; FreeCAD has one object per document.
+    # Not by ==, which never ends for plain objects that hold each other; FreeCAD has one object per document.
     if a is b:
         return True
     path = getattr(a, "FileName", "")

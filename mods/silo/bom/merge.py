@@ -29,9 +29,9 @@ from silo.bom.numbers import plain
 class MergePlan:
     """What a merge will write: the diff, and which unreferenced flags it sets and clears (part numbers).
 
-    ``tell`` names the lines that people own and of which the server does not know yet what the assembly
-    says now: a new conflict, a changed one, or one that is over. No line is written for them, but the server
-    must know to ask a person, or to stop asking.
+    ``tell`` names lines of people whose quantity in the assembly the server does not know yet: a new
+    conflict, a changed one, or one that is over. No line is written for them, but the server must ask a
+    person, or stop asking.
     """
 
     diff: BomDiff

@@ -209,7 +209,7 @@ class BomDiff:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What the comparison leaves to a person; :meth:`findings_at` tells the place too."""
+        """What the comparison leaves to a person; :meth:`findings_at` adds the place."""
         return self.findings_at(())
 
     def findings_at(self, where: Iterable[Place]) -> tuple[Finding, ...]:

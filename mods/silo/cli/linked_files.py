@@ -86,7 +86,7 @@ def run_where_used(args: argparse.Namespace) -> int:
         )
     for one in unread:
         out.print(
-            f"✗ {show.plain(relative(one, base))} could not be read, so nobody knows what it links to.",
+            f"✗ {show.plain(relative(one, base))} could not be read, so its links are not known.",
             markup=False,
         )
     return Exit.UNDONE if unread else Exit.DONE

@@ -183,7 +183,7 @@ def run_watch(args: argparse.Namespace) -> int:
     events: queue.Queue[ServerEvent | ConnectionState] = queue.Queue()
     with common.client_of(args) as client:
         with suppress(NotFoundError):  # a server that does not say who we are has answered all the same
-            client.whoami()  # a wrong address or token is reported at once, not retried for ever
+            client.whoami()  # a wrong address or token is reported at once, not retried
         mode = client.ready().mode
         print(f"[{client.base_url}: {mode}]", file=sys.stderr)
         listener = EventListener(client, on_event=events.put, on_state=events.put)

@@ -46,7 +46,7 @@ def new_key() -> str:
 ASKED, SAME_PART = "asked", "same part"
 
 UNKNOWN = "unknown"
-"""The origin of a file of which nobody knows what it was made from."""
+"""The origin of a file whose origin is not known."""
 
 
 @dataclass(frozen=True)

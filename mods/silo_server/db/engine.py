@@ -3,7 +3,7 @@
 
 Reads see one snapshot (SQLite: a transaction of its WAL; PostgreSQL: REPEATABLE READ, read only).
 
-Nothing waits for ever. Readers and writers have connections of their own, so that reads work while a writer
+Every wait ends. Readers and writers have connections of their own, so that reads work while a writer
 waits for another process, a locked row or a disk. Writers queue in a turnstile and are sent away (503,
 BusyError) where too many wait or it takes too long; PostgreSQL has time-outs for locks and statements, and a
 connection whose server does not answer at all is given up by us.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""A PostgreSQL connection that gives up: psycopg waits for ever for a server that is stopped or frozen."""
+"""A PostgreSQL connection that gives up: psycopg waits without end for a server that is stopped or frozen."""
 
 from __future__ import annotations
 

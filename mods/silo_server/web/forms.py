@@ -144,7 +144,7 @@ def local_path(target: str, otherwise: str = "/") -> str:
 
 
 def own_site(request: Request) -> bool | None:
-    """True for a form that a page of ours sent, False for one of another site, None where nobody says.
+    """True for a form that a page of ours sent, False for another site's, None where the browser does not say.
 
     Browsers say where a form comes from.
     """

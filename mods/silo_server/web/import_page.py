@@ -104,7 +104,7 @@ class Problem:
 
 
 def layout_of(form: FormData) -> Layout | None:
-    """How the person said the file is to be read; None where nobody said."""
+    """How the person wants the file to be read; None where that was not chosen."""
     if "header" not in form:
         return None
     marks = {mark.value: mark for mark in Mark}

@@ -162,7 +162,7 @@ _LINK = re.compile(r'(\s(?:href|src|action|formaction|data-events)=")/(?!/)')
 def _state(request: Request) -> tuple[bool, int]:
     """Whether the server takes no changes, and how many BOMs wait for a person.
 
-    Without its database nobody knows; the page says that then.
+    Without its database both are unknown; the page says so.
     """
     try:
         with server_of(request).db.read() as tx:

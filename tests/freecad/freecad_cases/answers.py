@@ -61,7 +61,7 @@ def _all(entries: Iterable[BomEntry]) -> Iterator[BomEntry]:
 
 
 def whole(extraction: Extraction, base: str) -> Mapping[str, Any]:
-    """Everything that an extraction tells, to compare two ways of reading the same files.
+    """Everything that an extraction says, to compare two ways of reading the same files.
 
     Left out is the document's label: FreeCAD sets it to the file's name when it opens the file, whatever the
     file says.

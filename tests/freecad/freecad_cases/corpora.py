@@ -49,7 +49,7 @@ def truth_of(key: str) -> Truth:
 def load(folder: Path) -> Corpus:
     """A corpus from its folder."""
     told = json.loads((folder / _MANIFEST).read_text())
-    # Links have been resolved in the answers, so the folder has to be told likewise.
+    # Links have been resolved in the answers, so the folder must be resolved likewise.
     return Corpus(folder.resolve(), tuple(told["freecad"]), tuple(told["built"]))
 
 

@@ -24,7 +24,7 @@ def missing_file(b: Bench) -> None:
 
 @case()
 def missing_file_below(b: Bench) -> None:
-    """The broken link is the sub-assembly's, so that is where it is told."""
+    """The broken link is the sub-assembly's, so that is where it is reported."""
     sub = b.sub_assembly(b.part("bolt.FCStd"), b.part("plate.FCStd", "Plate"))
     b.link(b.container(), sub)
     b.save()

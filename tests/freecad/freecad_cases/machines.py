@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The FreeCADs of this machine, as ``scripts/freecad-roots.sh --list`` tells them."""
+"""The FreeCADs of this machine, as ``scripts/freecad-roots.sh --list`` prints them."""
 
 from __future__ import annotations
 

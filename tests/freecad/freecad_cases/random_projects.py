@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Random projects, built by the FreeCAD that runs this, with the truth that its own geometry tells::
+"""Random projects, built by the FreeCAD that runs this, with the truth from its own geometry::
 
     SILO_RANDOM='{"out": "folder", "seeds": [1, 2, 3]}' freecadcmd -c 'import runpy; runpy.run_path(…)'
 
 Every part and every article has a volume of its own, so the shape that FreeCAD makes of an assembly
-(``Part.getShape``) tells how often each is shown. Nothing of the code under test is used here.
+(``Part.getShape``) shows how often each is shown. Nothing of the code under test is used here.
 """
 
 from __future__ import annotations

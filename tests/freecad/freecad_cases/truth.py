@@ -35,7 +35,7 @@ class Truth:
     top
         the file that is read.
     live
-        what live FreeCAD answers where it knows, by its nature, other things than the file tells.
+        what live FreeCAD answers where it knows, by its nature, other things than the file says.
     live_0_20
         the same for FreeCAD 0.20 only.
     error

@@ -86,7 +86,7 @@ def table() -> None:
 
 
 def long_one() -> None:
-    """Some thousand faces: the window goes on living, and Cancel ends it."""
+    """Some thousand faces: the window stays alive, and Cancel ends it."""
     doc, whole = assembly("Heavy")
     plate = Part.makeBox(160, 160, 5)
     holes = [

@@ -56,7 +56,7 @@ class Relay(QtCore.QObject):  # type: ignore[misc]  # PySide has no types
         try:
             self._posted.emit(call)
         except RuntimeError:
-            # FreeCAD is closing: the C++ half of this object is gone, and nobody is left to be told.
+            # FreeCAD is closing: the C++ half of this object is gone.
             return
 
     def _run(self, call: Callable[[], None]) -> None:

@@ -3,7 +3,7 @@
 
 Numbers are numbers, with the unit in the column's head, which mass and inertia tools read as well. Lines on
 top say what a reader must know first: for how many pieces, and that the BOM is incomplete. A mass or a cost
-of which a part is unknown is left empty, so that no sum looks whole.
+with an unknown part is left empty, so that no incomplete sum looks whole.
 
 A cell that a spreadsheet would run as a formula gets an apostrophe before it in CSV, and is marked as text in
 XLSX.
