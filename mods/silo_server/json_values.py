@@ -54,7 +54,7 @@ def json_problem(value: Any) -> str | None:
             return f"wanted at most {MAX_DEPTH} levels of nesting, got more"
         if isinstance(part, dict):
             for key in part:
-                if len(key) > MAX_KEY or not _is_text(key):
+                if len(key) > MAX_KEY or not is_text(key):
                     return f"wanted keys of at most {MAX_KEY} characters of valid text, got {key[:60]!r}"
             stack.extend((below, depth + 1) for below in part.values())
         elif isinstance(part, list | tuple):
@@ -92,7 +92,7 @@ def merge_patch(target: Any, patch: Any) -> Any:
 
 def _scalar_problem(value: Any) -> str | None:
     if isinstance(value, str):
-        return None if _is_text(value) else "wanted text, got a character that is no valid Unicode (or NUL)"
+        return None if is_text(value) else "wanted text, got a character that is no valid Unicode (or NUL)"
     if isinstance(value, float) and not math.isfinite(value):
         return f"wanted finite numbers, got {value}"
     if isinstance(value, int) and not -_MAX_WHOLE <= value <= _MAX_WHOLE:
@@ -100,7 +100,8 @@ def _scalar_problem(value: Any) -> str | None:
     return None
 
 
-def _is_text(text: str) -> bool:
+def is_text(text: str) -> bool:
+    """True for a text that both databases can keep: no NUL, no half of a surrogate pair."""
     return "\x00" not in text and (text.isascii() or not any("\ud800" <= c <= "\udfff" for c in text))
 
 

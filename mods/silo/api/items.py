@@ -15,7 +15,6 @@ from silo.api.failures import translated
 from silo.api.replies import Reply, WebPageError
 from silo.api.transport import Cancel
 from silo.api.wire import Answer, Item, Wire
-from silo.bom.categories import Categories, Rule
 from silo.bom.errors import (
     InputError,
     NotFoundError,
@@ -24,6 +23,7 @@ from silo.bom.errors import (
     ServerFaultError,
     SiloError,
 )
+from silo.bom.naming import Categories, Rule
 
 
 class UuidsBody(Wire):

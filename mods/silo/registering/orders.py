@@ -12,11 +12,10 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from silo.bom.categories import proposed_category
 from silo.bom.declare import Modelled
 from silo.bom.errors import SiloError
 from silo.bom.model import BomEntry
-from silo.bom.naming import Proposal
+from silo.bom.naming import Proposal, proposed_category
 from silo.declaring import declare
 from silo.registering.offer import Candidate, Control, Similar
 from silo.registration import Journal, Registration, RegistrationApi, register, unclear

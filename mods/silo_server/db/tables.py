@@ -314,3 +314,6 @@ audit = Table(
     Column("address", String(64), nullable=False),
     sqlite_autoincrement=True,
 )
+
+# Every place that refers to a file of the store, by its hash: what a backup takes, and housekeeping keeps.
+FILE_REFERENCES = (revisions.c.file_checksum, revisions.c.thumbnail_key, items.c.thumbnail_key)

@@ -35,7 +35,7 @@ from silo_server.clock import stamp, utc_now
 from silo_server.db.bulk import insert_rows
 from silo_server.db.engine import EVENT_CHANNEL, MIGRATION_LOCK, Database, Tx, mode_of, put_state
 from silo_server.db.migrate import check_revision, upgrade
-from silo_server.db.tables import events, items, metadata, revisions
+from silo_server.db.tables import FILE_REFERENCES, events, items, metadata
 from silo_server.errors import cause_of
 from silo_server.files import FileStore
 from silo_server.json_values import dumps
@@ -286,12 +286,8 @@ def _checksums(path: Path) -> set[str]:
     """Every file that the saved database refers to."""
     found: set[str] = set()
     with closing(sqlite3.connect(path)) as saved:
-        for query in (
-            select(revisions.c.file_checksum),
-            select(revisions.c.thumbnail_key),
-            select(items.c.thumbnail_key),
-        ):
-            found.update(row[0] for row in saved.execute(f"{query.distinct()}") if row[0])
+        for place in FILE_REFERENCES:
+            found.update(row[0] for row in saved.execute(f"{select(place).distinct()}") if row[0])
     return found
 
 

@@ -24,15 +24,14 @@ from silo.bom.errors import SiloError
 from silo_server.clock import stamp
 from silo_server.db.engine import Database, Tx, get_state, put_state
 from silo_server.db.tables import (
+    FILE_REFERENCES,
     api_tokens,
     audit,
     bom_change_lines,
     bom_changes,
     bom_syncs,
-    items,
     login_failures,
     login_links,
-    revisions,
     sessions,
 )
 from silo_server.errors import cause_of
@@ -246,6 +245,6 @@ def _remove_orphans(db: Database, store: FileStore) -> int:
         return 0
     with db.read() as tx:
         used: set[str] = set()
-        for referring in (revisions.c.file_checksum, revisions.c.thumbnail_key, items.c.thumbnail_key):
-            used.update(tx.conn.scalars(select(referring).distinct().where(referring.is_not(None))))
+        for place in FILE_REFERENCES:
+            used.update(tx.conn.scalars(select(place).distinct().where(place.is_not(None))))
     return sum(store.remove_old(path, before) for path in old if path.name not in used)

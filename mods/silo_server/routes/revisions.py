@@ -28,7 +28,7 @@ from silo_server.routes.context import (
 )
 from silo_server.routes.models import RevisionBody, RevisionOut
 from silo_server.services import items, revisions
-from silo_server.services.bom.merge_json import is_text
+from silo_server.services.bom.merge_json import is_short_text, sha256_or_none
 from silo_server.services.revisions import Origin, revision_to_wire
 from silo_server.values import Actor, Item, Revision
 
@@ -132,13 +132,11 @@ async def upload_file(server: ServerDep, caller: Editor, part_number: str, reque
         if twice:
             raise RejectedError(f"{', '.join(twice)}: wanted one part of this name, got several")
         file, comment, raw = form.get("file"), form.get("comment"), form.get("properties")
-        sha256 = form.get("sha256")
         if not isinstance(file, UploadFile):
             raise RejectedError("file: wanted a multipart form with the file in a part named 'file'")
-        if isinstance(raw, UploadFile) or not is_text(comment or "", 10_000):
+        if isinstance(raw, UploadFile) or not is_short_text(comment or "", 10_000):
             raise RejectedError("comment, properties: wanted texts of at most 10 000 characters")
-        if sha256 is not None and not (isinstance(sha256, str) and re.fullmatch("[0-9A-Fa-f]{64}", sha256)):
-            raise RejectedError("sha256: wanted 64 hexadecimal digits")
+        sha256 = sha256_or_none("sha256", form.get("sha256"))
         properties = _properties(raw)
         origin = Origin(
             _base_revision(form.get("base_revision")), _path(form.get("path")), _links(form.get("links"))
@@ -245,7 +243,7 @@ def _base_revision(raw: object) -> int | None:
 def _path(raw: object) -> str | None:
     if raw is None or raw == "":
         return None
-    if not is_text(raw, 1000):
+    if not is_short_text(raw, 1000):
         raise RejectedError("path: wanted a text of at most 1000 characters")
     return str(raw)
 
@@ -260,7 +258,7 @@ def _links(raw: object) -> list[dict[str, str]] | None:
         where = ".".join(map(str, first["loc"]))
         wanted = "wanted a JSON list of path, item and sha256"
         raise RejectedError(f"links: {wanted}; {where}: {first['msg']}") from None
-    if not all(is_text(link.path, 1000) and is_text(link.item, 64) for link in found):
+    if not all(is_short_text(link.path, 1000) and is_short_text(link.item, 64) for link in found):
         raise RejectedError("links: wanted texts without the character NUL")
     return [link.model_dump() for link in found]
 

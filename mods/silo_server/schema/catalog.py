@@ -14,8 +14,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from silo.bom.categories import Rule
 from silo.bom.errors import ConfigError, InputError, NotFoundError, RejectedError
+from silo.bom.naming import Rule
 from silo.bom.numbers import plain, read_number
 
 DEFAULT_SCHEMA = "kindred-rd"

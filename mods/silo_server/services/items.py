@@ -172,8 +172,9 @@ def create_item(tx: Tx, new: NewItem) -> tuple[Item, bool]:
         tx.lock(uuids.UUID(normal_uuid(new.uuid, "id")).int & (2**63 - 1))
     if new.uuid is not None and (known := _made_before(tx, new.uuid, new.part_number)) is not None:
         return known, False
-    if number is None:
+    if number is None and category is not None:
         number = take_number(tx, schema, category)
+    assert number is not None  # given, or of the category
     name, description = new.name.strip(), new.description.strip()
     values = {
         "uuid": normal_uuid(new.uuid, "id") if new.uuid else str(uuids.uuid4()),

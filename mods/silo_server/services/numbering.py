@@ -58,10 +58,8 @@ def preview_number(tx: Tx, schema_name: str | None, category: str) -> str:
     return _next_free(tx, schema, found, last or 0)[0]
 
 
-def take_number(tx: Tx, schema: Schema, category: Category | None) -> str:
-    """The next free number of the category, taken; RejectedError without a category."""
-    if category is None:
-        raise RejectedError("category: wanted one (such as F01) or an explicit part_number, got neither")
+def take_number(tx: Tx, schema: Schema, category: Category) -> str:
+    """The next free number of the category, taken."""
     where = (number_counters.c.schema_name == schema.name, number_counters.c.category == category.code)
     _ensure_counter(tx, schema.name, category.code)
     last = tx.conn.scalar(select(number_counters.c.last_serial).where(*where).with_for_update()) or 0

@@ -144,10 +144,7 @@ def local_path(target: str, otherwise: str = "/") -> str:
 
 
 def own_site(request: Request) -> bool | None:
-    """True for a form that a page of ours sent, False for another site's, None where the browser does not say.
-
-    Browsers say where a form comes from.
-    """
+    """True for a form of one of our pages, False for another site's, None where the browser does not say."""
     site = request.headers.get("sec-fetch-site")
     if site is not None:
         return site in ("same-origin", "none")

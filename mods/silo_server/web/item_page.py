@@ -8,13 +8,10 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query, Request
-from sqlalchemy import func, select
 from starlette.responses import Response
 
 from silo.bom.errors import ConflictError
-from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
-from silo_server.db.tables import bom_lines
 from silo_server.errors import TooLargeError
 from silo_server.routes.context import ServerDep
 from silo_server.schema.catalog import ITEM_TYPES, find_schema
@@ -193,7 +190,7 @@ def items_page(
     )
     with server.db.read(caller) as tx:
         found, total = list_items(tx, query)
-        used = _use_counts(tx, [item.id for item in found])
+        used = tree.use_counts(tx, [item.id for item in found])
     asked = {"q": q, "type": type, "category": category, "archived": "1" if archived else "", "sort": sort}
     return page(
         request,
@@ -210,12 +207,3 @@ def items_page(
         archived=archived,
         sort=sort,
     )
-
-
-def _use_counts(tx: Tx, ids: list[int]) -> dict[int, int]:
-    rows = tx.conn.execute(
-        select(bom_lines.c.child_id, func.count())
-        .where(one_of(tx, bom_lines.c.child_id, ids))
-        .group_by(bom_lines.c.child_id)
-    )
-    return {row[0]: row[1] for row in rows}

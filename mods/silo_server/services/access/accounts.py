@@ -67,10 +67,14 @@ def list_users(tx: Tx) -> list[User]:
 
 def get_user(tx: Tx, username: str) -> User:
     """The user, in whatever case; NotFoundError where there is none."""
-    row = tx.conn.execute(select(users).where(users.c.username_key == username.casefold())).one_or_none()
+    row = _row_of(tx, username)
     if row is None:
         raise NotFoundError(f"there is no user {username!r}")
     return to_user(row)
+
+
+def _row_of(tx: Tx, username: str) -> Any:
+    return tx.conn.execute(select(users).where(users.c.username_key == username.casefold())).one_or_none()
 
 
 def create_user(
@@ -82,8 +86,7 @@ def create_user(
             "username: wanted 1 to 64 letters, digits or . _ @ - beginning with a letter or digit, "
             f"got {username!r}"
         )
-    taken = tx.conn.scalar(select(users.c.id).where(users.c.username_key == username.casefold()))
-    if taken is not None:
+    if _row_of(tx, username) is not None:
         raise DuplicateError(f"username {username} is taken")
     tx.conn.execute(
         insert(users).values(
@@ -154,8 +157,7 @@ def _what_changed(user: User, values: Mapping[str, object]) -> str:
 def make_admin(tx: Tx, username: str) -> User:
     """The user as an active admin; made where there is none."""
     tx.lock(ADMIN_LOCK)
-    known = tx.conn.scalar(select(users.c.id).where(users.c.username_key == username.casefold()))
-    if known is None:
+    if _row_of(tx, username) is None:
         return create_user(tx, username, Role.ADMIN)
     return change_user(tx, username, role=Role.ADMIN, active=True)
 
@@ -170,7 +172,7 @@ class Claimed:
 
 def claimed_user(tx: Tx, username: str) -> Claimed | None:
     """The user of this name, to be checked with :func:`password_fits` once the transaction is over."""
-    row = tx.conn.execute(select(users).where(users.c.username_key == username.casefold())).one_or_none()
+    row = _row_of(tx, username)
     return None if row is None else Claimed(to_user(row), row.password_hash)
 
 

@@ -22,6 +22,7 @@ from silo.bom.numbers import LARGEST_QUANTITY, as_decimal
 from silo_server.clock import spec_time
 from silo_server.db.engine import Tx
 from silo_server.errors import TooLargeError
+from silo_server.json_values import is_text
 from silo_server.values import Item
 
 # An event goes to every listener: beyond this many unchanged lines it only says how many there are.
@@ -76,7 +77,7 @@ def read_merge_order(body: Any, max_entries: int) -> MergeOrder:
     if len(body["entries"]) > max_entries:
         raise TooLargeError(f"entries: this server takes at most {max_entries}, got {len(body['entries'])}")
     sync_id, dry_run = body.get("sync_id"), body.get("dry_run")
-    if sync_id is not None and not (is_text(sync_id, 128) and sync_id):
+    if sync_id is not None and not (is_short_text(sync_id, 128) and sync_id):
         raise RejectedError("sync_id: wanted a text of 1 to 128 characters")
     if dry_run is not None and not isinstance(dry_run, bool):
         raise RejectedError("dry_run: wanted true or false")
@@ -95,11 +96,16 @@ def read_merge_order(body: Any, max_entries: int) -> MergeOrder:
     return MergeOrder(entries, problems, sync_id, bool(dry_run), *document, left_out)
 
 
-def is_text(value: Any, longest: int) -> TypeGuard[str]:
-    """True for a text that both databases can keep (no NUL, no half of a surrogate pair)."""
-    if not isinstance(value, str) or len(value) > longest or "\x00" in value:
-        return False
-    return value.isascii() or not any("\ud800" <= c <= "\udfff" for c in value)
+def is_short_text(value: Any, longest: int) -> TypeGuard[str]:
+    """True for a text of at most so many characters that both databases can keep."""
+    return isinstance(value, str) and len(value) <= longest and is_text(value)
+
+
+def sha256_or_none(name: str, value: Any) -> str | None:
+    """A SHA-256 in hex, or None; RejectedError, naming the field, for anything else."""
+    if value is None or (isinstance(value, str) and re.fullmatch("[0-9A-Fa-f]{64}", value)):
+        return value
+    raise RejectedError(f"{name}: wanted 64 hexadecimal digits")
 
 
 def quantity_problem(value: Any) -> str | None:
@@ -130,7 +136,7 @@ def _entry(index: int, raw: Any) -> tuple[OrderEntry | None, str | None]:
     name, quantity = raw.get("child_part_number"), raw.get("quantity")
     problem = quantity_problem(quantity)
     text = None if problem is None else f"entries[{index}].quantity: {problem}"
-    if not is_text(name, 200) or not name.strip():
+    if not is_short_text(name, 200) or not name.strip():
         missing = f"entries[{index}].child_part_number: wanted a part number, got {_shown(name)}"
         return None, missing if text is None else f"{missing}; {text}"
     # An entry with a bad quantity is still looked up, so that an unknown number is reported as well.
@@ -143,7 +149,9 @@ def _components(index: int, raw: Any) -> tuple[Sequence[Mapping[str, str]], str 
     if raw is None:
         return (), None
     if not isinstance(raw, list) or not all(
-        isinstance(one, Mapping) and is_text(one.get("file"), 4096) and is_text(one.get("object", ""), 1024)
+        isinstance(one, Mapping)
+        and is_short_text(one.get("file"), 4096)
+        and is_short_text(one.get("object", ""), 1024)
         for one in raw
     ):
         return (), f'entries[{index}].components: wanted [{{"file": …, "object": …}}, …], got {_shown(raw)}'
@@ -167,7 +175,7 @@ def _left_out_part(index: int, raw: Any) -> dict[str, Any]:
     part: dict[str, Any] = {}
     for name, longest in _LEFT_OUT_TEXTS.items():
         value = raw.get(name, "")
-        if not is_text(value, longest):
+        if not is_short_text(value, longest):
             raise RejectedError(
                 f"left_out[{index}].{name}: wanted at most {longest} characters, got {_shown(value)}"
             )
@@ -186,14 +194,12 @@ def _document(raw: Any) -> tuple[str | None, str | None, str | None, int | None]
         return None, None, None, None
     if not isinstance(raw, Mapping):
         raise RejectedError('document: wanted {"file": …, "sha256": …, "revision": …}')
-    file, sha256, revision = raw.get("file"), raw.get("sha256"), raw.get("revision")
-    folder = raw.get("folder")
-    if not is_text(file, 4096):
+    file, folder, revision = raw.get("file"), raw.get("folder"), raw.get("revision")
+    if not is_short_text(file, 4096):
         raise RejectedError("document.file: wanted a file name of at most 4096 characters")
-    if folder is not None and not is_text(folder, 1024):
+    if folder is not None and not is_short_text(folder, 1024):
         raise RejectedError("document.folder: wanted a folder of at most 1024 characters")
-    if sha256 is not None and not (isinstance(sha256, str) and re.fullmatch("[0-9A-Fa-f]{64}", sha256)):
-        raise RejectedError("document.sha256: wanted 64 hexadecimal digits")
+    sha256 = sha256_or_none("document.sha256", raw.get("sha256"))
     if isinstance(revision, float) and revision.is_integer():
         revision = int(revision)  # 2.0 is a whole number in JSON
     if revision is not None and not (type(revision) is int and 0 <= revision < 2**31):

@@ -201,6 +201,12 @@ def where_used(
     return found, total
 
 
+def use_counts(tx: Tx, item_ids: Collection[int]) -> dict[int, int]:
+    """On how many BOM lines each item is; those on none are absent."""
+    query = select(bom_lines.c.child_id, func.count()).where(one_of(tx, bom_lines.c.child_id, item_ids))
+    return {row[0]: row[1] for row in tx.conn.execute(query.group_by(bom_lines.c.child_id))}
+
+
 def _levels_above(tx: Tx, item: Item, levels: int) -> Iterator[list[int]]:
     """The item, then what uses it, then what uses that; each item in its nearest level only."""
     seen = {item.id}
