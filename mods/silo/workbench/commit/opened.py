@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from silo.durable import Stamp
 
 
-def stamp_of(path: str) -> Stamp | None:
+def _stamp(path: str) -> Stamp | None:
     """What changes when a file is written; None where there is none. FreeCAD's start does not import it."""
     from silo.durable import stamp_of as found
 
@@ -74,8 +74,14 @@ class Base:
     @property
     def replaced(self) -> bool:
         """True where somebody else has written the file since."""
-        now = stamp_of(self.path)
+        now = _stamp(self.path)
         return self.stamp is not None and now is not None and now != self.stamp
+
+
+def _stamp(path: str) -> Stamp | None:
+    from silo.durable import stamp_of  # FreeCAD's start does not wait for it
+
+    return stamp_of(path)
 
 
 def _unchanged_hash(path: str, stamp: Stamp | None) -> str:
@@ -85,7 +91,7 @@ def _unchanged_hash(path: str, stamp: Stamp | None) -> str:
         content = content_hash(path)
     except OSError:
         return ""
-    return content if stamp is not None and stamp_of(path) == stamp else ""
+    return content if stamp is not None and _stamp(path) == stamp else ""
 
 
 class Opened:
@@ -112,7 +118,7 @@ class Opened:
         """The base of a document, also of one that was opened before we looked."""
         known = self._bases.get(doc.Name)
         if known is None:
-            known = self._bases[doc.Name] = Base(doc.FileName, stamp_of(doc.FileName))
+            known = self._bases[doc.Name] = Base(doc.FileName, _stamp(doc.FileName))
         return known
 
     def forget(self, doc: Any) -> None:
@@ -140,7 +146,7 @@ class Opened:
                 self._settle(known)
                 known.path, known.stamp = doc.FileName, None
             return
-        stamp = stamp_of(doc.FileName)
+        stamp = _stamp(doc.FileName)
         # A document that has objects before it has a file was made here.
         made_here = stamp is None or bool(doc.Objects)
         base = self._bases[doc.Name] = Base(doc.FileName, None if made_here else stamp)
@@ -162,7 +168,7 @@ class Opened:
         base = self._bases.get(doc.Name)
         if base is None or os.path.realpath(filename) != os.path.realpath(doc.FileName or ""):
             return
-        base.path, base.stamp = doc.FileName, stamp_of(doc.FileName)
+        base.path, base.stamp = doc.FileName, _stamp(doc.FileName)
         stamp, origin = base.stamp, base.origin
 
         def remember() -> None:
