@@ -417,6 +417,8 @@ def test_the_object_names_its_item_too(tmp_path: Path) -> None:
     assert stamp(path, "u-1", item_object="Box")
     document = open_document(path)
     assert document.getObject("Box").SiloItemId == "u-1"
+    # FreeCAD's property editor shows it, and nobody changes it there by accident.
+    assert b'attr="8" ro="1"' in zipfile.ZipFile(path).read("Document.xml")
     assert not hasattr(document.getObject("Other"), "SiloItemId")
     assert (document.Meta, identity_of(document.getObject("Box"))) == ({"SiloUUID": "u-1"}, "u-1")
     with zipfile.ZipFile(path) as archive:

@@ -42,7 +42,7 @@ def test_the_clipboard_is_for_a_spreadsheet(told: dict[str, Any]) -> None:
 
 
 def test_a_long_one_lets_the_window_live_and_can_be_cancelled(told: dict[str, Any]) -> None:
-    """Eight plates with 144 holes each; the window's own timer runs meanwhile."""
+    """Four plates with 144 holes each; the window's own timer runs meanwhile."""
     volume = (160 * 160 * 5 - 144 * 3.141592653589793 * 9 * 5) / 1000
     assert {float(row[4]) for row in told["heavy"]} == {float(f"{volume:.5g}")}
     assert told["ticks"] > 5

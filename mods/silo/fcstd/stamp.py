@@ -189,9 +189,10 @@ def _read_back(path: str, temporary: str, key: str, identity: str) -> None:
 
 
 _MORE = {'"': "&quot;", "'": "&apos;", "\n": "&#10;", "\r": "&#13;", "\t": "&#9;"}
+# As FreeCAD writes what the add-on adds: asks for no recompute (8), and cannot be edited by accident.
 _ITEM_ID = (
     b'<Property name="SiloItemId" type="App::PropertyString" group="Silo" doc="Identity of the item in Silo"'
-    b' attr="0" ro="0" hide="0">\n                    <String value="%s"/>\n                </Property>'
+    b' attr="8" ro="1" hide="0">\n                    <String value="%s"/>\n                </Property>'
 )
 _COUNT = re.compile(rb"""(<Properties\b[^<>]*?\sCount\s*=\s*["'])(\d+)(["'])""")
 

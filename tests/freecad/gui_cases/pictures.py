@@ -275,7 +275,12 @@ def commit(one: Any, top: Any) -> None:
     App.setActiveDocument(top.Name)
     show(top)
     photograph(one.dock, "activity")
+    # Its number and state are in the property editor.
+    bolt = top.getObject("FlangeBolt1")
+    wait(lambda: "SiloState" in bolt.PropertiesList)
+    Gui.Selection.addSelection(bolt)
     photograph_window("window")
+    Gui.Selection.clearSelection()
 
 
 def registering(one: Any, top: Any) -> None:

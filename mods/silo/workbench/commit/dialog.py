@@ -43,7 +43,8 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         self.comment.setMaximumHeight(5 * self.comment.fontMetrics().lineSpacing())
         self.comment.setPlainText(comment)
         layout.addWidget(self.comment)
-        layout.addWidget(widgets.label(self._heading(), wrap=True))
+        self._head = widgets.label(self._heading(), wrap=True)
+        layout.addWidget(self._head)
         self.files = self._make_files()
         layout.addWidget(self.files, 1)
         if len(plan.rows) > 1:
@@ -183,6 +184,10 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
                 self._show_one(self.files.topLevelItem(number), number, theirs)
         if self._theirs:
             self._tell_who()
+            text = translate(
+                "Silo", "What somebody else has changed is left out, unless you choose otherwise:"
+            )
+            self._head.setText(text)
             self.files.setColumnHidden(_CHOICE, False)
             self.files.setRootIsDecorated(True)
             for column in (0, _CHOICE):
