@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
 def _stamp(path: str) -> Stamp | None:
     """What changes when a file is written; None where there is none. FreeCAD's start does not import it."""
-    from silo.durable import stamp_of as found
+    from silo.durable import stamp_of
 
-    return found(path)
+    return stamp_of(path)
 
 
 class Origins(Protocol):
@@ -76,12 +76,6 @@ class Base:
         """True where somebody else has written the file since."""
         now = _stamp(self.path)
         return self.stamp is not None and now is not None and now != self.stamp
-
-
-def _stamp(path: str) -> Stamp | None:
-    from silo.durable import stamp_of  # FreeCAD's start does not wait for it
-
-    return stamp_of(path)
 
 
 def _unchanged_hash(path: str, stamp: Stamp | None) -> str:
