@@ -226,6 +226,9 @@ def _take_from_lfs(objects: Path, path: Path) -> None:
 
 
 def _commit(repository: str, revision: str) -> str:
+    if revision == "HEAD" and not _git(repository, "rev-list", "-n", "1", "--all"):
+        # Before the first commit there is nothing: git knows the empty tree without having it.
+        return _git(repository, "hash-object", "-t", "tree", os.devnull).decode().strip()
     # The two dashes: a revision that begins with a dash is no option.
     found = _git(repository, "rev-parse", "--verify", "--quiet", "--end-of-options", f"{revision}^{{commit}}")
     return found.decode().strip()

@@ -1,0 +1,235 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""The workflows of ``examples/ci/``: each step as the runner runs it, in a repository with a pull request.
+
+What the runner would have installed is stood in for: ``pip`` and ``apt-get`` do nothing, ``gh`` asks the same
+service with ``curl``. The service keeps the comments of a pull request, as GitHub's and Forgejo's does.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from threading import Thread
+from typing import Any
+
+import pytest
+import yaml
+
+from silo.cli.demo_edit import set_element_count
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+NEEDED = ("git", "jq", "curl", "bash", "iconv")
+MISSING = [name for name in NEEDED if shutil.which(name) is None]
+pytestmark = pytest.mark.skipif(bool(MISSING), reason=f"not on this machine: {', '.join(MISSING)}")
+
+GH = """#!/bin/bash
+# gh api [--paginate] [-X METHOD] PATH [--jq FILTER] [-F body=@FILE]
+shift
+while [ $# -gt 0 ]; do
+  case $1 in
+    --paginate) ;;
+    -X) method=$2; shift ;;
+    --jq) filter=$2; shift ;;
+    -F) body=${2#body=@}; shift ;;
+    *) path=$1 ;;
+  esac
+  shift
+done
+if [ -n "$body" ]; then jq -n --rawfile body "$body" '{body: $body}' > "$body.json"; fi
+curl -sS --fail-with-body -H "Authorization: token $GH_TOKEN" -X "${method:-GET}" ${body:+-d @$body.json} \\
+  "$SERVICE/$path" | jq -r "${filter:-.}"
+"""
+
+
+@dataclass
+class Service:
+    """Comments by their number; everything else is as the pull request says."""
+
+    url: str = ""
+    comments: dict[int, str] = field(default_factory=dict)
+
+
+@pytest.fixture
+def service() -> Iterator[Service]:
+    """Comments of pull request 7, of which one is another robot's."""
+    kept = Service(comments={1: "coverage: 81 %"})
+
+    class Handler(BaseHTTPRequestHandler):
+        def answer(self) -> None:
+            length = int(self.headers.get("Content-Length") or 0)
+            body = json.loads(self.rfile.read(length))["body"] if length else ""
+            steps = self.path.removeprefix("/repos/our/cad/issues").strip("/").split("/")
+            data: Any = {}
+            if self.headers["Authorization"] != "token t0k":
+                code = 401
+            elif steps == ["7", "comments"] and self.command == "POST":
+                code, kept.comments[max(kept.comments) + 1] = 201, body
+            elif steps == ["7", "comments"]:
+                code, data = (
+                    200,
+                    [
+                        {"id": number, "body": text, "user": {"type": "Bot"}}
+                        for number, text in kept.comments.items()
+                    ],
+                )
+            elif steps[0] == "comments" and self.command == "PATCH":
+                code, kept.comments[int(steps[1])] = 200, body
+            else:
+                code = 404
+            content = json.dumps(data).encode()
+            self.send_response(code)
+            self.send_header("Content-Length", str(len(content)))
+            self.end_headers()
+            self.wfile.write(content)
+
+        do_GET = do_POST = do_PATCH = answer
+
+        def log_message(self, *_: object) -> None:
+            pass
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
+        Thread(target=server.serve_forever, daemon=True).start()
+        kept.url = f"http://127.0.0.1:{server.server_port}"
+        yield kept
+        server.shutdown()
+
+
+def git(folder: Path, *words: str) -> str:
+    who = ("-c", "user.name=t", "-c", "user.email=t", "-c", "commit.gpgsign=false")
+    done = subprocess.run(["git", *who, *words], cwd=folder, capture_output=True, text=True, check=True)
+    return done.stdout.strip()
+
+
+@dataclass
+class Runner:
+    """Runs the steps of a workflow in a checkout, as its service's runner does."""
+
+    workflow: dict[str, Any]
+    checkout: Path
+    tools: Path
+    service: Service
+
+    def run(self) -> int:
+        """The exit code of the first step that fails, else 0."""
+        (job,) = self.workflow["jobs"].values()
+        base, head = git(self.checkout, "rev-parse", "origin/main"), git(self.checkout, "rev-parse", "HEAD")
+        values = {
+            "github.event.pull_request.base.sha": base,
+            "github.event.pull_request.head.sha": head,
+            "github.event.pull_request.number": "7",
+            "github.repository": "our/cad",
+            "github.api_url": self.service.url,
+            "github.token": "t0k",
+            "secrets.BOM_TOKEN": "t0k",
+        }
+        files = {name: self.tools / name for name in ("GITHUB_ENV", "GITHUB_STEP_SUMMARY")}
+        for path in files.values():
+            path.write_text("")
+        for step in job["steps"]:
+            if "run" not in step:
+                continue
+            given = {
+                name: re.sub(r"\$\{\{\s*(.*?)\s*\}\}", lambda found: values[found[1]], text)
+                for name, text in step.get("env", {}).items()
+            }
+            later = dict(line.split("=", 1) for line in files["GITHUB_ENV"].read_text().splitlines())
+            script = step["run"].replace("/opt/silo", str(self.tools))
+            environment = {
+                **os.environ,
+                "PATH": f"{self.tools / 'bin'}{os.pathsep}{os.environ['PATH']}",
+                "SERVICE": self.service.url,
+                "PYTHONPATH": os.pathsep.join(sys.path),
+                **{name: str(path) for name, path in files.items()},
+                **later,
+                **given,
+            }
+            done = subprocess.run(
+                ["bash", "-e", "-c", script],
+                cwd=self.checkout,
+                env=environment,
+                capture_output=True,
+                text=True,
+            )
+            if done.returncode:
+                print(done.stdout, done.stderr)
+                return done.returncode
+        return 0
+
+
+@pytest.fixture(params=["github", "forgejo"])
+def runner(request: pytest.FixtureRequest, gearbox: Path, tmp_path: Path, service: Service) -> Runner:
+    """A clone of a repository whose branch has four bolts more than main, which went on meanwhile."""
+    text = (EXAMPLES / "ci" / f"{request.param}-bom-diff.yml").read_text("utf-8")
+    folder = gearbox.parent
+    git(folder, "init", "-q", "-b", "main")
+    git(folder, "add", "-A")
+    git(folder, "commit", "-qm", "first")
+    git(folder, "checkout", "-qb", "more-bolts")
+    set_element_count(gearbox, "CoverBolts", added=4)
+    git(folder, "commit", "-qam", "more bolts")
+    git(folder, "checkout", "-q", "main")
+    (folder / "notes.txt").write_text("main went on")
+    git(folder, "add", "-A")
+    git(folder, "commit", "-qm", "notes")
+    git(tmp_path, "clone", "-q", "-b", "more-bolts", str(folder), "checkout")
+    tools = tmp_path / "tools"
+    (tools / "bin").mkdir(parents=True)
+    programs = {
+        "pip": "#!/bin/sh\n",
+        "apt-get": "#!/bin/sh\n",
+        "python3": "#!/bin/sh\n",  # of "python3 -m venv"
+        "gh": GH,
+        "silo-mod": f'#!/bin/sh\nexec {sys.executable} -m silo.cli.main "$@"\n',
+    }
+    for name, program in programs.items():
+        (tools / "bin" / name).write_text(program)
+        (tools / "bin" / name).chmod(0o755)
+    return Runner(yaml.safe_load(text), tmp_path / "checkout", tools, service)
+
+
+def test_a_pull_request_has_one_comment_that_follows_its_pushes(runner: Runner) -> None:
+    assert runner.run() == 0
+    assert list(runner.service.comments) == [1, 2]
+    assert "| quantity changed | M8x20 Bolt | 12 → 16 |" in runner.service.comments[2]
+    set_element_count(runner.checkout / "TopAssembly.FCStd", "CoverBolts", added=2)
+    git(runner.checkout, "commit", "-qam", "still more")
+    assert runner.run() == 0
+    assert list(runner.service.comments) == [1, 2], "replaced, and nobody else's"
+    assert "12 → 18" in runner.service.comments[2]
+    assert runner.service.comments[1] == "coverage: 81 %"
+
+
+def test_a_state_that_is_not_whole_is_commented_and_fails(runner: Runner) -> None:
+    (runner.checkout / "parts" / "Cover.FCStd").unlink()
+    git(runner.checkout, "commit", "-qam", "without the cover")
+    assert runner.run() == 1
+    assert "parts/Cover.FCStd is missing" in runner.service.comments[2]
+
+
+def test_what_cannot_be_compared_is_no_comment(runner: Runner) -> None:
+    """A shallow clone has no commit where the branch began."""
+    git(runner.checkout.parent, "clone", "-q", "--depth", "1", "--no-single-branch", "-b", "more-bolts",
+        f"file://{runner.checkout.parent / 'gearbox'}", "shallow")  # fmt: skip
+    runner.checkout = runner.checkout.parent / "shallow"
+    assert runner.run() == 2
+    assert list(runner.service.comments) == [1]
+
+
+def test_the_pre_commit_hook_names_a_command_that_there_is(run: Any, gearbox: Path) -> None:
+    """Also for the first commit of a repository, which has nothing to be compared with."""
+    (hook,) = yaml.safe_load((EXAMPLES.parent / ".pre-commit-hooks.yaml").read_text("utf-8"))
+    program, *words = hook["entry"].split()
+    assert (program, hook["pass_filenames"]) == ("silo-mod", False)
+    assert re.search(hook["files"], "parts/Gear.FCStd")
+    git(gearbox.parent, "init", "-q")
+    ran = run(*words, gearbox.parent)
+    assert ran.code == 0, ran.err
+    assert "TopAssembly.FCStd (new assembly)" in ran.out
