@@ -103,6 +103,7 @@ def test_shapes_and_materials(built: Callable[[Path], Path], in_freecad: Callabl
         if GeometryCode.NOT_CONVERGENT not in codes:
             assert live.volume_m3 == pytest.approx(prototype.volume_m3, rel=VOLUME), live.name
     assert by_name["Splines"].volume_m3 == pytest.approx(told["splines"] * 1e-9, rel=1e-8)
+    assert not by_name["Star"].problems
     densities = {name: (p.step_material, p.step_density) for name, p in by_name.items()}
     assert densities["Linked"] == ("Steel", 7900.0)
     assert densities["OtherUnit"][1] == pytest.approx(8500)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """The bodies of one product together: copies, cavities and overlaps. The same for every engine.
 
+What a mesh encloses is decided here, too, wherever its triangles are from.
+
 Nesting and orientation decide together. A body inside of another one with the opposite orientation is its
 cavity, whichever of the two is inside out: mirrored housings have both turned. A body inside of another one
 with the same orientation adds nothing, for the space is filled already; that, and bodies that overlap, is a
@@ -9,6 +11,7 @@ problem. A copy that lies exactly on a body is counted once.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -17,7 +20,15 @@ from typing import Any
 import numpy as np
 
 from silo.inertia.core import combine_arrays
-from silo.inertia.geometry.mesh import Floats, Mesh, is_inside, mesh_solid
+from silo.inertia.geometry.mesh import (
+    Floats,
+    Mesh,
+    components,
+    is_inside,
+    mesh_solid,
+    open_edges,
+    without_doubled,
+)
 from silo.inertia.model import GeometryCode, GeometryProblem, SolidProps
 from silo.inertia.wording import counted
 
@@ -29,6 +40,9 @@ COMMON = 1e-7
 
 WHOLE = 1e-6
 """A body that shares all but this much of itself with another one lies inside of it."""
+
+MAX_COMPONENTS = 500
+"""Meshes in more pieces than this are measured as a whole: scans come in thousands of crumbs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,3 +298,50 @@ def _closed(body: Body) -> Any:
     found = manifold3d.Manifold(mesh)
     sound = found.status() == manifold3d.Error.NoError and found.volume() > 0
     return found if sound else None
+
+
+def enclosed(mesh: Mesh, problems: list[GeometryProblem]) -> SolidProps:
+    """The moments of a part's triangles; every doubt is added to ``problems``."""
+    mesh, repeated, _ = without_doubled(mesh)
+    if repeated:
+        what = counted(repeated, "of its triangles is", "of its triangles are")
+        words = f"{what} there more than once; each is counted once"
+        problems.append(GeometryProblem(GeometryCode.COINCIDENT_SOLIDS, words))
+    if not len(mesh):
+        return SolidProps(0.0, np.zeros(3), np.zeros((3, 3)))
+    edges = open_edges(mesh)
+    if edges:
+        problems.append(_not_closed(mesh, edges))
+        return mesh_solid(mesh)
+    pieces = components(mesh, MAX_COMPONENTS)
+    if len(pieces) == 1 and len(components(mesh, sys.maxsize)) > 1:
+        words = (
+            f"its triangles are in more than {MAX_COMPONENTS} pieces, which may overlap; they were added up"
+        )
+        problems.append(GeometryProblem(GeometryCode.OVERLAPPING_SOLIDS, words))
+    found = together([_body(piece) for piece in pieces], MeshCommon(), problems)
+    if found.turned:
+        which = "the mesh is" if len(pieces) == 1 else f"{found.turned} of its {len(pieces)} pieces are"
+        words = f"{which} inside out; the sign was turned"
+        problems.append(GeometryProblem(GeometryCode.NEGATIVE_VOLUME, words))
+    solids = found.solids
+    whole = combine_arrays(
+        np.array([s.volume_m3 for s in solids]),
+        np.array([s.com_m for s in solids]),
+        np.array([s.inertia_unit for s in solids]),
+    )
+    return SolidProps(whole.mass, whole.com, whole.inertia, reversed=found.turned > 0)
+
+
+def _body(piece: Mesh) -> Body:
+    return Body(mesh_solid(piece), piece.vertices.min(axis=0), piece.vertices.max(axis=0), piece)
+
+
+def _not_closed(mesh: Mesh, edges: int) -> GeometryProblem:
+    """Holes, or triangles that disagree; either way the volume depends on the point that it is taken from."""
+    undirected = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    if (np.unique(undirected, axis=0, return_counts=True)[1] == 2).all():
+        words = "its triangles do not agree on what is outside; its volume cannot be trusted"
+        return GeometryProblem(GeometryCode.WINDING, words)
+    words = f"the mesh is open ({edges} free or shared edges), so it has no exact volume"
+    return GeometryProblem(GeometryCode.NOT_WATERTIGHT, words)

@@ -17,9 +17,9 @@ from OCP.Standard import Standard_Failure
 from OCP.TopoDS import TopoDS
 
 from silo.inertia.geometry.kernel import occt
-from silo.inertia.geometry.kernel.tessellate import MM, bounds, box, xyz
+from silo.inertia.geometry.kernel.tessellate import MM, bounds, box, triangles, xyz
 from silo.inertia.geometry.measured import CONVERGED, STATED, Gap
-from silo.inertia.geometry.mesh import Floats
+from silo.inertia.geometry.mesh import Floats, open_edges, welded
 
 MEETING = 1e-4
 """Share of a shape's size; edges that are closer are one. Real files have gaps of 5 µm in parts of 100 mm."""
@@ -98,7 +98,7 @@ def closed_shells(shapes: list[Any]) -> list[Any]:
             if _is_closed(shell):
                 closed.append(_solid(shell))
             else:
-                loose += occt.faces_of(shell)
+                loose += [face for face in occt.faces_of(shell) if occt.has_surface(face)]
         loose += occt.loose_faces_of(shape)
     if 1 < len(loose) <= MOST_FACES:
         size = max(box(shape)[1] for shape in shapes)
@@ -109,7 +109,13 @@ def closed_shells(shapes: list[Any]) -> list[Any]:
 
 
 def _is_closed(shape: Any) -> bool:
-    """By the edges that its faces share; a sphere's pole and a cylinder's seam are no open edges."""
+    """By the edges that its faces share; a sphere's pole and a cylinder's seam are no open edges.
+
+    Faces that hold triangles only (tessellated STEP) have no edges; their triangles do.
+    """
+    if not all(occt.has_surface(face) for face in occt.faces_of(shape)):
+        mesh, missing = triangles(shape)
+        return not missing and not open_edges(welded(mesh.vertices, mesh.faces))
     check = ShapeAnalysis_Shell()
     check.CheckOrientedShells(shape, True, True)
     return not check.HasFreeEdges() and not check.HasBadEdges()

@@ -5,8 +5,9 @@
   integration. Everything else needs control: the plain one is off by more than 1e-4 on one real part in
   thirteen.
 * The kernel's controlled integration looks at the volume only, so a tensor lags behind by up to four powers
-  of ten, and where it gives up (splines drawn along a line) it says so. Our own controls all ten moments of
-  every edge. It is slower, and so it is asked where the plain and the controlled integration differ.
+  of ten. Of splines drawn along a line it may give any volume, with an estimated error of 1e-16 (FreeCAD's
+  example of an engine block: -97 cm³ instead of 763). Our own controls all ten moments of every edge. It is
+  slower, and so it is asked where the plain and the controlled integration differ.
 * Where the kernel's and ours differ although both have converged, ours is asked how far it depends on the way
   that the volume is taken: less than both differ, and the kernel's is wrong; more than :data:`STATED`, and
   the faces do not meet at their edges, so no integration is right, and a warning says so.
@@ -83,8 +84,9 @@ def solid_moments(solid: Any, eps: float, notes: Notes) -> Moments:
     except (Standard_Failure, ValueError, RuntimeError, ArithmeticError):
         return kernel
     # An open or torn shell has no volume that both could agree on; then the doubt stays the kernel's.
+    # Where faces close, it is the kernel that may be that far off: closed splines drawn along a line.
     apart = abs(ours.volume - kernel.volume) / abs(kernel.volume)
-    if apart > MESH_TOLERANCE or ours.error > CONVERGED:
+    if ours.error > CONVERGED or (apart > MESH_TOLERANCE and ours.drift > STATED):
         return ours if ours.error < kernel.error and apart <= MESH_TOLERANCE else kernel
     # Ours depends less on its own formula than it differs from the kernel's: then the kernel's is wrong.
     better = kernel.error > CONVERGED or apart <= AGREE or ours.drift < apart

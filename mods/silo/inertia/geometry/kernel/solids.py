@@ -53,11 +53,10 @@ from silo.inertia.geometry.mesh import (
     Floats,
     Mesh,
     joined,
-    mesh_solid,
-    mesh_volume,
     simplified,
+    welded,
 )
-from silo.inertia.geometry.together import Body, together
+from silo.inertia.geometry.together import Body, enclosed, together
 from silo.inertia.model import GeometryCode, GeometryProblem, SolidProps
 
 SMALL = 0.1
@@ -193,17 +192,19 @@ def _rebuilt(shape: Any, offset: Floats) -> Any:
 
 
 def _triangulated_solid(solid: Any, notes: Notes) -> tuple[SolidProps | None, Mesh | None]:
-    """A solid whose faces are triangles without surfaces (AP242 tessellated): its polyhedron is exact."""
+    """A solid whose faces are triangles without surfaces (AP242 tessellated), judged as a mesh file is."""
     mesh, missing = triangles(solid)
-    if missing or not len(mesh) or mesh_volume(mesh) == 0.0:
+    if missing or not len(mesh):
         message = "the solid mixes triangles and surfaces, or has neither; it is left out"
         notes.append((GeometryCode.INVALID_SHAPE, message))
         return None, mesh if len(mesh) else None
-    props = mesh_solid(mesh)
+    problems: list[GeometryProblem] = []
+    props = enclosed(mesh := welded(mesh.vertices, mesh.faces), problems)
+    notes += [(GeometryCode(problem.code), problem.message) for problem in problems]
+    if props.volume_m3 == 0.0:
+        notes.append(NO_VOLUME)
+        return None, mesh
     notes.append((GeometryCode.READER, "the solid is given as triangles, and measured as such"))
-    if props.reversed:
-        message = "the solid's triangles look inwards; its sign was turned"
-        notes.append((GeometryCode.NEGATIVE_VOLUME, message))
     return props, mesh
 
 

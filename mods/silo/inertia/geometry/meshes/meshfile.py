@@ -7,7 +7,6 @@ computed all the same and said: a number from an open mesh looks like any other 
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,18 +15,13 @@ from typing import Any
 import numpy as np
 
 from silo.bom.errors import ConfigError, DocumentError
-from silo.inertia.core import combine_arrays
 from silo.inertia.geometry.checks import coincident_problems, implausible_size, name_problems, scaled_problems
 from silo.inertia.geometry.detect import Kind
 from silo.inertia.geometry.graph import MAX_DEPTH, Child, Floats, Node, unfold
-from silo.inertia.geometry.mesh import Mesh, components, mesh_solid, open_edges, welded, without_doubled
+from silo.inertia.geometry.mesh import Mesh, welded
 from silo.inertia.geometry.options import MESH_UNITS, Reading, ReadOptions, Report
-from silo.inertia.geometry.together import Body, MeshCommon, together
-from silo.inertia.model import Assembly, GeometryCode, GeometryProblem, Prototype, SolidProps
-from silo.inertia.wording import counted
-
-MAX_COMPONENTS = 500
-"""Meshes in more pieces than this are measured as a whole: scans come in thousands of crumbs."""
+from silo.inertia.geometry.together import enclosed
+from silo.inertia.model import Assembly, GeometryCode, GeometryProblem, Prototype
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +164,7 @@ def _prototype(key: str, name: str, mesh: Mesh) -> Prototype:
     problems = name_problems(name, unnamed=False)
     solid = None
     if len(mesh):
-        solid = _measured(mesh, problems)
+        solid = enclosed(mesh, problems)
     if solid is None or solid.volume_m3 == 0.0:
         problems.append(GeometryProblem(GeometryCode.NO_SOLID, "its triangles enclose no volume"))
         return Prototype(key, name, has_solid=False, problems=tuple(problems), mesh=mesh)
@@ -184,50 +178,3 @@ def _prototype(key: str, name: str, mesh: Mesh) -> Prototype:
         problems=tuple(problems),
         mesh=mesh,
     )
-
-
-def _measured(mesh: Mesh, problems: list[GeometryProblem]) -> SolidProps:
-    """The moments of a part's triangles; every doubt is added to ``problems``."""
-    mesh, repeated, _ = without_doubled(mesh)
-    if repeated:
-        what = counted(repeated, "of its triangles is", "of its triangles are")
-        words = f"{what} there more than once; each is counted once"
-        problems.append(GeometryProblem(GeometryCode.COINCIDENT_SOLIDS, words))
-    if not len(mesh):
-        return SolidProps(0.0, np.zeros(3), np.zeros((3, 3)))
-    edges = open_edges(mesh)
-    if edges:
-        problems.append(_not_closed(mesh, edges))
-        return mesh_solid(mesh)
-    pieces = components(mesh, MAX_COMPONENTS)
-    if len(pieces) == 1 and len(components(mesh, sys.maxsize)) > 1:
-        words = (
-            f"its triangles are in more than {MAX_COMPONENTS} pieces, which may overlap; they were added up"
-        )
-        problems.append(GeometryProblem(GeometryCode.OVERLAPPING_SOLIDS, words))
-    found = together([_body(piece) for piece in pieces], MeshCommon(), problems)
-    if found.turned:
-        which = "the mesh is" if len(pieces) == 1 else f"{found.turned} of its {len(pieces)} pieces are"
-        words = f"{which} inside out; the sign was turned"
-        problems.append(GeometryProblem(GeometryCode.NEGATIVE_VOLUME, words))
-    solids = found.solids
-    whole = combine_arrays(
-        np.array([s.volume_m3 for s in solids]),
-        np.array([s.com_m for s in solids]),
-        np.array([s.inertia_unit for s in solids]),
-    )
-    return SolidProps(whole.mass, whole.com, whole.inertia, reversed=found.turned > 0)
-
-
-def _body(piece: Mesh) -> Body:
-    return Body(mesh_solid(piece), piece.vertices.min(axis=0), piece.vertices.max(axis=0), piece)
-
-
-def _not_closed(mesh: Mesh, edges: int) -> GeometryProblem:
-    """Holes, or triangles that disagree; either way the volume depends on the point that it is taken from."""
-    undirected = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    if (np.unique(undirected, axis=0, return_counts=True)[1] == 2).all():
-        words = "its triangles do not agree on what is outside; its volume cannot be trusted"
-        return GeometryProblem(GeometryCode.WINDING, words)
-    words = f"the mesh is open ({edges} free or shared edges), so it has no exact volume"
-    return GeometryProblem(GeometryCode.NOT_WATERTIGHT, words)

@@ -49,7 +49,7 @@ class StepFile:
     shapes, measured
         of each product with a shape of its own: the kernel's, or what was measured of them already.
     empty
-        products without children and without any edge: their geometry is somewhere else.
+        products without children and without any edge or face: their geometry is somewhere else.
     kept
         the kernel's document. Taking a large one down takes longer than reading on.
     """
@@ -152,7 +152,8 @@ class _Walk:
         self._file.empty = [
             key
             for key, shapes in self._file.shapes.items()
-            if not self._file.nodes[key].children and not any(occt.has_edges(shape) for shape in shapes)
+            if not self._file.nodes[key].children
+            and not any(occt.has_edges(shape) or occt.faces_of(shape) for shape in shapes)
         ]
         return self._file
 
