@@ -101,6 +101,8 @@ class Buttons:
     def _with_document(self, path: str, call: Callable[[object], object]) -> None:
         doc = host.find_document(path)
         if doc is None:
+            # The report view is often hidden.
+            qt.tell_at_pointer(translate("Silo", "This document is not open any more."))
             host.warning(translate("Silo", "[Silo] This document is not open: ") + plain(path))
         else:
             call(doc)

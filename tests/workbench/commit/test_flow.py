@@ -141,6 +141,8 @@ def test_an_unregistered_one_is_registered_with_its_comment(office: Office) -> N
     (number,) = (s.item.part_number for s in office.silo.items.values())
     assert [r.comment for r in office.silo.revisions(number) if r.file_name] == ["a comment"]
     assert flow.comment_of(new.FileName) == ""
+    # What the first two commits said of it is not so any more.
+    assert titles(office) == [f"Committed: {number} New"]
 
 
 def test_a_disk_that_does_not_take_it_is_a_box(office: Office, flow: CommitFlow) -> None:

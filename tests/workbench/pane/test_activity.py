@@ -22,7 +22,7 @@ from silo.workbench.pane.activity import (
 
 
 def entry(key: str, when: float = 0.0, title: str = "x", rank: int = 0, also: str = "") -> Entry:
-    return Entry(key=key, title=title, when=when, rank=rank, also=also)
+    return Entry(key=key, title=title, when=when, rank=rank, also=(also,) if also else ())
 
 
 def keys(activity: Activity) -> list[str]:

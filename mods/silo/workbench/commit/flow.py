@@ -30,7 +30,7 @@ from silo.workbench.commit.desk import Answer, Desk
 from silo.workbench.commit.plan import MOST_S, Plan, Row, State, Taken, Taker, plan, refusal
 from silo.workbench.commit.snapshot import Snapshot
 from silo.workbench.commit.theirs import Asked, Choice, Theirs, look
-from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone
+from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone, not_in_silo_key
 from silo.workbench.session.session import Session
 from silo.workbench.settings.preferences import ALLOW, Preferences
 from silo.workbench.words import translate
@@ -313,7 +313,7 @@ def not_in_silo(taken: Snapshot) -> Entry:
     tone = Tone.PLAIN if taken.problem else Tone.WARNING
     register = Action(Do.REGISTER, translate("Silo", "Register Parts…"), document=taken.path)
     return Entry(
-        key=f"not-in-silo:{taken.path}",
+        key=not_in_silo_key(taken.path),
         title=translate("Silo", "Saved, but not in Silo: {name}").replace("{name}", name),
         when=time.time(),
         tone=tone,

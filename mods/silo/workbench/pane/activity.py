@@ -92,7 +92,7 @@ class Entry:
     rank
         but only if it knows at least as much: our own sync (1) is not replaced by the server's event (0).
     also
-        the key of another entry that this one includes, such as the upload of the file.
+        the keys of other entries that this one includes or settles, such as the upload of the file.
     icon
         name of one of the add-on's icons.
     badges
@@ -113,7 +113,7 @@ class Entry:
     lines: tuple[Line, ...] = ()
     actions: tuple[Action, ...] = ()
     rank: int = 0
-    also: str = ""
+    also: tuple[str, ...] = ()
     icon: str = ""
     part_of: Batch | None = None
     document: str = ""
@@ -141,6 +141,11 @@ class Entry:
             for line, done in zip(self.lines, answered, strict=True)
         )
         return replace(self, lines=tuple(lines))
+
+
+def not_in_silo_key(path: str) -> str:
+    """The key of the box for a document without an item; a commit of it that arrives takes its place."""
+    return f"not-in-silo:{path}"
 
 
 def gathered(entries: Iterable[Entry]) -> tuple[Entry, ...]:
@@ -212,10 +217,10 @@ class Activity:
 
     def add(self, entry: Entry) -> Activity:
         """With one more entry. One with the same key and a higher rank stays as it is."""
-        mine = {entry.key, entry.also} - {""}
+        mine = {entry.key, *entry.also}
         # Events may come by the thousand, and hardly one has to do with another.
-        related = [e for e in self.entries if e.key in mine or e.also == entry.key]
-        if any(e.rank > entry.rank and entry.key in (e.key, e.also) for e in related):
+        related = [e for e in self.entries if e.key in mine or entry.key in e.also]
+        if any(e.rank > entry.rank and entry.key in (e.key, *e.also) for e in related):
             return self
         rest = tuple(e for e in self.entries if e.key not in mine) if related else self.entries
         if entry.document:

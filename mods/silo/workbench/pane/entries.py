@@ -21,7 +21,7 @@ from silo.bom.naming import display_name
 from silo.bom.report import shorten
 from silo.bom_sync import Resolved, Status
 from silo.outbox.report import Sent
-from silo.workbench.pane.activity import Action, Batch, Do, Entry, Line, Tone, shortened
+from silo.workbench.pane.activity import Action, Batch, Do, Entry, Line, Tone, not_in_silo_key, shortened
 from silo.workbench.session.colleagues import Newer
 from silo.workbench.words import counted, plain, quantity, translate
 
@@ -36,7 +36,10 @@ def of_sent(sent: Sent, page: Page, now: float | None = None) -> Entry:
     url = (sent.result.resolve_url if sent.result is not None else "") or f"/items/{sent.part_number}/bom"
     return Entry(
         key=f"sync:{sent.sync_id}" if sent.sync_id else f"commit:{sent.part_number}:{now}",
-        also=_revision_key(sent.part_number, sent.revision) if sent.revision else "",
+        also=(
+            not_in_silo_key(sent.entry.path),
+            *((_revision_key(sent.part_number, sent.revision),) if sent.revision else ()),
+        ),
         title=_title(sent),
         when=time.time() if now is None else now,
         tone=tone if tone in (Tone.WARNING, Tone.ERROR) else Tone.GOOD,
