@@ -48,10 +48,10 @@ class FileSurvey(Survey):
         self._document, self._xml = document, xml
         types = xml.head.types
         self._types = set(types.values())
-        known = {type_id: kind_by_type(ancestors(type_id)) for type_id in self._types if is_listed(type_id)}
+        known = {kind: kind_by_type(ancestors(kind)) if is_listed(kind) else None for kind in self._types}
         self._kinds = {
-            name: known.get(type_id) or kind_of(document.object_of(name, type_id))
-            for name, type_id in types.items()
+            name: kind or kind_of(document.object_of(name, types[name]))
+            for name, kind in zip(types, map(known.__getitem__, types.values()), strict=True)
         }
         self._there = set(self._kinds.values())
         self._groups: list[tuple[Kind, tuple[str, ...]]] | None = None
@@ -68,10 +68,12 @@ class FileSurvey(Survey):
 
     def grouped(self, kinds: Set[Kind]) -> set[str]:
         if self._groups is None:
-            groups = [
-                obj for obj, _ in self.of(set(Kind), self._kinds.keys() - self._xml.mentioning("Group"))
+            types, make = self._xml.head.types, self._document.object_of
+            found = [
+                (kind, make(name, types[name]).properties.value("Group"))
+                for name in self._xml.mentioning("Group")
+                if (kind := self._kinds.get(name)) is not None
             ]
-            found = [(self._kinds[obj.Name], obj.properties.value("Group")) for obj in groups]
             self._groups = [(kind, group.names) for kind, group in found if isinstance(group, LocalList)]
         return {name for kind, names in self._groups if kind in kinds for name in names}
 

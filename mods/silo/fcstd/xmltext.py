@@ -13,9 +13,10 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from collections.abc import Callable, Set
+from collections.abc import Callable, Iterable
 from hashlib import sha256
-from itertools import accumulate, islice, pairwise
+from itertools import accumulate, compress, count, islice, repeat
+from operator import lshift, not_, or_
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import unescape
 
@@ -244,11 +245,11 @@ class XmlText:
         if opening is None or not int(opening[1]) == len(found) == text.count(b"<Object ", begin, end):
             raise _Unexpected
         self._limit_objects(len(found))
-        self._names = [name for _, name in found]
-        kinds = {kind: self.decode(kind) for kind in {kind for kind, _ in found}}
+        listed, self._names = map(list, zip(*found, strict=True)) if found else ([], [])
+        kinds = {kind: self.decode(kind) for kind in set(listed)}
         # No name holds a quotation mark.
         names = self.decode(b'"'.join(self._names)).split('"') if found else ()
-        types = {name: kinds[kind] for name, (kind, _) in zip(names, found, strict=True)}
+        types = dict(zip(names, map(kinds.__getitem__, listed), strict=True))
         if len(types) != len(found):
             raise _Unexpected
         return types
@@ -303,33 +304,40 @@ class XmlText:
         if not pieces or len(pieces) != len(self._names) or not _TAIL.match(tail):
             return False
         indent = pieces[0].partition(b"<")[0]
-        for piece, name in zip(pieces, self._names, strict=True):
-            if not piece.startswith(b'%b<Object name="%b">' % (indent, name)):
-                opening = _OBJECT.match(piece)
-                if opening is None or opening[1] != name:
-                    return False
         if not indent.isspace() and indent:
             return False
-        ends = list(accumulate((len(piece) + len(_CLOSING) for piece in pieces), initial=self._position))
-        spans = (begin << _HALF | end for begin, end in pairwise(ends))
+        # A text has thousands of objects: what is done for each of them is done by functions in C.
+        begin = indent + b'<Object name="'
+        opening = (begin + (b'">\0' + begin).join(self._names) + b'">').split(b"\0")
+        if len(opening) != len(pieces):
+            return False
+        for number in compress(count(), map(not_, map(bytes.startswith, pieces, opening))):
+            found = _OBJECT.match(pieces[number])
+            if found is None or found[1] != self._names[number]:
+                return False
+        lengths = map(len(_CLOSING).__add__, map(len, pieces))
+        ends = list(accumulate(lengths, initial=self._position))
+        spans = map(or_, map(lshift, ends, repeat(_HALF)), islice(ends, 1, None))
         self._data = dict(zip(self._head.types, spans, strict=True))
         self._position = ends[-1]
         return True
 
-    def mentioning(self, word: str) -> Set[str]:
-        """Names of the objects in whose data a word may stand, of a text that was read to its end."""
+    def mentioning(self, word: str) -> Iterable[str]:
+        """Names of the objects in whose data a word may stand, of a text that was read to its end; in the
+        order of the text."""
         text, wanted = self.text, word.encode()
         if b"&" in text and b"&#" in text:  # which may be a letter
-            return self.head.types.keys()
-        found, names, ends = set(), list(self._data), [span & _LOW for span in self._data.values()]
+            return self.head.types
+        found, names = list[str](), list(self._data)
+        ends = list(map(_LOW.__and__, self._data.values()))
         if ends != sorted(ends):
-            return self.head.types.keys()
+            return self.head.types
         at = text.find(wanted, self._data[names[0]] >> _HALF) if names else -1
         while at >= 0:
             number = bisect_right(ends, at)
             if number == len(names):
                 break
-            found.add(names[number])
+            found.append(names[number])
             at = text.find(wanted, ends[number])
         return found
 
