@@ -103,6 +103,27 @@ def same_articles_of(entries: Iterable[BomEntry]) -> list[tuple[BomEntry, BomEnt
     return [(known[one], known[other]) for one, other in same_articles(known)]
 
 
+class _Files:
+    """What identifies an object: its file, by one path, and its name in it."""
+
+    def __init__(self, canonical: Canonical | None) -> None:
+        self._canonical = canonical
+        self._paths: dict[str, str] = {}
+
+    def key(self, obj: Any) -> Key:
+        return (self.path(obj), object_name(obj))
+
+    def path(self, obj: Any) -> str:
+        return self.canonical(getattr(getattr(obj, "Document", None), "FileName", "") or "")
+
+    def canonical(self, path: str) -> str:
+        if not path or self._canonical is None:
+            return path
+        if path not in self._paths:
+            self._paths[path] = self._canonical(path)
+        return self._paths[path]
+
+
 class _Walker:
     def __init__(
         self,
@@ -113,16 +134,16 @@ class _Walker:
         below: bool,
     ) -> None:
         self._goes_below = below
-        self._canonical = canonical
-        self._paths: dict[str, str] = {}
-        self.notes = Notes(self._path)
+        # Nothing here refers back to the walker: what a walk made goes with it, at once.
+        self._files = files = _Files(canonical)
+        self.notes = Notes(files.path)
         # For a look at what is not counted, which is nobody's business twice.
-        self.silent = Reader(Notes(self._path), self.key, inspect, hardware=hardware)
+        self.silent = silent = Reader(Notes(files.path), files.key, inspect, hardware=hardware)
         self._reader = Reader(
             self.notes,
-            self.key,
+            files.key,
             inspect,
-            beside=lambda container: loose_hardware(container, self.silent, whole) if hardware else (),
+            beside=lambda container: loose_hardware(container, silent, whole) if hardware else (),
             hardware=hardware,
         )
         self._rings = Rings({})
@@ -133,10 +154,6 @@ class _Walker:
         self._containers: dict[Key, bool] = {}
         self._nameless: dict[int, list[Any]] = {}
 
-    def key(self, obj: Any) -> Key:
-        """What identifies an object: its file and its name in it."""
-        return (self._path(obj), object_name(obj))
-
     def component(self, obj: Any) -> Key:
         """What a component is; the same as its key where it has a name.
 
@@ -144,7 +161,7 @@ class _Walker:
         documents made of one file agree.
         """
         if isinstance(obj, Lost):
-            return (self._canonical_path(obj.file), obj.name)
+            return (self._files.canonical(obj.file), obj.name)
         if (known := self._components.get(id(obj))) is not None:
             return known[1]
         key = self._component(obj)
@@ -165,16 +182,6 @@ class _Walker:
         """How many objects are modelled in an assembly's own file."""
         return len(self._reader.contents(top).local)
 
-    def _path(self, obj: Any) -> str:
-        return self._canonical_path(getattr(getattr(obj, "Document", None), "FileName", "") or "")
-
-    def _canonical_path(self, path: str) -> str:
-        if not path or self._canonical is None:
-            return path
-        if path not in self._paths:
-            self._paths[path] = self._canonical(path)
-        return self._paths[path]
-
     def entry_for(self, obj: Any) -> BomEntry:
         """What an object says of itself, wherever it is used."""
         path, name = key = self.component(obj)
@@ -184,7 +191,7 @@ class _Walker:
         if key not in self._heads:
             standard, registered = self._reader.standard(obj)
             if standard and not registered:  # where it first occurs
-                path, name = self.key(obj)
+                path, name = self._files.key(obj)
             self._heads[key] = BomEntry(
                 doc_path=path,
                 silo_uuid=standard_uuid(standard) if standard and not registered else identity_of(obj),

@@ -19,7 +19,7 @@ from silo.fcstd.container import ContainerFile, Entry, Inflater
 from silo.fcstd.limits import FcstdError
 from silo.fcstd.locate import Found
 from silo.fcstd.objects import FcstdObject
-from silo.fcstd.properties import Kept, Properties
+from silo.fcstd.properties import Properties, table_of
 from silo.fcstd.typetree import ancestors, is_listed
 from silo.fcstd.values import ABSENT, LocalList, Ref, Vector
 from silo.fcstd.xmltext import XmlText
@@ -168,10 +168,9 @@ class FcstdDocument:
         return known
 
     def _type_of(self, name: str) -> str | None:
-        facts = self.content.facts
-        if facts is not None and name in facts.objects:
-            return facts.objects[name][0]
-        return self._xml.head.types.get(name)
+        known = self.content.known
+        kind = known.type_of(name) if known is not None else None
+        return kind or self._xml.head.types.get(name)
 
     def getPropertyByName(self, name: str) -> Any:
         """A document property. AttributeError where there is none, or none with a plain value."""
@@ -198,7 +197,7 @@ class FcstdDocument:
     @cached_property
     def is_large(self) -> bool:
         """True where memory counts more than time."""
-        return self.content.facts is None and len(self._xml.head.types) > _MANY_OBJECTS
+        return self.content.known is None and len(self._xml.head.types) > _MANY_OBJECTS
 
     def was_read(self, obj: FcstdObject, size: int) -> None:
         """Note that an object was read. A large document unloads the one that was read longest ago."""
@@ -220,38 +219,36 @@ class FcstdDocument:
 
     def check(self, target: FcstdObject) -> None:
         """Make sure that what a walker asks of a link's target can be read. Raises DocumentError."""
+        known = self.content.known
+        if known is not None and target.Name in known.sound:
+            return
         # Facts are those of a file that was read to its end.
-        if self.content.facts is None and not _CONTAINERS.isdisjoint(ancestors(target.TypeId)):
+        if known is None and not _CONTAINERS.isdisjoint(ancestors(target.TypeId)):
             self._xml.complete()
         numbers = target.properties.numbers
         for name in _SAID_OF_ITSELF:
             if name in numbers:
                 getattr(target, name, None)
         _ = target.Label, self.Meta, self._value("SiloUUID")
+        if known is not None:
+            known.sound.add(target.Name)
 
     @property
     def properties(self) -> Properties:
         """The property table of the document itself."""
         if self._table is None:
-            facts = self.content.facts
-            self._table = self._whole() if facts is None else Kept(*facts.document, self._whole)
+            known = self.content.known
+            if known is None:
+                self._table = Properties(self._xml, self._xml.head.properties, "")
+            else:
+                self._table = known.document
         return self._table
-
-    def _whole(self) -> Properties:
-        return Properties(self._xml, self._xml.head.properties, "")
 
     def properties_of(self, obj: FcstdObject) -> Properties:
         """The property table of an object of this document."""
-        facts = self.content.facts
-        if facts is not None and obj.Name in facts.objects:
-            return Kept(*facts.objects[obj.Name][1:], lambda: self._whole_of(obj))
-        return self._whole_of(obj)
-
-    def _whole_of(self, obj: FcstdObject) -> Properties:
-        span = self._xml.span(obj.Name)
-        if span is None:
-            raise self._xml.error(f"does not hold the data of the object {obj.Name!r}")
-        return Properties(self._xml, span, obj.TypeId)
+        known = self.content.known
+        table = known.table(obj.Name) if known is not None else None
+        return table or table_of(self._xml, obj.Name, obj.TypeId)
 
     def members(self, names: Collection[str]) -> tuple[FcstdObject, ...]:
         """The objects of these names, without those that are not there."""

@@ -9,9 +9,8 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 from silo.bom.document import LinkProblem
 from silo.bom.findings import FindingCode
@@ -21,13 +20,16 @@ from silo.fcstd.document import FcstdDocument
 from silo.fcstd.limits import FcstdError, Limits
 from silo.fcstd.locate import Found, Locator, NotFound
 from silo.fcstd.objects import FcstdObject
-from silo.fcstd.properties import to_keep
+from silo.fcstd.properties import KnownTables, to_keep
 from silo.fcstd.values import Ref
 from silo.fcstd.xmltext import Shared, XmlText
 
 # Which objects of a file its facts describe: what may be a component, but no features of a body.
 _TARGETS = frozenset(Kind) - {Kind.NOTHING, Kind.FOLDER, Kind.LINK, Kind.ASSEMBLY_LINK, Kind.ELEMENT}
 _TARGETS_AT_MOST = 24
+_ENCODER = json.JSONEncoder(separators=(",", ":"))
+# Files of which facts are kept as values; each takes some kB.
+_REMEMBERED_AT_MOST = 2000
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,10 +53,7 @@ class Content:
         """What tells this content from any other."""
         return self.xml.digest(self.directory.raw)
 
-    @property
-    def facts(self) -> None:
-        """Nothing is known of it that could spare reading it."""
-        return None
+    known: ClassVar[None] = None  # nothing that could spare reading it
 
     @property
     def size(self) -> int:
@@ -82,17 +81,19 @@ class Facts(NamedTuple):
 class Remembered:
     """The content of a file of which facts are known. It is read where they say too little.
 
-    Raises FcstdError then where the file is another one by now.
+    Several sessions may share it. Raises FcstdError where the file that is read is another one by now.
+
+    known
+        the tables of properties that the facts hold.
     """
 
     def __init__(self, path: str, facts: str, contents: Contents) -> None:
         self._path, self._contents = path, contents
         known = Facts(*json.loads(facts))
-        self.facts = known
         self.digest, self.changed_ns, self.read_ns = known.digest, known.changed_ns, known.read_ns
         self.state = FileState(*known.state)
+        self.known = KnownTables(known.document, known.objects, lambda: self.xml)
 
-    @cached_property
     def _content(self) -> Content:
         found = self._contents.read(self._path)
         if found.digest != self.digest:
@@ -102,18 +103,18 @@ class Remembered:
     @property
     def xml(self) -> XmlText:
         """The text."""
-        return self._content.xml
+        return self._content().xml
 
     @property
     def directory(self) -> Directory:
         """The directory of the container."""
-        return self._content.directory
+        return self._content().directory
 
 
 def facts_of(document: FcstdDocument) -> str:
     """The facts of a document that was read to its end, as JSON; "" where none can be given."""
     content = document.content
-    if content.facts is not None or content.xml.is_careful:
+    if not isinstance(content, Content) or content.xml.is_careful:
         return ""
     try:
         survey = document.survey
@@ -129,7 +130,7 @@ def facts_of(document: FcstdDocument) -> str:
         )
     except (FcstdError, UnicodeDecodeError):  # who asks for it gets the error
         return ""
-    return json.dumps(facts, separators=(",", ":"))
+    return _ENCODER.encode(facts)
 
 
 class Contents:
@@ -155,6 +156,7 @@ class Contents:
         self.shared = Shared(self.limits.resident)
         self.reads = 0
         self._known: OrderedDict[str, Content] = OrderedDict()
+        self._remembered: OrderedDict[tuple[str, str], Remembered] = OrderedDict()
         self._size = 0
 
     def read(self, path: str) -> Content:
@@ -175,6 +177,15 @@ class Contents:
         while self._size > self.limits.resident and len(self._known) > 1:
             _, oldest = self._known.popitem(last=False)
             self._size -= oldest.size
+
+    def remembered(self, path: str, facts: str) -> Remembered:
+        """The content of a file of which facts are known."""
+        found = self._remembered.get((path, facts))
+        if found is None:
+            found = self._remembered[path, facts] = Remembered(path, facts, self)
+            if len(self._remembered) > _REMEMBERED_AT_MOST:
+                self._remembered.popitem(last=False)
+        return found
 
     def add(self, path: str, content: Content) -> None:
         """Take what another process has read."""
@@ -241,6 +252,17 @@ class Library:
         self.documents.clear()
         self._contents = Contents(self.limits)
 
+    def dissolve(self) -> None:
+        """Forget all documents and take them apart: no object of them can be used any more.
+
+        Documents and their objects refer to each other. Whoever has thousands of sessions need not wait until
+        Python finds such rings.
+        """
+        for document in self.documents.values():
+            if isinstance(document, FcstdDocument):
+                document.__dict__.clear()
+        self.documents.clear()
+
     def open(self, path: Path | str) -> FcstdDocument:
         """The document in a file, read to its end and checked. Raises DocumentError."""
         opened = os.path.abspath(path)
@@ -292,7 +314,7 @@ class Library:
         if len(self.documents) >= self.limits.documents:
             return FcstdError(found.real, f"more than {self.limits.documents} files are not read in one go")
         if facts := self._facts(found.real):
-            return FcstdDocument(self, found, Remembered(found.real, facts, self._contents))
+            return FcstdDocument(self, found, self._contents.remembered(found.real, facts))
         try:
             try:
                 return FcstdDocument(self, found, self._contents.read(found.real))

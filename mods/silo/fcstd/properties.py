@@ -169,6 +169,14 @@ def _utf8(raw: bytes) -> str:
     return raw.decode()
 
 
+def table_of(xml: XmlText, name: str, type_id: str) -> Properties:
+    """The table of an object. Raises FcstdError."""
+    span = xml.span(name)
+    if span is None:
+        raise xml.error(f"does not hold the data of the object {name!r}")
+    return Properties(xml, span, type_id)
+
+
 class Kept(Properties):
     """The table of an object in a file that was read before; the file is read where it says too little.
 
@@ -178,13 +186,14 @@ class Kept(Properties):
         reads the file.
     """
 
-    __slots__ = ("_whole",)
+    __slots__ = ("_values", "_whole")
 
     def __init__(
         self, names: Sequence[str], pieces: Mapping[str, str], whole: Callable[[], Properties]
     ) -> None:
         self._careful, self._decode, self._whole = False, _utf8, whole
         self._begin = self._end = 0
+        self._values: dict[str, Any] = {}
         self.names = tuple(names)
         self.numbers = dict.fromkeys(self.names, 0)
         self.kept = {name: piece.encode() for name, piece in pieces.items()}
@@ -196,8 +205,48 @@ class Kept(Properties):
     def value(self, name: str) -> Any:
         if name not in self.numbers:
             return ABSENT
-        piece = self.kept.get(name, b"")
-        return super().value(name) if _CANONICAL.match(piece) else self._whole().value(name)
+        if name not in self._values:
+            if not _CANONICAL.match(self.kept.get(name, b"")):
+                return self._whole().value(name)
+            self._values[name] = super().value(name)
+        return self._values[name]
+
+
+class KnownTables:
+    """The tables of a file that was read before, each made once.
+
+    objects
+        name → type, names of properties, kept pieces.
+    xml
+        reads the file.
+    sound
+        names of the objects of which all that a walker asks can be read.
+    """
+
+    def __init__(
+        self,
+        document: tuple[Sequence[str], Mapping[str, str]],
+        objects: Mapping[str, tuple[str, Sequence[str], Mapping[str, str]]],
+        xml: Callable[[], XmlText],
+    ) -> None:
+        self._objects, self._xml = objects, xml
+        self._tables: dict[str, Kept] = {}
+        self.document = Kept(*document, lambda: Properties(xml(), xml().head.properties, ""))
+        self.sound: set[str] = set()
+
+    def type_of(self, name: str) -> str | None:
+        """The type of an object, None where nothing is known of it."""
+        known = self._objects.get(name)
+        return None if known is None else known[0]
+
+    def table(self, name: str) -> Kept | None:
+        """The table of an object, None where nothing is known of it."""
+        table = self._tables.get(name)
+        if table is None and (known := self._objects.get(name)) is not None:
+            kind, names, pieces = known
+            table = Kept(names, pieces, lambda: table_of(self._xml(), name, kind))
+            self._tables[name] = table
+        return table
 
 
 def to_keep(table: Properties) -> tuple[tuple[str, ...], dict[str, str]]:

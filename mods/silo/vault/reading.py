@@ -140,11 +140,20 @@ class Session:
     def ask(self, question: Question, facts: Callable[[str], str] = lambda _path: "") -> Known:
         """The answer with its trail."""
         library = Library(contents=self.contents, locator=self.locator, facts=facts)
-        return Known.found_in(library, self._answer(library, question))
+        try:
+            return Known.found_in(library, self._answer(library, question))
+        finally:
+            library.dissolve()
 
     def read(self, question: Question) -> First:
         """The file of a question, and the answer where no other file is needed for it."""
         library = Library(contents=self.contents, locator=self.locator)
+        try:
+            return self._read(library, question)
+        finally:
+            library.dissolve()
+
+    def _read(self, library: Library, question: Question) -> First:
         facts, linked = "", set[str]()
         try:
             document = library.open(question.path)
