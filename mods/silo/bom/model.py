@@ -34,7 +34,8 @@ class Frozen(tuple[T, ...]):
 def _freeze(value: object, *names: str) -> None:
     """Tuples of what was given: a caller may hand over any iterable, a frozen value holds a tuple."""
     for name in names:
-        object.__setattr__(value, name, Frozen(getattr(value, name)))
+        if type(given := getattr(value, name)) is not Frozen:
+            object.__setattr__(value, name, Frozen(given))
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,7 @@ class BomEntry:
     name: str | None = None
     quantity: int = 1
     level: int = 1
-    children: tuple[BomEntry, ...] = ()
+    children: tuple[BomEntry, ...] = Frozen()
     consolidation_warning: bool = False
     object_name: str = ""
     missing: bool = False
@@ -91,11 +92,11 @@ class BomEntry:
     is_assembly: bool = field(default=False, compare=False)
     individual_links: int = field(default=0, compare=False)
     link_objects: int = field(default=0, compare=False)
-    instances: tuple[str, ...] = field(default=(), compare=False, repr=False)
+    instances: tuple[str, ...] = field(default=Frozen(), compare=False, repr=False)
     document_label: str = field(default="", compare=False, repr=False)
     standard: str | None = None
-    also: tuple[tuple[str, str], ...] = field(default=(), compare=False, repr=False)
-    unregistered: tuple[BomEntry, ...] = field(default=(), compare=False, repr=False)
+    also: tuple[tuple[str, str], ...] = field(default=Frozen(), compare=False, repr=False)
+    unregistered: tuple[BomEntry, ...] = field(default=Frozen(), compare=False, repr=False)
 
     def __post_init__(self) -> None:
         _freeze(self, "children", "instances", "also", "unregistered")
@@ -121,8 +122,8 @@ class Extraction:
     """What a walk found: the assembly itself, its entries, and its findings."""
 
     assembly: BomEntry
-    entries: tuple[BomEntry, ...] = ()
-    findings: tuple[Finding, ...] = ()
+    entries: tuple[BomEntry, ...] = Frozen()
+    findings: tuple[Finding, ...] = Frozen()
 
     def __post_init__(self) -> None:
         _freeze(self, "entries", "findings")

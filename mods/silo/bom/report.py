@@ -196,7 +196,7 @@ def diff_json(diff: BomDiff) -> dict[str, Any]:
 
 FORMAT = 1
 
-_ELSEWHERE = ("children", "instances", "also", "unregistered")
+_ELSEWHERE = frozenset({"children", "instances", "also", "unregistered"})
 _PLAIN_FIELDS = tuple(f.name for f in fields(BomEntry) if f.name not in _ELSEWHERE)
 # What an entry usually says is left out: a vault has tens of thousands of them to read every night.
 _USUAL = {f.name: f.default for f in fields(BomEntry) if f.name in _PLAIN_FIELDS and f.default is not MISSING}
@@ -247,8 +247,11 @@ class _Table:
         if (number := self._known.get(id(entry))) is not None:
             return number
         children = [self.add(child) for child in entry.children]
-        whole = {name: getattr(entry, name) for name in _PLAIN_FIELDS}
-        row = {name: value for name, value in whole.items() if name not in _USUAL or value != _USUAL[name]}
+        row = {
+            name: value
+            for name, value in vars(entry).items()
+            if name not in _ELSEWHERE and (name not in _USUAL or value != _USUAL[name])
+        }
         self.rows.append({**row, "children": children, "instances": list(entry.instances)})
         self._known[id(entry)] = len(self.rows) - 1
         return len(self.rows) - 1

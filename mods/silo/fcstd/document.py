@@ -98,6 +98,8 @@ class FcstdDocument:
         self.FileName = found.real
         self._library, self._found = library, found
         self.content, self.state = content, content.state
+        if content.known is None:
+            self.__dict__["_xml"] = content.xml  # a cached property takes a lock
         self._table: Properties | None = None
         self._objects: dict[str, FcstdObject] = {}
         self._read: deque[FcstdObject] = deque()

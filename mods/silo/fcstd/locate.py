@@ -46,9 +46,15 @@ class NotFound(NamedTuple):
 
 @dataclass
 class Locator:
-    """Finds linked files, all below ``root`` where one is given; remembers folders for one session."""
+    """Finds linked files, all below ``root`` where one is given; remembers folders for one session.
+
+    remembers_files
+        a file that was found is not looked for again.
+    """
 
     root: str | None = None
+    remembers_files: bool = False
+    _files: dict[tuple[str, tuple[str, ...]], Found] = field(default_factory=dict)
     _spelling: Spelling = field(default_factory=Spelling)
     _listings: dict[str, dict[str, list[str]]] = field(default_factory=dict)
 
@@ -67,6 +73,16 @@ class Locator:
 
     def find(self, recorded: str, folders: tuple[str, ...]) -> Found | NotFound:
         """The file that a link in a document of (one of) these folders means."""
+        if not self.remembers_files:
+            return self._find(recorded, folders)
+        found: Found | NotFound | None = self._files.get((recorded, folders))
+        if found is None:
+            found = self._find(recorded, folders)
+            if isinstance(found, Found):
+                self._files[recorded, folders] = found
+        return found
+
+    def _find(self, recorded: str, folders: tuple[str, ...]) -> Found | NotFound:
         if "://" in recorded and _URL.match(recorded):
             return NotFound(FindingCode.MISSING_FILE, "it is a web address; only files are read")
         if (refused := refusal(recorded)) is not None:

@@ -19,6 +19,7 @@ from silo.fcstd.limits import FcstdError
 from silo.fcstd.locate import Found, NotFound
 
 FORMAT = 2
+_ENCODER = json.JSONEncoder(separators=(",", ":"))
 _SETTLED_NS = 2_500_000_000  # FAT has ticks of 2 s, the coarsest in use
 
 
@@ -134,4 +135,4 @@ def _target(led: str) -> str | None:
 
 def json_of(value: Any) -> str:
     # Escaped: a file's name need not be valid Unicode, and SQLite takes nothing else.
-    return json.dumps(value, separators=(",", ":"))
+    return _ENCODER.encode(value)

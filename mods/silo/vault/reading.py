@@ -110,13 +110,14 @@ class First(NamedTuple):
 
     known
         the answer; None where that needs other files.
-    facts
-        of the file, "" where there are none.
+    path, facts
+        the file without symlinks, and its facts, "" where there are none.
     content, linked
         where there is no answer yet: the file itself, and the files that it links to.
     """
 
     known: Known | None
+    path: str = ""
     facts: str = ""
     content: Content | None = None
     linked: tuple[str, ...] = ()
@@ -135,7 +136,7 @@ class Session:
 
     def __init__(self, contents: Contents | None = None) -> None:
         self.contents = contents or Contents()
-        self.locator = Locator()
+        self.locator = Locator(remembers_files=True)
 
     def ask(self, question: Question, facts: Callable[[str], str] = lambda _path: "") -> Known:
         """The answer with its trail."""
@@ -154,19 +155,19 @@ class Session:
             library.dissolve()
 
     def _read(self, library: Library, question: Question) -> First:
-        facts, linked = "", set[str]()
+        path, facts, linked = "", "", set[str]()
         try:
             document = library.open(question.path)
-            facts = facts_of(document)
+            path, facts = document.FileName, facts_of(document)
             for recorded in document.linked():
                 if isinstance(found := self.locator.find(recorded, document.folders), Found):
                     linked.add(found.real)
         except DocumentError:
             pass  # which is the answer
         else:
-            if linked - {document.FileName} and isinstance(document.content, Content):
-                return First(None, facts, document.content, tuple(linked))
-        return First(Known.found_in(library, self._answer(library, question)), facts)
+            if linked - {path} and isinstance(document.content, Content):
+                return First(None, path, facts, document.content, tuple(linked))
+        return First(Known.found_in(library, self._answer(library, question)), path, facts)
 
     def _answer(self, library: Library, question: Question) -> dict[str, Any]:
         try:
@@ -278,17 +279,17 @@ class Reading:
         self.asked += len(left)
         pool = self._pool if self._pool is not None and len(left) >= self._pool.worth else None
         size = CHUNK if pool is None else pool.chunk
-        contents, linked, held = dict[str, Content](), dict[int, tuple[str, ...]](), 0
+        contents, linked, held = dict[str, Content](), dict[int, First](), 0
         chunks = (_Chunk([some[number] for number in group], None) for group in grouped(left, size))
         for number, first in zip(left, self._worked_on(chunks, pool), strict=True):
             if first.facts:
-                self.index.remember_facts(os.path.realpath(some[number].path), first.facts)
+                self.index.remember_facts(first.path, first.facts)
             if first.known is not None:
                 known[number] = self._remembered(some[number], first.known)
             else:
-                linked[number] = first.linked
+                linked[number] = First(None, first.path, linked=first.linked)
                 if first.content is not None and held < _HELD:  # else it is read again
-                    contents[first.content.xml.path] = first.content
+                    contents[first.path] = first.content
                     held += first.content.size
         walks = (self._walk(some, group, linked, contents) for group in grouped(linked, size))
         for number, first in zip(list(linked), self._worked_on(walks, pool), strict=True):
@@ -299,12 +300,12 @@ class Reading:
         self,
         some: Sequence[Question],
         group: Sequence[int],
-        linked: Mapping[int, Sequence[str]],
+        linked: Mapping[int, First],
         contents: dict[str, Content],
     ) -> _Chunk:
-        own = {os.path.realpath(some[number].path) for number in group}
+        own = dict.fromkeys(linked[number].path for number in group)
         given = {path: contents.pop(path) for path in own if path in contents}
-        paths = {path: None for number in group for path in linked[number]}
+        paths = {path: None for number in group for path in linked[number].linked}
         return _Chunk([some[number] for number in group], Supplies(given, self.index.facts([*own, *paths])))
 
     def _remembered(self, question: Question, known: Known) -> Known:
