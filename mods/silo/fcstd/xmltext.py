@@ -325,7 +325,8 @@ class XmlText:
     def mentioning(self, word: str) -> Iterable[str]:
         """Names of the objects in whose data a word may stand, of a text that was read to its end; in the
         order of the text."""
-        text, wanted = self.text, re.compile(re.escape(word.encode()))  # quicker than find() for a rare letter
+        # A search is quicker than find() where the first letter is rare.
+        text, wanted = self.text, re.compile(re.escape(word.encode()))
         if b"&" in text and b"&#" in text:  # which may be a letter
             return self.head.types
         found, names = list[str](), list(self._data)
