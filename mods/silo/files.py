@@ -37,8 +37,9 @@ def documents_in(tops: Iterable[str]) -> list[str]:
         if not os.path.isdir(top):
             once.setdefault(real, top)
             continue
+        begin = len(os.path.join(top, ""))
         for path in sorted(_below(top)):
-            once.setdefault(os.path.join(real, os.path.relpath(path, top)), path)
+            once.setdefault(os.path.join(real, path[begin:]), path)
     return list(once.values())
 
 

@@ -58,13 +58,17 @@ class Spelling:
         listed = self._listed(real_folder, name, status)
         return Spelt(os.path.join(real_folder, listed), os.path.join(plain, name), True)
 
-    def is_plain(self, path: str) -> bool:
-        """True for the one path of what is there, in a folder that was looked into before; else maybe."""
+    def is_plain(self, path: str, known: bool = False) -> bool:
+        """True for the one path of what is there, in a folder that was looked into before; else maybe.
+
+        known
+            it is known to be there, and no symlink.
+        """
         folder, _, name = path.rpartition(os.sep)
         if folder not in self._exact or self._folders.get(folder) != (folder, folder) or not name.isascii():
             return False
         try:
-            return not stat.S_ISLNK(os.lstat(path).st_mode)
+            return known or not stat.S_ISLNK(os.lstat(path).st_mode)
         except (OSError, ValueError):
             return False
 

@@ -100,10 +100,14 @@ class Locator:
             return NotFound(FindingCode.MISSING_FILE)
         return self._respelt(recorded, folders)
 
-    def leads_plainly(self, recorded: str, folders: tuple[str, ...], path: str) -> bool:
-        """True where :meth:`find` gives this very path, of a link that it followed before; else maybe."""
+    def leads_plainly(self, recorded: str, folders: tuple[str, ...], path: str, is_plain: bool) -> bool:
+        """True where :meth:`find` gives this very path, of a link that it followed before; else maybe.
+
+        is_plain
+            it is known to be there, and no symlink.
+        """
         plain = os.path.normpath(os.path.join(folders[0], recorded))
-        return plain == path and self.inside(path) and self._spelling.is_plain(path)
+        return plain == path and self.inside(path) and self._spelling.is_plain(path, is_plain)
 
     def _respelt(self, recorded: str, folders: tuple[str, ...]) -> Found | NotFound:
         """Written on Windows or macOS, where ``Part.FCStd`` opens ``part.FCStd``: taken if only one fits."""

@@ -18,7 +18,7 @@ from silo.fcstd.library import Content, Library, Remembered
 from silo.fcstd.limits import FcstdError
 from silo.fcstd.locate import Found, NotFound
 
-FORMAT = 2
+FORMAT = 3
 _ENCODER = json.JSONEncoder(separators=(",", ":"))
 _SETTLED_NS = 2_500_000_000  # FAT has ticks of 2 s, the coarsest in use
 
@@ -66,6 +66,16 @@ class Seen(NamedTuple):
         content = f"!{state.inode}:{state.size}:{state.modified_ns}:{error.reason}"
         return cls(content, state.inode, state.size, state.modified_ns, 0, 0)
 
+    def text(self) -> str:
+        """For the index."""
+        return f"{self.inode} {self.size} {self.modified_ns} {self.changed_ns} {self.read_ns} {self.content}"
+
+    @classmethod
+    def from_text(cls, text: str) -> Seen:
+        """What :meth:`text` wrote."""
+        *numbers, content = text.split(" ", 5)
+        return cls(content, *map(int, numbers))
+
     def still(self, status: os.stat_result) -> bool:
         """True where the file certainly is what it was then."""
         then = (self.inode, self.size, self.modified_ns, self.changed_ns)
@@ -79,7 +89,8 @@ class Known(NamedTuple):
     answer
         JSON.
     trail
-        JSON: [{path: content}, [[folders in which links' paths begin, {recorded path: where it leads}], …]].
+        JSON: [{path: content}, [[folders in which links' paths begin, {recorded path: where it leads}], …]];
+        only the content where nothing was read but the very file that was asked about.
     seen
         path → the file when it was read; empty where the answer comes from the index.
     lasting
@@ -106,12 +117,21 @@ class Known(NamedTuple):
         led: dict[tuple[str, ...], dict[str, str]] = {}
         for (folders, recorded), found in library.lookups.items():
             led.setdefault(folders, {})[recorded] = led_to(found)
+        if len(seen) == 1 and not led:
+            return cls(json_of(answer), next(iter(seen.values())).content, seen, lasting)
         files = {path: one.content for path, one in seen.items()}
         return cls(json_of(answer), json_of([files, list(led.items())]), seen, lasting)
 
     @property
+    def is_of_one_file(self) -> bool:
+        """True where nothing but the very file that was asked about was read, and no link followed."""
+        return not self.trail.startswith("[")
+
+    @property
     def links(self) -> frozenset[str]:
         """The files that links lead to, counted or not; of those that are not there what is recorded."""
+        if self.is_of_one_file:
+            return frozenset()
         files, lookups = json.loads(self.trail)
         found = {
             _target(to) or os.path.normpath(os.path.join(folders[-1], recorded))

@@ -14,50 +14,31 @@ The rules of this module:
 * content is the packed ``Document.xml`` with the container's directory, which has a checksum of every entry;
 * a row has a checksum; a row that fails it is not there;
 * code that reads otherwise asks under another name (``ENGINE``), so an update never meets old answers;
-* a database that is damaged or of another format is made anew; one that cannot be written is left alone, and
-  the answers live in memory. Nothing here makes a run fail.
+* a database that is damaged is made anew (:mod:`silo.vault.database`). Where nothing can be written the
+  answers live in memory. Nothing here makes a run fail.
 """
 
 from __future__ import annotations
 
 import json
-import logging
 import os
-import sqlite3
+import stat
 import time
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from hashlib import blake2b
 from pathlib import Path
-from typing import Any, BinaryIO
+from zlib import crc32
 
-from silo.bom.errors import InputError
-from silo.durable import remove_patiently
 from silo.fcstd.library import Contents, Facts
 from silo.fcstd.limits import FcstdError
 from silo.fcstd.locate import Locator
 from silo.folders import cache_folder
-from silo.platform import hold_lock
-from silo.vault.answers import FORMAT, Known, Seen, engine, json_of, led_to
+from silo.vault.answers import Known, Seen, engine, led_to
+from silo.vault.database import Database
 
-log = logging.getLogger("silo.vault")
-
-_APPLICATION = 0x51107A11  # marks our databases (SQLite's application_id)
-_MAGIC = b"SQLite format 3\0"
 _KEPT_S = 30 * 24 * 3600.0
-_BUSY_S = 10.0
 _SAVED_EACH = 500
 _ANSWERS = "SELECT path, answer, trail, mark FROM answers"
-_VARIABLES = 250  # of one statement; SQLite takes at least 999
-
-_TABLES = """
-CREATE TABLE files (path TEXT PRIMARY KEY, seen TEXT NOT NULL, mark BLOB NOT NULL) WITHOUT ROWID;
-CREATE TABLE facts (path TEXT PRIMARY KEY, facts TEXT NOT NULL, mark BLOB NOT NULL);
-CREATE TABLE answers (
-    path TEXT NOT NULL, question TEXT NOT NULL, answer TEXT NOT NULL, trail TEXT NOT NULL,
-    made_at REAL NOT NULL, mark BLOB NOT NULL, PRIMARY KEY (path, question)
-);
-CREATE TABLE places (vault TEXT, uuid TEXT, path TEXT, PRIMARY KEY (vault, uuid, path)) WITHOUT ROWID;
-"""
 
 
 def default_path() -> Path:
@@ -65,8 +46,14 @@ def default_path() -> Path:
     return cache_folder() / "documents.sqlite3"
 
 
-def _mark(*texts: str) -> bytes:
-    return blake2b("\0".join(texts).encode("utf-8", "surrogateescape"), digest_size=8).digest()
+def _mark(*texts: str) -> int:
+    return crc32("\0".join(texts).encode("utf-8", "surrogateescape"))
+
+
+def _facts_mark(path: str, facts: str) -> bytes:
+    """Also tells what other code has found out, which must never be taken."""
+    text = f"{engine()}\0{path}\0{facts}"
+    return blake2b(text.encode("utf-8", "surrogateescape"), digest_size=16).digest()
 
 
 class Index:
@@ -83,22 +70,22 @@ class Index:
     def __init__(
         self, path: Path | None = None, *, given: bool = False, contents: Contents | None = None
     ) -> None:
-        self.path = path
-        self.trouble = ""
         self.contents = contents or Contents()
+        self._database = Database(path, given)
         self._now: dict[str, Seen | None] = {}
+        self._plain: set[str] = set()  # looked at, and no symlinks
         self._led: dict[tuple[tuple[str, ...], str], str] = {}
         self._locator = Locator()
         self._unsaved: dict[tuple[str, str], Known] = {}
         self._facts: dict[str, str] = {}
         self._files: dict[str, Seen] = {}
-        self._rows: dict[str, tuple[str, bytes]] = {}
+        self._rows: dict[str, tuple[str, int]] = {}
         self._expected = ""
-        self._guard: BinaryIO | None = None
-        self._writes = True
-        self._database = _empty()
-        if path is not None:
-            self._open(path, given)
+
+    @property
+    def trouble(self) -> str:
+        """Why nothing is kept; "" where all is well."""
+        return self._database.trouble
 
     def __enter__(self) -> Index:
         return self
@@ -110,8 +97,6 @@ class Index:
         """Save, and let others rebuild the database."""
         self.save()
         self._database.close()
-        if self._guard is not None:
-            self._guard.close()
 
     # --- answers ----------------------------------------------------------------------------------------
 
@@ -121,27 +106,30 @@ class Index:
 
     def recall_all(self, asked: Sequence[tuple[str, str]]) -> Iterator[Known | None]:
         """The same for several questions, in their order."""
-        rows: dict[tuple[str, str], tuple[str, str, bytes]] = {}
+        rows: dict[tuple[str, str], tuple[str, str, int]] = {}
         for question in dict.fromkeys(question for _, question in asked):
             paths = [_text(path) for path, one in asked if one == question]
-            found = self._select_in(f"{_ANSWERS} WHERE question = ? AND path IN", paths, question)
+            found = self._database.select_in(f"{_ANSWERS} WHERE question = ? AND path IN", paths, question)
             rows |= {(path, question): row for path, *row in found}
         for path, question in asked:
             known = self._unsaved.get((path, question))
-            answer, trail, mark = rows.get((_text(path), question), ("", "", b""))
-            if known is None and mark and mark == _mark(path, question, answer, trail):
-                known = Known(answer, trail)
-            yield known if known is not None and self._holds(known) else None
+            if known is None and (row := rows.get((_text(path), question))) is not None:
+                answer, trail, mark = row
+                if mark == _mark(path, question, answer, trail):
+                    known = Known(answer, trail)
+            yield known if known is not None and self._holds(path, known) else None
 
-    def _holds(self, known: Known) -> bool:
+    def _holds(self, path: str, known: Known) -> bool:
+        if known.is_of_one_file:
+            return self.content(path) == known.trail
         files, lookups = json.loads(known.trail)
-        if not all(self.content(file) == content for file, content in files.items()):
-            return False
-        plainly = self._locator.leads_plainly
+        for file, content in files.items():
+            if self.content(file) != content:
+                return False
         for folders, led in lookups:
             start = tuple(folders)
             for recorded, to in led.items():
-                if not plainly(recorded, start, to) and self._leads(start, recorded) != to:
+                if self._leads(start, recorded, to) != to:
                     return False
         return True
 
@@ -176,14 +164,14 @@ class Index:
         found = {path: self._facts[path] for path in paths if path in self._facts}
         rows = {
             path: (facts, mark)
-            for path, facts, mark in self._select_in(
+            for path, facts, mark in self._database.select_in(
                 "SELECT path, facts, mark FROM facts WHERE path IN",
                 [_text(path) for path in paths if path not in found],
             )
         }
         for path in paths:
             facts, mark = rows.get(_text(path), ("", b""))
-            if facts and mark == _mark(engine(), path, facts):
+            if facts and mark == _facts_mark(path, facts):
                 found[path] = facts
         return {path: text for path, text in found.items() if text.startswith(f'["{self.content(path)}"')}
 
@@ -196,7 +184,11 @@ class Index:
 
     def _look(self, path: str) -> Seen | None:
         try:
-            status = os.stat(path)
+            status = os.lstat(path)
+            if stat.S_ISLNK(status.st_mode):
+                status = os.stat(path)
+            else:
+                self._plain.add(path)
         except (OSError, ValueError):
             return None
         known = self._known_file(path)
@@ -209,11 +201,14 @@ class Index:
         self._files[path] = seen
         return seen
 
-    def _leads(self, folders: tuple[str, ...], recorded: str) -> str:
+    def _leads(self, folders: tuple[str, ...], recorded: str, before: str) -> str:
+        """Where a link leads now; ``before`` is where it led."""
         key = (folders, recorded)
-        if (known := self._led.get(key)) is None:
-            known = self._led[key] = led_to(self._locator.find(recorded, folders))
-        return known
+        if (now := self._led.get(key)) is None:
+            plain = self._locator.leads_plainly(recorded, folders, before, before in self._plain)
+            now = before if plain else led_to(self._locator.find(recorded, folders))
+            self._led[key] = now
+        return now
 
     def untouched(self, path: str) -> bool:
         """True where a file is still in the state in which this run found it. From any thread."""
@@ -230,24 +225,25 @@ class Index:
     def places(self, vault: str) -> dict[str, set[str]]:
         """Identity → files that carried it when the vault was last read."""
         found: dict[str, set[str]] = {}
-        for uuid, path in self._select("SELECT uuid, path FROM places WHERE vault = ?", _text(vault)):
+        rows = self._database.select("SELECT uuid, path FROM places WHERE vault = ?", _text(vault))
+        for uuid, path in rows:
             found.setdefault(uuid, set()).add(os.fsdecode(path))
         return found
 
     def keep_places(self, vault: str, places: Iterable[tuple[str, str]]) -> None:
         """Replace what is known of a vault."""
         rows = [(_text(vault), uuid, os.fsencode(path)) for uuid, path in set(places)]
-        self._write(
+        self._database.write(
             ("DELETE FROM places WHERE vault = ?", [(_text(vault),)]),
             ("INSERT OR REPLACE INTO places VALUES (?, ?, ?)", rows),
         )
 
     def forget(self, folder: str, but: Collection[str]) -> None:
         """Forget the files of a folder but these, and what older code has found out."""
-        rows = self._select("SELECT path FROM files WHERE path >= ? AND path < ?", *_below(folder))
+        rows = self._database.select("SELECT path FROM files WHERE path >= ? AND path < ?", *_below(folder))
         kept = {path for path in but if path.isascii()} | {_text(path) for path in but if not path.isascii()}
         gone = [path for (path,) in rows if path not in kept]
-        self._write(
+        self._database.write(
             ("DELETE FROM files WHERE path = ?", [(path,) for path in gone]),
             ("DELETE FROM facts WHERE path = ?", [(path,) for path in gone]),
             ("DELETE FROM answers WHERE path = ?", [(path,) for path in gone]),
@@ -261,19 +257,19 @@ class Index:
 
     def save(self) -> None:
         """Write what is not yet on disk, all or nothing."""
-        if not self._writes or not (self._unsaved or self._files or self._facts):
+        if not self._database.writes or not (self._unsaved or self._files or self._facts):
             return
         now = time.time()
         files = [
             (_text(path), text, _mark(path, text))
-            for path, text in ((path, json_of(seen)) for path, seen in self._files.items())
+            for path, text in ((path, seen.text()) for path, seen in self._files.items())
         ]
         answers = [
             (_text(path), question, one.answer, one.trail, now, _mark(path, question, one.answer, one.trail))
             for (path, question), one in self._unsaved.items()
         ]
-        facts = [(_text(path), text, _mark(engine(), path, text)) for path, text in self._facts.items()]
-        if self._write(
+        facts = [(_text(path), text, _facts_mark(path, text)) for path, text in self._facts.items()]
+        if self._database.write(
             ("INSERT OR REPLACE INTO files VALUES (?, ?, ?)", files),
             ("INSERT OR REPLACE INTO facts VALUES (?, ?, ?)", facts),
             ("INSERT OR REPLACE INTO answers VALUES (?, ?, ?, ?, ?, ?)", answers),
@@ -287,152 +283,20 @@ class Index:
             return self._files[path]
         row = self._rows.get(path)
         if row is None and not self._all_below(path):
-            found = self._select("SELECT path, seen, mark FROM files WHERE path = ?", _text(path))
+            found = self._database.select("SELECT path, seen, mark FROM files WHERE path = ?", _text(path))
             row = found[0][1:] if found else None
-        return Seen(*json.loads(row[0])) if row is not None and row[1] == _mark(path, row[0]) else None
+        return Seen.from_text(row[0]) if row is not None and row[1] == _mark(path, row[0]) else None
 
     def expect(self, folder: str) -> None:
         """Load what is known of all files below a folder, since most will be asked for."""
         self._expected = os.path.join(folder, "")
-        found = self._select(
+        found = self._database.select(
             "SELECT path, seen, mark FROM files WHERE path >= ? AND path < ?", *_below(folder)
         )
         self._rows = {path: (seen, mark) for path, seen, mark in found}
 
     def _all_below(self, path: str) -> bool:
         return bool(self._expected) and path.startswith(self._expected) and path == _text(path)
-
-    def _select(self, statement: str, *values: str) -> list[Any]:
-        try:
-            return self._database.execute(statement, values).fetchall()
-        except sqlite3.Error as error:
-            self._give_up(error)
-            return []
-
-    def _select_in(self, statement: str, paths: Sequence[str], *values: str) -> Iterator[Any]:
-        """Rows whose path is one of these; ``statement`` ends with ``IN``."""
-        for at in range(0, len(paths), _VARIABLES):
-            some = paths[at : at + _VARIABLES]
-            marks = ",".join("?" * len(some))
-            yield from self._select(f"{statement} ({marks})", *values, *some)
-
-    def _write(self, *changes: tuple[str, Sequence[tuple[Any, ...]]]) -> bool:
-        if not self._writes:
-            return False
-        try:
-            self._database.execute("BEGIN IMMEDIATE")
-            try:
-                for statement, rows in changes:
-                    self._database.executemany(statement, rows)
-                self._database.execute("COMMIT")
-            except BaseException:
-                if self._database.in_transaction:
-                    self._database.execute("ROLLBACK")
-                raise
-        except sqlite3.Error as error:
-            self._give_up(error)
-            return False
-        return True
-
-    def _open(self, path: Path, given: bool) -> None:
-        try:
-            if given and not _may_replace(path):
-                raise InputError(f"{path} is no index of silo-mod and is not touched. Name another file.")
-            path.parent.mkdir(parents=True, exist_ok=True)
-            for attempt in range(2):
-                self._guard = hold_lock(f"{path}.lock", shared=True)
-                if self._guard is None:
-                    self.trouble = f"the index {path} is being made anew by another process"
-                    return
-                try:
-                    database = _connected(path)
-                    self._database.close()
-                    self._database = database
-                    return
-                except _Unusable as error:
-                    log.info("%s: %s; it is made anew", path, error)
-                    self._guard.close()
-                    if attempt or not _removed(path):
-                        self.trouble = f"the index {path} cannot be used ({error})"
-                        return
-        except (OSError, sqlite3.Error) as error:
-            self._give_up(error)
-
-    def _give_up(self, error: sqlite3.Error | OSError) -> None:
-        """The database fails: what it holds is read as long as it can be, and nothing is written any more."""
-        if not self.trouble:
-            self.trouble = f"the index {self.path} cannot be used ({error}); nothing is lost but time"
-            log.warning("%s", self.trouble)
-        self._writes = False
-        if isinstance(error, sqlite3.DatabaseError) and not isinstance(error, sqlite3.OperationalError):
-            self._database.close()
-            self._database = _empty()
-            if self._guard is not None and self.path is not None:
-                self._guard.close()
-                self._guard = None
-                _removed(self.path)
-
-
-def _empty() -> sqlite3.Connection:
-    """A database of this process alone, on disk where it grows large."""
-    database = sqlite3.connect("", isolation_level=None)
-    database.executescript(_TABLES)
-    return database
-
-
-class _Unusable(Exception):
-    """The file is no database that this code can use."""
-
-
-def _connected(path: Path) -> sqlite3.Connection:
-    """An open database of our format. Raises _Unusable, sqlite3.OperationalError (locked, full, no right)."""
-    database = sqlite3.connect(path, timeout=_BUSY_S, isolation_level=None)
-    try:
-        database.execute("PRAGMA synchronous = NORMAL")
-        database.execute("BEGIN IMMEDIATE")
-        (application,) = database.execute("PRAGMA application_id").fetchone()
-        (version,) = database.execute("PRAGMA user_version").fetchone()
-        (tables,) = database.execute("SELECT count(*) FROM sqlite_master").fetchone()
-        if (application, version) == (0, 0) and not tables:
-            for statement in _TABLES.split(";"):
-                database.execute(statement)
-            database.execute(f"PRAGMA application_id = {_APPLICATION}")
-            database.execute(f"PRAGMA user_version = {FORMAT}")
-        elif (application, version) != (_APPLICATION, FORMAT):
-            raise _Unusable(f"it has format {version}, wanted is {FORMAT}")
-        database.execute("COMMIT")
-        return database
-    except sqlite3.OperationalError:
-        database.close()
-        raise
-    except sqlite3.DatabaseError as error:
-        database.close()
-        raise _Unusable(str(error)) from error
-    except _Unusable:
-        database.close()
-        raise
-
-
-def _removed(path: Path) -> bool:
-    """Delete a database that nobody has open; True where it is gone."""
-    guard = hold_lock(f"{path}.lock")
-    if guard is None:
-        return False
-    with guard:
-        for name in (path, f"{path}-journal", f"{path}-wal", f"{path}-shm"):
-            remove_patiently(name)
-    return True
-
-
-def _may_replace(path: Path) -> bool:
-    """True for a path where nothing is, and for a database of ours, however damaged behind its head."""
-    try:
-        with path.open("rb") as file:
-            head = file.read(72)
-    except FileNotFoundError:
-        return True
-    ours = head.startswith(_MAGIC) and head[68:72] == _APPLICATION.to_bytes(4, "big")
-    return ours or not head
 
 
 def _below(folder: str) -> tuple[str, str]:

@@ -125,21 +125,25 @@ def make_plan(
         if isinstance(error := _error(answer), SiloError):
             plan.errors[top] = error
             continue
-        head = whole_row(answer.plain["table"][answer.plain["assembly"]])
-        plan._files.setdefault(head["doc_path"], top)
-        if skip_parts and _is_part(answer.plain):
+        head, entries = rows = _rows(answer.plain)
+        path = head["doc_path"]
+        plan._files.setdefault(path, top)
+        if skip_parts and _is_part(answer.plain, head, entries):
             plan.parts += 1
-            plan.spares.add(((head["silo_uuid"] or "").lower(), head["doc_path"]))
-            plan._assemblies.setdefault((head["doc_path"], head["object_name"]), head["is_assembly"])
+            plan.spares.add(((head["silo_uuid"] or "").lower(), path))
+            plan._assemblies.setdefault((path, head["object_name"]), head["is_assembly"])
         else:
-            _add(plan, _node(answer, top), answer, wanted)
+            _add(plan, _node(answer.question, rows, top), rows, wanted)
     while recursive and (asked := {key: top for key, top in wanted.items() if key not in plan._assemblies}):
         wanted.clear()
         questions = [Question(path, name, hardware, name_only=True) for path, name in asked]
         for (key, top), answer in zip(asked.items(), reading.ask_many(questions), strict=True):
             plan._assemblies[key] = False
-            if _error(answer) is None and (node := _node(answer, top)).is_assembly:
-                _add(plan, node, answer, wanted)
+            if _error(answer) is not None:
+                continue
+            rows = _rows(answer.plain)
+            if (node := _node(answer.question, rows, top)).is_assembly:
+                _add(plan, node, rows, wanted)
                 plan._assemblies[key] = True  # the name that the link has for it
     _add_used_parts(plan, reading, hardware, recursive)
     for node in plan.nodes.values():
@@ -164,18 +168,23 @@ def _error(answer: Answer) -> SiloError | None:
     return found
 
 
-def _rows(plain: Mapping[str, Any]) -> tuple[Mapping[str, Any], list[Mapping[str, Any]]]:
+_Row = Mapping[str, Any]
+_Rows = tuple[_Row, list[_Row]]
+
+
+def _rows(plain: Mapping[str, Any]) -> _Rows:
+    """The assembly, and its components."""
     table = plain["table"]
     return whole_row(table[plain["assembly"]]), [whole_row(table[number]) for number in plain["entries"]]
 
 
-def _is_part(plain: Mapping[str, Any]) -> bool:
+def _is_part(plain: Mapping[str, Any], head: _Row, entries: Sequence[_Row]) -> bool:
     """No assembly: nothing in it, or an unregistered file of screws or parts for others to link."""
-    head, entries = _rows(plain)
     if any(finding["severity"] == Severity.ERROR for finding in plain["findings"]):
         return False
-    own = all(entry["doc_path"] == head["doc_path"] for entry in entries)
-    return not entries or (own and head["silo_uuid"] is None)
+    if not entries:
+        return True
+    return head["silo_uuid"] is None and all(entry["doc_path"] == head["doc_path"] for entry in entries)
 
 
 def _is_article(row: Mapping[str, Any]) -> bool:
@@ -183,15 +192,15 @@ def _is_article(row: Mapping[str, Any]) -> bool:
     return standard is not None and row["silo_uuid"] == standard_uuid(standard)
 
 
-def _node(answer: Answer, top: str) -> Node:
-    head, entries = _rows(answer.plain)
+def _node(question: Question, rows: _Rows, top: str) -> Node:
+    head, entries = rows
     content = sorted(
         (str(e["silo_uuid"] or (e["doc_path"], e["object_name"])), e["quantity"]) for e in entries
     )
     return Node(
         (head["doc_path"], head["object_name"]),
         top,
-        answer.question,
+        question,
         head["silo_uuid"],
         [(e["doc_path"], e["object_name"]) for e in entries if e["is_assembly"] and not e["missing"]],
         blake2b(repr(content).encode("utf-8", "surrogateescape"), digest_size=8).digest(),
@@ -200,10 +209,10 @@ def _node(answer: Answer, top: str) -> Node:
     )
 
 
-def _add(plan: Plan, node: Node, answer: Answer, wanted: dict[Key, str]) -> None:
+def _add(plan: Plan, node: Node, rows: _Rows, wanted: dict[Key, str]) -> None:
     plan.nodes.setdefault(node.key, node)
     plan._assemblies[node.key] = True
-    head, entries = _rows(answer.plain)
+    head, entries = rows
     for row in (head, *entries):
         if (uuid := row["silo_uuid"]) is None:
             continue
@@ -230,7 +239,8 @@ def _add_used_parts(plan: Plan, reading: Reading, hardware: bool, recursive: boo
     questions = [Question(path, name, hardware, name_only=True) for path, name in empty]
     for top, answer in zip(empty.values(), reading.ask_many(questions), strict=True):
         if _error(answer) is None:
-            _add(plan, _node(answer, top), answer, {})
+            rows = _rows(answer.plain)
+            _add(plan, _node(answer.question, rows, top), rows, {})
 
 
 # --- order ----------------------------------------------------------------------------------------------

@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError, Future
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import lru_cache
 from itertools import islice
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 from uuid import uuid4
@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 CHUNK = 64
+_RECALLED = 256  # answers that are held on the way from the index
 # Questions that are worked on together; of the files of others an assembly has no facts yet.
 _TOGETHER = 20_000
 # Bytes of assemblies' files that are kept from the first step to the second.
@@ -74,23 +75,31 @@ class Question:
     @property
     def name(self) -> str:
         """For the index."""
-        words = ("bom" if self.below else "level") + ("" if self.hardware else " without hardware")
-        mark = "#" if self.name_only else "="
-        return f"{engine()} {words} {'' if self.assembly is None else mark + self.assembly}"
+        return _name(self.assembly, self.hardware, self.below, self.name_only)
 
 
-@dataclass(frozen=True)
+@lru_cache(maxsize=256)
+def _name(assembly: str | None, hardware: bool, below: bool, name_only: bool) -> str:
+    words = ("bom" if below else "level") + ("" if hardware else " without hardware")
+    mark = "#" if name_only else "="
+    return f"{engine()} {words} {'' if assembly is None else mark + assembly}"
+
+
 class Answer:
     """What was found out."""
 
-    question: Question
-    known: Known
+    __slots__ = ("_plain", "known", "question")
 
-    @cached_property
+    def __init__(self, question: Question, known: Known) -> None:
+        self.question, self.known = question, known
+        self._plain: dict[str, Any] | None = None
+
+    @property
     def plain(self) -> dict[str, Any]:
         """As :mod:`silo.bom.report` writes an extraction; or the one key of an error."""
-        data: dict[str, Any] = json.loads(self.known.answer)
-        return data
+        if self._plain is None:
+            self._plain = json.loads(self.known.answer)
+        return self._plain
 
     @property
     def found(self) -> Extraction | SiloError:
@@ -264,7 +273,7 @@ class Reading:
         """The answers in the order of the questions."""
         for some in grouped(questions, _TOGETHER):
             known: dict[int, Known] = {}
-            for numbers in grouped(range(len(some)), CHUNK):
+            for numbers in grouped(range(len(some)), _RECALLED):
                 asked = [(some[number].path, some[number].name) for number in numbers]
                 for number, found in zip(numbers, self.index.recall_all(asked), strict=True):
                     if found is not None:
