@@ -7,12 +7,16 @@ Data: a generated vault, four parts in five, the rest assemblies in five levels 
 sub-assemblies. A part is a body with 60 features, some 90 kB of XML: the median of real files.
 
 null        unpack every Document.xml with zipfile, let expat parse it without a handler; one process
-first       the plan of the whole vault with an empty index
+stages      what the first run does, one after the other: reading (each file once, to its facts), walking (the
+            parts, then the assemblies with facts in place of the files), remembering (the index); what is
+            left of the first run is planning
+first       the plan of the whole vault with an empty index: all of the stages
 second      the same again, nothing changed;  five: after five files were changed
 dask        the plan on a LocalCluster of two workers; again, while a worker is killed
 requests    what one sync of the vault asks of a server on loopback, first and second time
 kills       assemblies are changed, and the sync is killed with SIGKILL at random moments, against a server;
-            at the end all lines, versions, revisions and history against those of undisturbed syncs
+            at the end all lines, versions, history, events and syncs against those of undisturbed syncs; and
+            the file revisions, of which a sync makes none: two items have one beforehand
 
 Times are processor times of the process and its workers, which other work on the machine disturbs least;
 ``wall`` is the clock's.
@@ -95,6 +99,58 @@ if __name__ == "__main__":
     main()
 """
 
+STAGES = """
+import json, sys, time
+sys.path.insert(0, sys.argv[3])
+from pathlib import Path
+from silo.fcstd.library import Library, facts_of
+from silo.files import documents_in
+from silo.vault.index import Index
+from silo.vault.reading import Question, Session
+
+def read(session, question):
+    library = Library(contents=session.contents, locator=session.locator)
+    document = library.open(question.path)
+    facts_of(document), document.linked()
+    library.dissolve()
+
+def main():
+    spent = dict.fromkeys(("reading", "walking", "remembering"), 0.0)
+    def stage(name):
+        nonlocal begin
+        now = time.process_time()
+        spent[name] += now - begin
+        begin = now
+    index = Index(Path(sys.argv[2]))
+    asked = [Question(path) for path in documents_in([sys.argv[1]])]
+    begin, session = time.process_time(), Session()
+    for question in asked:
+        read(session, question)
+    stage("reading")
+    session = Session()
+    firsts = [session.read(question) for question in asked]
+    stage("walking")
+    spent["walking"] -= spent["reading"]  # what is left are the answers of parts
+    for question, first in zip(asked, firsts):
+        index.remember_facts(first.path, first.facts)
+        if first.known is not None:
+            index.remember(question.path, question.name, first.known)
+    index.save()
+    stage("remembering")
+    facts = {first.path: first.facts for first in firsts}
+    left = [question for question, first in zip(asked, firsts) if first.known is None]
+    walked = [session.ask(question, lambda path: facts.get(path, "")) for question in left]
+    stage("walking")
+    for question, known in zip(left, walked):
+        index.remember(question.path, question.name, known)
+    index.close()
+    stage("remembering")
+    print(json.dumps(spent))
+
+if __name__ == "__main__":
+    main()
+"""
+
 
 def uuid_of(kind: int, number: int) -> str:
     """An identity."""
@@ -157,6 +213,7 @@ def reading(folder: Path, scratch: Path, use_dask: bool) -> None:
     null = child(NULL, folder)
     count = null["documents"]
     print(f"{count} documents, {null['bytes'] / count / 1000:.0f} kB of XML each; null {null['cpu']:.2f} s")
+    stages = child(STAGES, folder, scratch / "stages", ROOT / "mods")
     first = plan(folder, scratch / "one")
     two = plan(folder, scratch / "two", 2)
     time.sleep(3)  # files that were written just now are compared by content
@@ -173,6 +230,10 @@ def reading(folder: Path, scratch: Path, use_dask: bool) -> None:
             f"{name:8} cpu {run['cpu']:7.2f} s  wall {run['wall']:7.2f} s  {each:6.0f} µs each  "
             f"reads {run['reads']:6}  parent {run['parent']:.2f} s, {run['rss_mb']:.0f} MB"
         )
+    stages["planning"] = first["cpu"] - sum(stages.values())
+    for name, seconds in stages.items():
+        print(f"{name:11} cpu {seconds:6.2f} s  {seconds / count * 1e6:4.0f} µs each")
+    print(f"reading : null = {stages['reading'] / null['cpu']:.2f}")
     print(f"first : null = {first['cpu'] / null['cpu']:.2f}")
     print(f"first : second = {first['cpu'] / second['cpu']:.1f}")
     print(f"first : five = {first['cpu'] / five['cpu']:.1f}")
@@ -212,9 +273,10 @@ def serve(scratch: Path, documents: int) -> tuple[Any, Any]:
     assemblies = sum(max(1, int((documents - parts) * share)) for share in LEVELS)
     with SiloClient(server.base_url, server.token) as client:
         for kind, category, item_type in ((0x8000, "M01", "part"), (0x9000, "A01", "assembly")):
-            client.create_item(
+            item = client.create_item(
                 "kindred-rd", category, "first", item_type=item_type, idempotency_key=uuid_of(kind, 0)
             )
+            client.upload_file(item.part_number, Doc("first").save(scratch / "first.FCStd"))
     with closing(sqlite3.connect(scratch / "silo.db")) as database:
         for kind, category, count in ((0x8000, "M01", parts), (0x9000, "A01", assemblies)):
             begin = uuid_of(kind, 0)
@@ -350,7 +412,7 @@ def main() -> None:
     parser.add_argument("--kill-documents", type=int, default=300)
     parser.add_argument("--seed", type=int, default=1)
     args = parser.parse_args()
-    scratch = Path(tempfile.mkdtemp(prefix="silo-vault-"))
+    scratch, begin = Path(tempfile.mkdtemp(prefix="silo-vault-")), time.perf_counter()
     try:
         for documents in args.documents:
             folder, aside = scratch / f"vault{documents}", scratch / str(documents)
@@ -362,6 +424,7 @@ def main() -> None:
         if args.kills:
             build(scratch / "small", args.kill_documents, features=5)
             kills(scratch / "small", scratch / "servers", args.kill_documents, args.kills, args.seed)
+        print(f"all of it: {time.perf_counter() - begin:.0f} s by the clock")
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
 
