@@ -243,7 +243,8 @@ def run_links(args: argparse.Namespace) -> int:
             file=sys.stderr,
         )
     for name in args.preview:
-        from silo.inertia.preview.write import LinkView, preview_bytes
+        from silo.inertia.preview.picture import preview_bytes
+        from silo.inertia.preview.scene import LinkView
 
         views = [
             LinkView(link, tuple(assembly.instances[index] for index in ids))

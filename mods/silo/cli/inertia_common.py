@@ -69,14 +69,14 @@ def add_material_options(parser: argparse.ArgumentParser) -> None:
 def add_bom_options(parser: argparse.ArgumentParser) -> None:
     """How the BOM is read, where what is found out from it is wrong."""
     group = parser.add_argument_group("BOM")
-    group.add_argument("--bom", metavar="BOM.csv", help="BOM export with names, and masses or materials")
+    group.add_argument("--bom", metavar="BOM", help="CSV, XLSX, XLS or ODS; names, masses or materials")
     group.add_argument(
         "--column",
         action="append",
         default=[],
         metavar="ROLE=HEADER",
         help="a renamed column; roles: name, part_number, description, material, mass, total_mass, "
-        "quantity, item, level",
+        "mass_unit, quantity, item, level, find_number",
     )
     group.add_argument("--encoding", help="of the BOM, for example cp1252")
     group.add_argument("--delimiter", help="of the BOM, one character")
@@ -285,7 +285,7 @@ def _write_files(args: argparse.Namespace, report: InertiaReport, assembly: Asse
         drawn = pages[0].with_suffix(".png")
         pictures.append(drawn)
     for path in pictures:
-        from silo.inertia.preview.write import write_preview
+        from silo.inertia.preview.picture import write_preview
 
         write_preview(report, assembly, path)
     if args.html:

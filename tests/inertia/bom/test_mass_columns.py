@@ -190,7 +190,7 @@ def test_a_bracket_that_is_not_understood(bom: Bom) -> None:
             (h, 0.12)
             for h in ("Mass [kg/100 pcs]", "Mass per 100 (kg)", "Weight/100 (kg)", "Gew. kg pro 100")
         ),
-        *((h, 0.012) for h in ("Gewicht/1000 Stk (kg)", "mass_g", "Weight g/pc", "Mass/g")),
+        *((h, 0.012) for h in ("Gewicht/1000 Stk (kg)", "mass_g", "Weight g/pc", "Mass/g", "Mass/unit (g)")),
         *(
             (h, 12)
             for h in ("Net weight (kg)", "Nettogewicht kg", "unitMassKg", "CAD mass [kg]", "单件重量(kg)")
@@ -243,10 +243,14 @@ def test_the_second_line_of_a_header_counts(bom: Bom, text: str) -> None:
     assert codes(table) == []
 
 
-def test_a_row_without_a_name_is_no_second_line(bom: Bom) -> None:
-    """What is no unit there is a row that cannot be used, and is reported as such."""
-    table = bom("Name,Qty,Mass (g),Material\n,,see drawing,\nbolt,4,3,\n")
-    assert codes(table) == [BomCode.NO_NAME]
+@pytest.mark.parametrize(
+    ("row", "code"),
+    [(",,see drawing,", BomCode.NO_NAME), (",4,g,", BomCode.NO_NAME), ("nut,,g,", BomCode.UNREADABLE_MASS)],
+)
+def test_a_row_is_no_second_line_of_the_header(bom: Bom, row: str, code: BomCode) -> None:
+    """With a name, with a number, or without a unit: a row that cannot be used, and is reported as such."""
+    table = bom(f"Name,Qty,Mass (g),Material\n{row}\nbolt,4,3,\n")
+    assert codes(table) == [code]
 
 
 STRUCTURED = "Level,Name,Qty,Material,{}\n0,arm,2,,,\n.1,motor,3,,{}\n"

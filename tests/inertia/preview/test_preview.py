@@ -24,11 +24,10 @@ from silo.inertia.geometry.mesh import mesh_volume
 from silo.inertia.model import Assembly, Instance, Prototype
 from silo.inertia.preview.glb import quaternion, write_glb
 from silo.inertia.preview.legend import fitted, mass_words, width_of, write
-from silo.inertia.preview.picture import write_picture
+from silo.inertia.preview.picture import preview_bytes, write_picture, write_preview
 from silo.inertia.preview.raster import Canvas
-from silo.inertia.preview.scene import colour_of, inertia_ellipsoid, views_of
+from silo.inertia.preview.scene import LinkView, colour_of, inertia_ellipsoid, views_of
 from silo.inertia.preview.shading import ellipsoid, shaded
-from silo.inertia.preview.write import LinkView, preview_bytes, write_preview
 
 
 def cube_mesh(size: float = 0.1) -> Mesh:

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import difflib
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -19,6 +17,7 @@ from silo.inertia.materials.words import (
     uncovered,
     words,
 )
+from silo.inertia.names import Suggester
 
 
 class Found(StrEnum):
@@ -126,6 +125,7 @@ class _Index:
                 if key:
                     self.exact.setdefault(key, row)
         self._joined = {"".join(key): row for key, row in reversed(self.exact.items())}
+        self._suggester = Suggester((" ".join(key) for key in self.exact), budget=1_000_000)
         self._single = frozenset(key[0] for key in self.exact if len(key) == 1)
 
     def find(self, tokens: Words) -> MaterialHit | MaterialMiss:
@@ -176,12 +176,8 @@ class _Index:
     def _alike(self, tokens: Words) -> Material | None:
         """The row with the most similar spelling and the same digits: 6063 is another alloy than 6061."""
         wanted = " ".join(tokens)
-        if len(wanted) < 4:
-            return None  # "Air" is not like "acier"
-        digits = re.sub(r"\D+", " ", wanted)
-        names = {" ".join(key): row for key, row in self.exact.items()}
-        near = (name for name in difflib.get_close_matches(wanted, names, n=5, cutoff=0.75))
-        return next((names[name] for name in near if re.sub(r"\D+", " ", name) == digits), None)
+        near = self._suggester.near(wanted, 1) if len(wanted) > 3 else ()  # "Air" is not like "acier"
+        return self.exact[tuple(near[0].split())] if near else None
 
     def _ancestors(self, name: str) -> set[str]:
         found: set[str] = set()

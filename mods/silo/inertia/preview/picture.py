@@ -9,14 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from io import BytesIO
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
+from silo.bom.errors import InputError
 from silo.inertia.geometry.mesh import Floats, simplified
 from silo.inertia.model import Assembly
+from silo.inertia.output.files import write_whole
 from silo.inertia.preview.camera import SMOOTH, Camera, camera_for
+from silo.inertia.preview.glb import write_glb
 from silo.inertia.preview.legend import draw_axes, draw_legend, draw_ruler
 from silo.inertia.preview.raster import Canvas
 from silo.inertia.preview.scene import (
@@ -26,8 +30,10 @@ from silo.inertia.preview.scene import (
     colour_of,
     inertia_ellipsoid,
     meshes_of,
+    views_of,
 )
 from silo.inertia.preview.shading import Shaded, shaded
+from silo.inertia.report import InertiaReport
 
 _LEGEND = 0.27
 """Share of the width that the legend has."""
@@ -204,3 +210,20 @@ def _mark_centre(page: Floats, camera: Camera, view: LinkView) -> None:
     alpha = np.clip(radius - distance + 0.5, 0, 1)
     window = page[top:bottom, left:right]
     window[...] = window * (1 - alpha[..., None]) + tone[..., None] * alpha[..., None]
+
+
+def write_preview(report: InertiaReport, assembly: Assembly, path: Path) -> None:
+    """Draw the links of a report with their centres of mass and ellipsoids: ``.glb`` or ``.png`` by suffix.
+
+    Raises InputError for another suffix and where the file cannot be written.
+    """
+    write_whole(path, preview_bytes(assembly, views_of(report, assembly), path.suffix))
+
+
+def preview_bytes(assembly: Assembly, views: Sequence[LinkView], suffix: str) -> bytes:
+    """The preview as ``.glb`` or ``.png``. InputError for another suffix."""
+    if suffix.lower() == ".glb":
+        return write_glb(assembly, views)
+    if suffix.lower() == ".png":
+        return write_picture(assembly, views)
+    raise InputError(f"a preview is a .glb or a .png file, got '{suffix}'")
