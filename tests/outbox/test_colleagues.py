@@ -10,6 +10,7 @@ import pytest
 
 from silo.api.address import canonical
 from silo.api.files import Origin
+from silo.api.revisions import other_name
 from silo.api.wire import Revision
 from silo.bom.errors import RejectedError, UnreachableError
 from silo.outbox.entry import UNKNOWN, Commit, Entry, State
@@ -394,3 +395,22 @@ def test_on_top_of_what_a_person_saw_and_of_nothing_else(vault: Vault) -> None:
     (held,) = vault.waiting()
     assert (held.state, held.newer["file_checksum"]) == (State.HELD, sha(b"another one"))
     assert contents(vault) == [b"one", b"another one"]
+
+
+def test_a_revision_without_a_file_is_no_colleagues_work(vault: Vault) -> None:
+    """Somebody typed a mass on the web page: the file is still the one that this was made from."""
+    file_only(vault, b"one", UNKNOWN)
+    vault.send()
+    vault.silo.update_item(vault.number, properties={"mass_kg": 2})
+    file_only(vault, b"two", sha(b"one"))
+    vault.send()
+    assert (vault.waiting(), contents(vault)) == ((), [b"one", b"two"])
+
+
+def test_a_name_in_another_case_is_no_other_name(vault: Vault) -> None:
+    """Windows and macOS show one file by both."""
+    file_only(vault, b"one", UNKNOWN)
+    vault.send()
+    known = vault.silo.revisions(vault.number)
+    assert other_name("/elsewhere/TOP.fcstd", known) == ""
+    assert other_name("/elsewhere/Top 2.FCStd", known) == "Top.FCStd"

@@ -12,6 +12,7 @@ from fcstd_writer import Doc, locals_, part
 from hypothesis import given
 from hypothesis import strategies as st
 
+from silo.api.revisions import download_revision
 from silo.bom.errors import DocumentError, NotFoundError, ServerFaultError
 from silo.bom.links import extract
 from silo.bom.model import Extraction
@@ -328,6 +329,11 @@ def test_a_file_that_is_not_what_was_committed_is_refused(project: Project, tmp_
         project.pull(tmp_path / "into", learn=lambda sha256, _item, _number: learned.append(sha256))
     assert not (tmp_path / "into").exists()
     assert learned == []
+    target = tmp_path / "one.FCStd"
+    with pytest.raises(ServerFaultError):
+        download_revision(project.silo, project.number("Plate"), target, 1, "0" * 64)
+    assert not target.exists()
+    assert download_revision(project.silo, project.number("Plate"), target, 1, "") != ""
 
 
 @pytest.mark.usefixtures("needs_symlinks")
@@ -385,3 +391,30 @@ def test_two_files_that_are_one_on_this_disk(project: Project, tmp_path: Path, *
     (lost,) = pulled.lost
     assert (lost.path, not pulled.complete) == ("b/P.FCStd", True)
     assert "has the same place on this disk" in lost.reason
+
+
+def test_what_the_top_links_to_is_what_its_designer_had(project: Project, tmp_path: Path) -> None:
+    """A colleague's newer plate was in Silo already, but not in the folder that was committed."""
+    project.commit()
+    plate = project.path("arm/parts/Plate.FCStd")
+    then = plate.read_bytes()
+    newer = tmp_path / "colleague" / "Plate.FCStd"
+    part("Plate, by a colleague", uuid=project.ids["Plate"]).save(newer)
+    project.silo.upload_file(project.number("Plate"), newer, "thicker")
+    project.write(bolts=6)
+    project.commit("Arm")
+    for revision, content in ((2, then), (None, newer.read_bytes())):
+        into = tmp_path / f"at {revision}"
+        project.pull(into, revision=revision)
+        assert (into / "robot/arm/parts/Plate.FCStd").read_bytes() == content
+
+
+def test_a_file_below_that_was_sent_after_the_top(project: Project, tmp_path: Path) -> None:
+    """Its upload had to be repeated: what the file above it names counts, not only the time."""
+    project.commit("Nut")
+    nut = project.folder / "work" / "vendor" / "Nut.FCStd"
+    part("Nut, greased", uuid=project.ids["Nut"]).save(nut)
+    project.commit("Arm", "Plate", "Bolt", "Nut")
+    into = tmp_path / "into"
+    assert project.pull(into, revision=1).complete
+    assert (into / "vendor/Nut.FCStd").read_bytes() == nut.read_bytes()

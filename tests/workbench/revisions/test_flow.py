@@ -9,11 +9,13 @@ from typing import Any
 
 import pytest
 from desk import Document, Documents, Office
+from fcstd_writer import Doc as File
+from fcstd_writer import part
 from other_disk import other_disk
 
 from silo.api.files import Origin
 from silo.workbench.commit.flow import CommitFlow
-from silo.workbench.commit.theirs import Choice, of_held
+from silo.workbench.commit.theirs import Choice, Theirs, of_held
 from silo.workbench.revisions.flow import RevisionFlow
 
 
@@ -115,6 +117,8 @@ def test_a_third_persons_file_is_kept_as_well(day: Day) -> None:
     day.choose(Choice.TAKE)
     assert Path(day.doc.FileName).read_bytes() == b"theirs"
     assert day.kept() == [b"by a third person", b"mine", b"mine"]
+    (where,) = day.office.session.shown.activity.entries[0].lines
+    assert where.text.count("kept-aside") == 2  # both copies that were made here are named
 
 
 def test_a_file_that_is_not_open_is_kept(day: Day) -> None:
@@ -170,3 +174,18 @@ def test_what_is_open_under_another_spelling_is_left_alone(day: Day, tmp_path: P
         day.office.settle()
         assert (disk / "Plate.FCStd").read_bytes() == b"open, with edits"
     assert "open" in str(pulled[0])
+
+
+def test_what_theirs_links_to_and_is_not_here_is_named(day: Day) -> None:
+    """Only the file itself is taken; a part that they added is not in this folder yet."""
+    links = File("Plate").link("New", "parts/New.FCStd", "Box").link("Old", "Old.FCStd", "Box")
+    theirs = day.office.folder / "theirs" / "Plate.FCStd"
+    theirs.write_bytes(links.bytes())
+    part("Old").save(Path(day.doc.FileName).with_name("Old.FCStd"))
+    day.office.silo.upload_file(day.held.part_number, theirs, "a new part")
+    newest = day.office.silo.revisions(day.held.part_number)[0]
+    day.flow.choose(day.doc.FileName, Theirs(day.doc.FileName, day.held.part_number, 3, "alice"), Choice.TAKE)
+    day.office.settle()
+    assert newest.revision_number == 3
+    (line,) = day.office.session.shown.activity.entries[0].lines
+    assert line.text.startswith("It links to New.FCStd, not in this folder: Open from Silo… fetches them.")

@@ -142,15 +142,16 @@ class RevisionFlow:
         from silo.durable import remove_patiently, replacing
         from silo.files import content_hash
 
-        doc, outbox, kept = self._desk.find(path), self._session.outbox, None
+        doc, outbox, kept = self._desk.find(path), self._session.outbox, list[str]()
         # The file on disk is mine, or it is a third person's.
         is_mine = doc is not None and not self._desk.documents.base(doc).replaced
         is_theirs = content is None or (os.path.exists(path) and content_hash(path) == content_hash(content))
         if not is_mine and not is_theirs:
-            kept = outbox.keep_aside(path)
+            kept += filter(None, [str(outbox.keep_aside(path) or "")])
         if doc is not None:
-            kept = outbox.aside(path)
-            self._desk.save_copy(doc, kept)
+            mine = outbox.aside(path)
+            self._desk.save_copy(doc, mine)
+            kept.append(str(mine))
         if content is not None:
             try:
                 with content.open("rb") as read, replacing(path, mode=0o644) as write:
@@ -162,7 +163,10 @@ class RevisionFlow:
             self._desk.close(doc)
         self._desk.open(path)
         told = translate("Silo", "Yours is kept for {n} days at {path}")
-        text = told.replace("{n}", str(KEPT_ASIDE_DAYS)).replace("{path}", str(kept)) if kept else ""
+        text = told.replace("{n}", str(KEPT_ASIDE_DAYS)).replace("{path}", ", ".join(kept)) if kept else ""
+        if lost := _not_here(path):
+            told = translate("Silo", "It links to {names}, not in this folder: Open from Silo… fetches them.")
+            text = " ".join(filter(None, (told.replace("{names}", plain(", ".join(lost), 200)), text)))
         title = translate("Silo", "Took {who}'s revision {n}: {name}") if theirs.revision else ""
         title = title or translate("Silo", "Took the file on disk: {name}")
         for key, value in (("{who}", theirs.who), ("{n}", str(theirs.revision)), ("{name}", _name(path))):
@@ -333,6 +337,19 @@ def left_alone(pulled: Pulled) -> Sequence[str]:
         text = lost.replace("{path}", one.path or "?").replace("{name}", one.position)
         told.append(plain(text.replace("{reason}", one.reason), 300))
     return told
+
+
+def _not_here(path: str) -> list[str]:
+    """The files that a file links to and that are not there."""
+    from silo.fcstd.linked import recorded_paths
+    from silo.fcstd.locate import Found, Locator
+
+    locator, folder = Locator(), (os.path.dirname(path),)
+    try:
+        recorded = recorded_paths(path)
+    except DocumentError:
+        return []  # FreeCAD says what it cannot read
+    return [os.path.basename(one) for one in recorded if not isinstance(locator.find(one, folder), Found)]
 
 
 def _aside(*names: str) -> Path:
