@@ -10,13 +10,20 @@ from typing import Any
 import numpy as np
 import pytest
 from OCP.BRep import BRep_Builder
-from OCP.BRepBuilderAPI import BRepBuilderAPI_Transform
-from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder, BRepPrimAPI_MakeSphere
+from OCP.BRepBuilderAPI import (
+    BRepBuilderAPI_MakeFace,
+    BRepBuilderAPI_MakePolygon,
+    BRepBuilderAPI_Transform,
+)
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder, BRepPrimAPI_MakePrism, BRepPrimAPI_MakeSphere
 from OCP.BRepTools import BRepTools
 from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
+from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS_Compound, TopoDS_Shell, TopoDS_Solid
 
 from silo.inertia.geometry.kernel import occt
+from silo.inertia.geometry.kernel.solids import measure
+from silo.inertia.geometry.mesh import mesh_volume
 from silo.inertia.model import GeometryCode, Prototype
 
 Read = Callable[..., Any]
@@ -163,6 +170,35 @@ def test_a_pin_in_its_hole_is_no_overlap(part: Callable[..., Prototype], box: An
     assert found.volume_m3 * 1e9 == pytest.approx(8000)
 
 
+def pinwheel(mirrored: bool) -> Any:
+    """Four arms round a square of 2 mm, area 12 mm², 5 mm high."""
+    corners = np.array([(1, -1), (1, 0), (3, 0), (3, 1)])
+    turns = [np.array([[c, -s], [s, c]]) for c, s in ((1, 0), (0, 1), (-1, 0), (0, -1))]
+    outline = BRepBuilderAPI_MakePolygon()
+    for x, y in np.concatenate([corners @ turn.T for turn in turns]).tolist():
+        outline.Add(gp_Pnt(-x if mirrored else x, y, 0))
+    outline.Close()
+    face = BRepBuilderAPI_MakeFace(outline.Wire()).Face()
+    return BRepPrimAPI_MakePrism(face, gp_Vec(0, 0, 5)).Shape()
+
+
+def test_a_mirror_image_is_no_copy(part: Callable[..., Prototype]) -> None:
+    """Volume, centre, tensor and box are equal; the arms are others, and the square is there once."""
+    found = part(pinwheel(False), pinwheel(True))
+    assert found.volume_m3 * 1e9 == pytest.approx(5 * 20)
+    assert codes(found) == [OVER]
+
+
+def test_the_mesh_of_a_mirrored_solid_is_not_inside_out(box: Any) -> None:
+    """A mirror in the solid's own location turns its triangles over."""
+    mirror = gp_Trsf()
+    mirror.SetMirror(gp_Ax2(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)))
+    found = measure([box(1, 2, 3).Located(TopLoc_Location(mirror), False)], eps=1e-8, mesh_check=True)
+    assert found.mesh is not None
+    assert mesh_volume(found.mesh) == pytest.approx(6e-9)
+    assert found.total[0] == pytest.approx(6e-9)
+
+
 def test_equal_moments_are_no_copy(part: Callable[..., Prototype], box: Any) -> None:
     """A cube and the same turned by 45 degrees have equal volumes, centres and tensors."""
     turn = gp_Trsf()
@@ -172,6 +208,19 @@ def test_equal_moments_are_no_copy(part: Callable[..., Prototype], box: Any) -> 
     assert codes(found) == [OVER]
     # The common octagon has 2 (√2 - 1) of the square's area.
     assert found.volume_m3 * 1e9 == pytest.approx(8000 * (2 - 2 * (np.sqrt(2) - 1)))
+
+
+def test_a_body_in_a_cavity_of_a_body(part: Callable[..., Prototype], box: Any) -> None:
+    """A ball in its housing, three deep, beside a larger block: each solid has what is its own."""
+    found = part(box(30, 30, 30, (50, 0, 0)), *nested(box, 20, 10, 4))
+    assert sorted(solid.volume_m3 * 1e9 for solid in found.solids) == pytest.approx([64, 7000, 27000])
+    assert OVER not in codes(found)
+
+
+def nested(box: Any, *sizes: float) -> list[Any]:
+    """Cubes around one middle, every second one inside out."""
+    cubes = [box(size, size, size, (-size / 2, -size / 2, -size / 2)) for size in sizes]
+    return [cube.Reversed() if number % 2 else cube for number, cube in enumerate(cubes)]
 
 
 @pytest.mark.parametrize("turned", [(False, True), (True, False)])

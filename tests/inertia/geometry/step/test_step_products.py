@@ -3,21 +3,29 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from fcstd_writer import Doc, Raw
 from OCP.BRep import BRep_Builder
 from OCP.BRepAdaptor import BRepAdaptor_Curve2d
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
-from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakeWire
-from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder
+from OCP.BRepBuilderAPI import (
+    BRepBuilderAPI_GTransform,
+    BRepBuilderAPI_MakeEdge,
+    BRepBuilderAPI_MakeFace,
+    BRepBuilderAPI_MakeWire,
+)
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder, BRepPrimAPI_MakeTorus
 from OCP.BRepTools import BRepTools
 from OCP.Geom2d import Geom2d_BezierCurve
 from OCP.Geom2dConvert import Geom2dConvert
-from OCP.gp import gp_Ax2, gp_Dir, gp_Pln, gp_Pnt, gp_Pnt2d, gp_Trsf
+from OCP.gp import gp_Ax2, gp_Dir, gp_GTrsf, gp_Pln, gp_Pnt, gp_Pnt2d, gp_Trsf
+from OCP.STEPControl import STEPControl_Reader
 from OCP.TopoDS import TopoDS_Compound, TopoDS_Shell, TopoDS_Solid
 
 from silo.bom.errors import DocumentError
@@ -25,6 +33,8 @@ from silo.inertia.core import place
 from silo.inertia.geometry.graph import Child, Node
 from silo.inertia.geometry.kernel import occt
 from silo.inertia.geometry.kernel.closure import beside_edges
+from silo.inertia.geometry.kernel.moments import solid_moments
+from silo.inertia.geometry.measured import Notes
 from silo.inertia.geometry.step.read import lost_stretches
 from silo.inertia.geometry.step.xcaf import StepFile
 from silo.inertia.model import GeometryCode
@@ -284,12 +294,23 @@ def test_a_part_twice_at_one_place_is_reported(
     """An accident of copying; both are counted, since the BOM counts both."""
     document = step()
     top, part = document.assembly("top"), document.part(box(10, 10, 10), "cube")
-    for name, at in (("one", (0, 0, 0)), ("two", (0, 0, 0)), ("three", (20, 0, 0))):
+    # An exporter that multiplies placements leaves rounding behind.
+    for name, at in (("one", (0, 0, 0)), ("two", (1e-9, 0, 0)), ("three", (20, 0, 0))):
         document.place(top, part, trsf(at), name)
     assembly = read_in(document.write(tmp_path / "twice.step"))
     assert codes_of(assembly) == [GeometryCode.COINCIDENT_PARTS]
     assert "1 (two)" in assembly.problems[0].message
     assert len(assembly.instances) == 3
+
+
+def test_a_product_without_any_name_is_reported(
+    step_part: Any, box: Any, read_in: Any, codes_of: Any
+) -> None:
+    """No BOM line can have its name; it is called after its file."""
+    path = step_part(box(10, 10, 10), "block")
+    path.write_text(path.read_text().replace("PRODUCT('block','block'", "PRODUCT('','  '"))
+    (part,) = read_in(path).prototypes.values()
+    assert (part.name, codes_of(part)) == ("block", [GeometryCode.NAME])
 
 
 def moved_surface(text: str, kind: str, offset: float) -> str:
@@ -314,9 +335,18 @@ def moved_surface(text: str, kind: str, offset: float) -> str:
 )
 @pytest.mark.parametrize("kind", ["PLANE", "CYLINDRICAL_SURFACE"])
 def test_a_face_beside_its_own_edges_is_doubted(
-    kind: str, offset: float, code: GeometryCode | None, step_part: Any, box: Any, read_in: Any
+    kind: str,
+    offset: float,
+    code: GeometryCode | None,
+    step_part: Any,
+    box: Any,
+    read_in: Any,
+    tmp_path: Path,
 ) -> None:
-    """The kernel widens the edges' tolerances until such a face is valid; [mm], in a bored block of 10 mm."""
+    """The kernel widens the edges' tolerances until such a face is valid; [mm], in a bored block of 10 mm.
+
+    Also where FreeCAD has imported it, and keeps the shape with the wide tolerances.
+    """
     bore = BRepPrimAPI_MakeCylinder(gp_Ax2(gp_Pnt(5, 5, -1), gp_Dir(0, 0, 1)), 4.0, 12.0).Shape()
     path = step_part(BRepAlgoAPI_Cut(box(10, 10, 10), bore).Shape())
     text = path.read_text()
@@ -324,6 +354,36 @@ def test_a_face_beside_its_own_edges_is_doubted(
     assert path.read_text() != text
     (part,) = read_in(path).prototypes.values()
     assert [p.code for p in part.problems] == ([code] if code else [])
+    doc = Doc("imported")
+    assert BRepTools.Write_s(imported(path), str(tmp_path / "shape.brp"))
+    doc.entries["Body.Shape.brp"] = (tmp_path / "shape.brp").read_bytes()
+    doc.add("Part::Feature", "Body", Shape=Raw("Part::PropertyPartShape", '<Part file="Body.Shape.brp"/>'))
+    (part,) = read_in(doc.save(tmp_path / "imported.FCStd")).prototypes.values()
+    assert [p.code for p in part.problems] == ([code] if code else [])
+
+
+def imported(path: Path) -> Any:
+    """The shape of a STEP file."""
+    reader = STEPControl_Reader()
+    reader.ReadFile(str(path))
+    reader.TransferRoots()
+    return reader.OneShape()
+
+
+def test_a_spline_face_that_does_not_meet_its_edges_is_doubted(step_part: Any, box: Any) -> None:
+    """Where our own integration is asked, it reports that by itself: a squashed torus, cut, the cut moved."""
+    squash = gp_GTrsf()
+    squash.SetValue(1, 1, 5.0)
+    torus = BRepBuilderAPI_GTransform(BRepPrimAPI_MakeTorus(10, 1).Shape(), squash, True).Shape()
+    path = step_part(BRepAlgoAPI_Cut(torus, box(200, 50, 50, (-100, 0, -25))).Shape())
+    text = path.read_text()
+    for offset, codes in ((0.0, []), (1e-2, [GeometryCode.NOT_CONVERGENT])):
+        path.write_text(moved_surface(text, "PLANE", offset))
+        (solid,) = occt.solids_of(imported(path))
+        notes: Notes = []
+        found = solid_moments(solid, 1e-8, notes)
+        assert [code for code, _ in notes] == codes
+        assert abs(found.volume) == pytest.approx(math.pi**2 * 50, rel=1e-3)
 
 
 @pytest.mark.parametrize(("aside", "doubt"), [(0.0, 0.0), (1.0, 0.0075)])

@@ -171,7 +171,7 @@ class _Walk:
         if not self._tool.IsAssembly_s(label):
             own, facts = [self._tool.GetShape_s(label)], self._used(label).facts
         name = clean(occt.name_of(label))
-        if is_generic(name) and (facts is None or facts.name != name):
+        if not name or (is_generic(name) and (facts is None or facts.name != name)):
             name = around
             self._file.unnamed.add(key)
         if own:
