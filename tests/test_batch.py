@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
 from silo.batch import Options, TopResult, stopped_by, sync_top
-from silo.batch_report import cell
+from silo.batch_report import Markdown, Summary, cell
 from silo.bom.errors import AuthError, DocumentError, InputError, NotFoundError, SiloError
 from silo.bom.model import BomEntry, Extraction
 from silo.bom_sync import Status
@@ -242,3 +242,10 @@ def test_text_of_others_is_shown_in_markdown_and_does_nothing(text: str) -> None
         words = "".join(token.content for token in said)
         assert not re.search(r"[@#]\w", words)
         assert " ".join(words.replace("\u200b", "").split()) == shown
+
+
+def test_a_sentence_of_the_report_is_followed_by_the_files_that_it_does_not_name() -> None:
+    """With a space between them."""
+    summary = Summary(warnings={"One bolt is too many.": ["asm/T.FCStd"], "b.FCStd is odd.": ["b.FCStd"]})
+    lines = Markdown().end(summary).splitlines()
+    assert {"- One bolt is too many. (asm/T.FCStd)", "- b.FCStd is odd."} <= set(lines)

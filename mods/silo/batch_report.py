@@ -283,7 +283,7 @@ def _others(words: str, files: Iterable[str]) -> str:
     """The files of a sentence that it does not name itself."""
     named = [file for file in files if file and os.path.basename(file) not in words]
     more = f" and {len(named) - 5} more" if len(named) > 5 else ""
-    return cell(f" ({', '.join(named[:5])}{more})") if named else ""
+    return " " + cell(f"({', '.join(named[:5])}{more})") if named else ""
 
 
 def changes_of(outcome: Outcome) -> Iterator[tuple[str, str, str, str]]:

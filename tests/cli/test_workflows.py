@@ -224,12 +224,16 @@ def test_what_cannot_be_compared_is_no_comment(runner: Runner) -> None:
 
 
 def test_the_pre_commit_hook_names_a_command_that_there_is(run: Any, gearbox: Path) -> None:
-    """Also for the first commit of a repository, which has nothing to be compared with."""
+    """Also for the first commit of a repository, and for one that only removes a part."""
     (hook,) = yaml.safe_load((EXAMPLES.parent / ".pre-commit-hooks.yaml").read_text("utf-8"))
     program, *words = hook["entry"].split()
-    assert (program, hook["pass_filenames"]) == ("silo-mod", False)
-    assert re.search(hook["files"], "parts/Gear.FCStd")
+    assert (program, hook["pass_filenames"], hook["always_run"]) == ("silo-mod", False, True)
     git(gearbox.parent, "init", "-q")
     ran = run(*words, gearbox.parent)
     assert ran.code == 0, ran.err
     assert "TopAssembly.FCStd (new assembly)" in ran.out
+    git(gearbox.parent, "add", "-A")
+    git(gearbox.parent, "commit", "-qm", "first")
+    git(gearbox.parent, "rm", "-q", "parts/Cover.FCStd")
+    ran = run(*words, gearbox.parent)
+    assert (ran.code, "parts/Cover.FCStd is missing" in ran.out) == (1, True)

@@ -328,7 +328,8 @@ class Library:
 
     def _note_respelt(self, owner: FcstdDocument, ref: Ref, found: Found) -> None:
         name = os.path.basename(found.real)
-        note = f"{owner.FileName} records {ref.file}; taken was {name}, which differs in case only"
+        differs = "which differs in case or Unicode form only"
+        note = f"{owner.FileName} records {ref.file}; taken was {name}, {differs}"
         if note not in self.notes:
             self.notes.append(note)
 

@@ -116,7 +116,8 @@ class Locator:
             if len(matches) > 1:
                 names = ", ".join(sorted(os.path.basename(match) for match in matches[:4]))
                 return NotFound(
-                    FindingCode.MISSING_FILE, f"several files differ from it in case only: {names}"
+                    FindingCode.MISSING_FILE,
+                    f"several files differ from it in case or Unicode form only: {names}",
                 )
             if matches and self.inside(real := self.real(matches[0])):
                 return Found(matches[0], real, respelt=True)
