@@ -17,6 +17,7 @@ import pytest
 from fault_proxy import Fault, Proxy, fault_proxy
 from fcstd_writer import Doc, locals_, part
 
+from silo.bom.errors import InputError
 from silo.fcstd import Library
 from silo.vault.lock import NAME, only_job
 
@@ -118,6 +119,27 @@ def test_what_a_killed_job_left_behind_holds_nothing(tmp_path: Path) -> None:
     with only_job(str(tmp_path)) as doubt:
         assert doubt == ""
     assert not (tmp_path / NAME).exists()
+
+
+@pytest.mark.usefixtures("needs_locks")
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems lock in another way")
+def test_a_job_of_a_network_client_is_seen_on_the_server(tmp_path: Path) -> None:
+    """Servers of NFS take their clients' locks as a process takes those of POSIX; both see each other."""
+    path = tmp_path / NAME
+    code = (
+        "import fcntl, sys; file = open(sys.argv[1], 'a+')\n"
+        "fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB); print('held', flush=True); sys.stdin.read()"
+    )
+    command = [sys.executable, "-c", code, str(path)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as client:
+        assert client.stdout is not None
+        assert client.stdout.readline() == "held\n"
+        with pytest.raises(InputError, match="is being synced by"), only_job(str(tmp_path)):
+            pass
+        client.communicate("")
+    with only_job(str(tmp_path)):
+        path.write_text("x")  # readers and writers of the file are not kept out
+        assert subprocess.run(command, input="", text=True, capture_output=True).returncode == 1
 
 
 def test_where_the_folder_takes_no_lock_the_report_says_what_that_means(

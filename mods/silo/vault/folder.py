@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -58,7 +59,7 @@ def read_folder(
     unreadable = list(lost)
     findings: dict[Finding, None] = {}
     with Library(root) as library:
-        for path in documents_in([base]):
+        for path in _users_first(documents_in([base]), library):
             try:
                 for found in _extractions(library, path, assemblies):
                     findings.update(dict.fromkeys(f for f in found.findings if f.severity is Severity.ERROR))
@@ -73,6 +74,15 @@ def read_folder(
         tuple(unreadable),
         tuple(findings),
     )
+
+
+def _users_first(paths: Sequence[str], library: Library) -> list[str]:
+    """Files that no other links to come first, so that what they use is walked once, as part of them."""
+    used: set[str] = set()
+    for path in paths:
+        with suppress(SiloError):  # reported where it is read
+            used.update(os.path.basename(recorded).lower() for recorded in library.open(path).linked())
+    return sorted(paths, key=lambda path: os.path.basename(path).lower() in used)
 
 
 def _extractions(library: Library, path: str, known: dict[tuple[str, str], Assembly]) -> Iterator[Extraction]:
