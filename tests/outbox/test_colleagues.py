@@ -414,3 +414,17 @@ def test_a_name_in_another_case_is_no_other_name(vault: Vault) -> None:
     known = vault.silo.revisions(vault.number)
     assert other_name("/elsewhere/TOP.fcstd", known) == ""
     assert other_name("/elsewhere/Top 2.FCStd", known) == "Top.FCStd"
+
+
+def test_what_was_there_already_keeps_its_revision_over_a_hold(vault: Vault) -> None:
+    """The BOM of a file that Silo had is refused; before its retry a colleague commits."""
+    file_only(vault, b"one", UNKNOWN)
+    vault.send()
+    entry = mine(vault, b"one", sha(b"one"))
+    refuse_next_merge(vault)
+    vault.send()
+    theirs(vault, b"one less", 1)
+    vault.outbox.retry(entry.id)
+    vault.send()
+    assert (vault.waiting(), vault.lines()) == ((), {})
+    assert "alice has committed revision 2 since" in vault.told[-1].entry.remark

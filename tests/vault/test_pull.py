@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.api.revisions import download_revision
-from silo.bom.errors import DocumentError, NotFoundError, ServerFaultError
+from silo.api.wire import LinkedFile
+from silo.bom.errors import DocumentError, InputError, NotFoundError, ServerFaultError
 from silo.bom.links import extract
 from silo.bom.model import Extraction
 from silo.bom.roots import choose_assembly
@@ -240,17 +242,25 @@ def test_a_hostile_path_leaves_the_folder_alone(project: Project, tmp_path: Path
     links = tuple((f"L{n}", path, 0) for n, path in enumerate(bad))
     assembly(project.ids["Arm"], *links, ("Plate", "parts/Plate.FCStd", 0)).save(project.arm)
     project.commit("Plate", "Arm")
+    # A server that lies has an item for each of them.
+    (revision,) = (one for one in project.stored("Arm").revisions if one.file_name)
+    revision.links.extend(LinkedFile(path=path, item=project.ids["Plate"]) for path in bad)
     into = tmp_path / "into"
     pulled = project.pull(into)
     assert {lost.path for lost in pulled.lost} == set(bad)
+    reasons = [lost.reason for lost in pulled.lost]
+    assert not any("no item in Silo" in reason for reason in reasons)
+    assert sum("absolute path" in reason for reason in reasons) == 3
+    assert sum("no FreeCAD file" in reason for reason in reasons) == 2
     assert set(states(pulled, into)) == {"Arm.FCStd", "parts/Plate.FCStd"}
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
     other = tmp_path / "other"
     other.mkdir()
     (other / "parts").symlink_to(elsewhere)
-    with pytest.raises(DocumentError, match="leads out of"):
-        project.pull(other)
+    (lost,) = (one for one in project.pull(other).lost if "leads out of" in one.reason)
+    assert lost.path.endswith("Plate.FCStd")
+    assert (other / "Arm.FCStd").exists()
     assert list(elsewhere.iterdir()) == []
 
 
@@ -349,8 +359,9 @@ def test_no_folder_is_made_outside(project: Project, tmp_path: Path) -> None:
     elsewhere.mkdir()
     other.mkdir()
     (other / "parts").symlink_to(elsewhere)
-    with pytest.raises(DocumentError, match="leads out of"):
-        project.pull(other)
+    (lost,) = (one for one in project.pull(other).lost if "leads out of" in one.reason)
+    assert lost.path.endswith("Plate.FCStd")
+    assert (other / "Arm.FCStd").exists()
     assert list(elsewhere.iterdir()) == []
 
 
@@ -418,3 +429,88 @@ def test_a_file_below_that_was_sent_after_the_top(project: Project, tmp_path: Pa
     into = tmp_path / "into"
     assert project.pull(into, revision=1).complete
     assert (into / "vendor/Nut.FCStd").read_bytes() == nut.read_bytes()
+
+
+def test_a_folder_in_the_way_keeps_no_other_file(project: Project, tmp_path: Path) -> None:
+    """It is reported with the rest; where the top itself has no place, that is an error."""
+    project.commit()
+    into = tmp_path / "into"
+    (into / "robot/arm/parts/Plate.FCStd").mkdir(parents=True)
+    pulled = project.pull(into, overwrite=True)
+    (lost,) = pulled.lost
+    assert (lost.path, lost.reason) == ("robot/arm/parts/Plate.FCStd", "a folder has its place and name")
+    assert not pulled.complete
+    assert set(states(pulled, into)) == TREE - {"robot/arm/parts/Plate.FCStd"}
+    other = tmp_path / "other"
+    (other / "robot/arm/Arm.FCStd").mkdir(parents=True)
+    with pytest.raises(DocumentError, match="a folder has its place"):
+        project.pull(other)
+    assert [path.name for path in other.rglob("*.FCStd")] == ["Arm.FCStd"]
+
+
+def test_a_tree_without_an_end_is_an_error(project: Project, tmp_path: Path) -> None:
+    """A file that links to itself in a folder below has a place for each turn."""
+    assembly(project.ids["Arm"], ("Again", "deeper/Arm.FCStd", 0)).save(project.arm)
+    project.commit("Arm")
+    (revision,) = (one for one in project.stored("Arm").revisions if one.file_name)
+    revision.links[:] = [LinkedFile(path="deeper/Arm.FCStd", item=project.ids["Arm"])]
+    with (
+        pytest.raises(InputError, match="more than 9 files"),
+        fetched(project.silo, project.number("Arm"), most=9),
+    ):
+        pass
+
+
+def test_files_of_one_moment_count_as_there(tmp_path: Path) -> None:
+    """A clock without fractions of a second, and a server that wrote no links down."""
+    project = Project(tmp_path, FakeSilo(clock=lambda: datetime(2026, 1, 2, tzinfo=UTC)))
+    project.commit()
+    part("Plate, thicker", uuid=project.ids["Plate"]).save(project.path("arm/parts/Plate.FCStd"))
+    project.commit("Plate")
+    for stored in project.silo.items.values():
+        stored.revisions[:] = [one.model_copy(update={"links": []}) for one in stored.revisions]
+    for child in ("Plate", "Bolt"):
+        project.silo.add_bom_line(project.number("Arm"), project.number(child), quantity=1)
+    into = tmp_path / "into"
+    project.pull(into, revision=1)
+    now = project.path("arm/parts/Plate.FCStd").read_bytes()
+    assert (into / "arm/parts/Plate.FCStd").read_bytes() == now
+
+
+@pytest.mark.parametrize(
+    ("name", "place"),
+    [
+        ("NUL.FCStd", "_NUL.FCStd"),
+        ("../../.bashrc", "bashrc.FCStd"),
+        ("C:\\Users\\x\\Arm.FCStd", "Arm.FCStd"),
+        ("..", "file.FCStd"),
+    ],
+)
+def test_the_top_has_a_name_of_a_file(project: Project, tmp_path: Path, name: str, place: str) -> None:
+    """Whatever the server calls it."""
+    project.commit("Nut")
+    stored = project.stored("Nut")
+    stored.revisions[:] = [
+        one.model_copy(update={"file_name": name, "file_path": name if name != ".." else None})
+        for one in stored.revisions
+    ]
+    into = tmp_path / "into"
+    assert set(states(project.pull(into, "Nut"), into)) == {place}
+
+
+def test_two_items_that_want_one_place(project: Project, tmp_path: Path) -> None:
+    """The first stays, and the second is reported."""
+    links = (("Plate", "../lib/Nut.FCStd", 0), ("Bolts", "../lib/Bolt.FCStd", 4))
+    assembly(project.ids["Arm"], *links).save(project.arm)
+    assembly(project.ids["Bolt"], ("Nut", "Nut.FCStd", 1)).save(project.path("lib/Bolt.FCStd"))
+    project.commit()
+    for name, path, item in (("Arm", "../lib/Nut.FCStd", "Plate"), ("Bolt", "Nut.FCStd", "Nut")):
+        (revision,) = (one for one in project.stored(name).revisions if one.file_name)
+        revision.links[:] = [
+            *(one for one in revision.links if one.path != path),
+            LinkedFile(path=path, item=project.ids[item]),
+        ]
+    pulled = project.pull(tmp_path / "into")
+    (lost,) = pulled.lost
+    assert lost.path == "../lib/Nut.FCStd"
+    assert lost.reason == f"{project.number('Plate')} and {project.number('Nut')} want the same place"

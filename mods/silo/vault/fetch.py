@@ -56,7 +56,7 @@ class Fetched:
     position
         relative to the folder of the top file, with ``/``; may begin with ``../``.
     earlier
-        the hashes of the item's other revisions: such a file may be replaced, it is in Silo.
+        the hashes of the item's revisions: such a file may be replaced, it is in Silo.
     """
 
     position: str
@@ -92,6 +92,7 @@ class _Fetch:
     pinned: bool
     cancelled: Cancel | None
     progress: Progress
+    most: int
     files: dict[str, Fetched] = field(default_factory=dict)
     lost: list[Lost] = field(default_factory=list)
     _at: datetime | None = None
@@ -121,13 +122,13 @@ class _Fetch:
                 why = f"{known.part_number} and {item.part_number} want the same place"
                 self.lost.append(Lost(position, position, why))
             return
-        if len(self.files) >= MOST_FILES:
-            raise InputError(f"more than {MOST_FILES} files are not fetched in one go")
+        if len(self.files) >= self.most:
+            raise InputError(f"more than {self.most} files are not fetched in one go")
         self.progress(posixpath.basename(position), len(self.files))
         content, sha256 = self.content(item.part_number, revision)
         earlier = frozenset(filter(None, map(checksum_of, self.revisions(item.part_number))))
         self.files[position] = Fetched(
-            position, item.part_number, item.id, revision, content, sha256, earlier - {sha256}
+            position, item.part_number, item.id, revision, content, sha256, earlier
         )
         try:
             recorded = recorded_paths(content)
@@ -248,14 +249,17 @@ def fetched(
     *,
     cancelled: Cancel | None = None,
     progress: Progress = lambda _name, _count: None,
+    most: int = MOST_FILES,
 ) -> Iterator[Tree]:
     """The tree of an item, in a scratch folder that goes with the block.
 
     revision
         of the top; its linked files are then those of its time. None: the newest of all.
 
-    Raises NotFoundError where the item has no such file.
+    Raises NotFoundError where the item has no such file, InputError for more than ``most`` files.
     """
     item = client.get_item(part_number)
     with scratch_folder("silo-pull-") as scratch:
-        yield _Fetch(client, Path(scratch), revision is not None, cancelled, progress).tree(item, revision)
+        yield _Fetch(client, Path(scratch), revision is not None, cancelled, progress, most).tree(
+            item, revision
+        )

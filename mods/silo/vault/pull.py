@@ -132,8 +132,10 @@ class Rules:
 
 
 def place(tree: Tree, into: Path | str, rules: Rules = Rules()) -> Pulled:
-    """Write the files of a tree below a folder. Raises DocumentError where the disk does not take one; those
-    before it are whole."""
+    """Write the files of a tree below a folder. What has no place there is lost, the others come.
+
+    Raises DocumentError where the disk does not take one, or the top has no place; those before it are whole.
+    """
     base = Path(os.path.realpath(into))
     places = lay_out((one.position, one.revision.file_path) for one in tree.files)
     anchor = _anchor(tree, places, base)
@@ -148,7 +150,12 @@ def place(tree: Tree, into: Path | str, rules: Rules = Rules()) -> Pulled:
                 why = f"{before.part_number}, revision {before.revision}, has the same place on this disk"
                 lost.append(Lost(one.position, where, why))
             continue
-        placed.append(_place(one, target, base, rules))
+        if why := _in_the_way(target, base):
+            if not placed:
+                raise DocumentError(str(target), why)
+            lost.append(Lost(one.position, where, why))
+            continue
+        placed.append(_place(one, target, rules))
         taken[_on_disk(target)] = placed[-1]
     return Pulled(placed[0].path, tuple(placed), tuple(lost))
 
@@ -161,7 +168,16 @@ def _on_disk(path: Path) -> tuple[int, int]:
     return (status.st_dev, status.st_ino)
 
 
-def _place(one: Fetched, target: Path, base: Path, rules: Rules) -> Placed:
+def _in_the_way(target: Path, base: Path) -> str:
+    """Why a file cannot go where it belongs, though the disk takes others; "" where it can."""
+    if base not in Path(os.path.realpath(target)).parents:
+        return f"its place leads out of {base}; nothing was written there"
+    if target.is_dir():
+        return "a folder has its place and name"
+    return ""
+
+
+def _place(one: Fetched, target: Path, rules: Rules) -> Placed:
     number = one.revision.revision_number
 
     def done(state: State, kept: Path | None = None) -> Placed:
@@ -171,8 +187,6 @@ def _place(one: Fetched, target: Path, base: Path, rules: Rules) -> Placed:
 
     try:
         real = Path(os.path.realpath(target))
-        if base not in real.parents:
-            raise DocumentError(str(target), f"it leads out of {base}; nothing was written there")
         real.parent.mkdir(parents=True, exist_ok=True)
         state, kept = State.NEW, None
         if target.exists():

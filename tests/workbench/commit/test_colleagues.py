@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -458,3 +459,16 @@ def test_a_file_that_is_replaced_while_the_person_decides(office: Office, flow: 
     flow.run(plan(doc, office.desk.documents).rows)
     office.settle()
     assert office.files("Plate") == [b"one", b"mine"]
+
+
+def test_a_bom_alone_of_a_file_that_was_saved_since(office: Office, flow: CommitFlow) -> None:
+    """Registering a part saves the assembly above it, which is no revision yet; it was made from one."""
+    top, bolt = two_bolts(office, flow)
+    edit(top, b"with the times at which its parts were saved")
+    office.desk.documents.save(top)
+    office.desk.documents.base(top).origin = sha256(b"two bolts").hexdigest()
+    top.parts[bolt] = 3
+    flow.sync_only(top)
+    office.settle()
+    assert (bolts(office), office.session.shown.waiting) == ([3], ())
+    assert office.desk.documents.base(top).origin == sha256(b"two bolts").hexdigest()
