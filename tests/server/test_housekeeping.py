@@ -13,13 +13,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from server_testing import Api, bom, form_body, wait_until
+from large_boms import fcstd_with_picture, form_file
+from server_testing import Api, bom, wait_until
 from sqlalchemy import func, select, text
 
 from silo_server.bootstrap import prepare
 from silo_server.db.engine import Database
 from silo_server.db.tables import audit, bom_changes, bom_syncs, events, sessions
 from silo_server.files import FileStore
+from silo_server.operation.backup import back_up
 from silo_server.operation.housekeeping import last_run, tidy
 from silo_server.run import running_server
 from silo_server.services.search import rebuild_index
@@ -165,25 +167,32 @@ def _old(path: Path) -> None:
 
 
 def test_uploads_that_nothing_refers_to_are_collected(url: str, tmp_path: Path) -> None:
-    """What no revision has, after a day; never what one has, nor what was uploaded again meanwhile."""
+    """What no revision has, after a day; never what one has, nor what was uploaded again meanwhile.
+
+    A backup takes the same: the files and the pictures of all revisions, not of the newest alone.
+    """
     root = tmp_path / "files"
     with running_server(url, token=TOKEN, files_dir=root) as server, Api(server.base_url, TOKEN) as api:
         item = api.item()
-        body, headers = form_body({"file": ("a.FCStd", b"used")})
-        assert api.call("POST", f"/api/items/{item}/file", body=body, headers=headers).status == 201
+        for seed in (1, 2):
+            body, headers = form_file("a.FCStd", fcstd_with_picture(seed))
+            assert api.call("POST", f"/api/items/{item}/file", body=body, headers=headers).status == 201
     store = FileStore(root)
-    used = next(path for path in root.glob("??/??/*"))
+    used = list(root.glob("??/??/*"))
+    assert len(used) == 4
     orphan = store.path_of(store.keep("b", BytesIO(b"orphan")).checksum)
     fresh = store.path_of(store.keep("c", BytesIO(b"fresh")).checksum)
     half = root / "upload-half"
     half.write_bytes(b"half")
-    for path in (used, orphan, half):
+    for path in (*used, orphan, half):
         _old(path)
     db = database(url, tmp_path, 1.01)
     # Fresh by the clock of the run.
     os.utime(fresh, (db.clock().timestamp(), db.clock().timestamp()))
     assert tidy(db, store).removed["files"] == 2
-    assert (used.exists(), fresh.exists(), orphan.exists(), half.exists()) == (True, True, False, False)
+    assert all(path.exists() for path in used)
+    assert (fresh.exists(), orphan.exists(), half.exists()) == (True, False, False)
+    assert back_up(db.settings, tmp_path / "saved").files == len(used)
     db.close()
 
 

@@ -11,7 +11,19 @@ import pytest
 from silo_server.services.events import LoggedEvent
 from silo_server.values import LineState
 from silo_server.web.activity_page import entry_of
-from silo_server.web.render import bdi, closed, isolate, mass, money, plural, quantity, segment, size, when
+from silo_server.web.render import (
+    bdi,
+    closed,
+    isolate,
+    mass,
+    money,
+    plural,
+    quantity,
+    segment,
+    sentence,
+    size,
+    when,
+)
 from silo_server.web.words import changes
 
 LINE = LineState(4.0, "assembly")
@@ -150,3 +162,12 @@ def test_a_merge_has_its_counts() -> None:
     ]
     assert (entry.link, entry.user) == ("/items/A%2F1/bom", "designer")
     assert entry_of(LoggedEvent(1, "bom_merge", '{"item": "A", "diff": {}}', "2026")).counts[0][1] == 0
+
+
+@pytest.mark.parametrize(
+    ("message", "shown"),
+    [("", ""), ("no file", "No file."), ("No file.", "No file."), ("which one?", "Which one?")],
+)
+def test_a_message_is_shown_as_a_sentence(message: str, shown: str) -> None:
+    """With a capital, and one end."""
+    assert sentence(message) == shown

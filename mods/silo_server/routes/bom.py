@@ -232,18 +232,7 @@ def get_cost(server: ServerDep, caller: Viewer, part_number: str) -> dict[str, A
         "totals": [{"currency": c, "total_cost": t} for c, t in cost.totals.items()],
         "complete": not cost.missing,
         "missing": list(cost.missing),
-        "lines": [
-            {
-                "part_number": row.part_number,
-                "name": row.name,
-                "total_quantity": plain(row.quantity),
-                "unit": row.unit,
-                "standard_cost": row.unit_cost,
-                "currency": row.currency,
-                "total_cost": row.total,
-            }
-            for row in cost.rows
-        ],
+        "lines": [to_wire(row) for row in cost.rows],
     }
 
 
@@ -259,17 +248,7 @@ def get_mass(server: ServerDep, caller: Viewer, part_number: str) -> dict[str, A
         "stated_mass_kg": mass.stated,
         "complete": not mass.missing,
         "missing": list(mass.missing),
-        "lines": [
-            {
-                "part_number": row.part_number,
-                "name": row.name,
-                "total_quantity": plain(row.quantity),
-                "mass_kg": row.unit_mass,
-                "total_mass_kg": row.total,
-                "is_assembly": row.is_assembly,
-            }
-            for row in mass.rows
-        ],
+        "lines": [to_wire(row) for row in mass.rows],
     }
 
 

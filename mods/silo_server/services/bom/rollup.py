@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 from sqlalchemy import select
 
-from silo.bom.numbers import as_decimal, exact_product, exact_sum, read_number
+from silo.bom.numbers import as_decimal, exact_product, exact_sum, plain, read_number
 from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import items
@@ -28,15 +28,15 @@ DEFAULT_CURRENCY = "EUR"
 
 @dataclass(frozen=True, slots=True)
 class CostRow:
-    """A leaf part's share. ``unit_cost`` None = not stated."""
+    """A leaf part's share, as the API sends it. ``standard_cost`` None = not stated."""
 
     part_number: str
     name: str
-    quantity: Exact
+    total_quantity: float
     unit: str | None
-    unit_cost: float | None
+    standard_cost: float | None
     currency: str | None
-    total: float | None
+    total_cost: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,13 +50,16 @@ class CostRollup:
 
 @dataclass(frozen=True, slots=True)
 class MassRow:
-    """A part whose stated mass was taken [kg]; ``is_assembly`` where it stands for all below it."""
+    """A part whose stated mass was taken [kg], as the API sends it.
+
+    ``is_assembly`` where it stands for all below it.
+    """
 
     part_number: str
     name: str
-    quantity: Exact
-    unit_mass: float | None
-    total: float | None
+    total_quantity: float
+    mass_kg: float | None
+    total_mass_kg: float | None
     is_assembly: bool = False
 
 
@@ -156,7 +159,7 @@ def roll_up_cost(graph: Graph, parts: Mapping[int, Part]) -> CostRollup:
         else:
             totals[currency] = exact_sum((totals.get(currency, Decimal(0)), total))
         shown = None if total is None else float(total)
-        rows.append(CostRow(item.part_number, item.name, row.total, row.unit, cost, currency, shown))
+        rows.append(CostRow(item.part_number, item.name, plain(row.total), row.unit, cost, currency, shown))
     return CostRollup(rows, {name: float(total) for name, total in totals.items()}, missing)
 
 
@@ -178,8 +181,8 @@ def roll_up_mass(graph: Graph, parts: Mapping[int, Part]) -> MassRollup:
     rows = [_mass_row(parts[one], amount, one in assemblies) for one, amount in amounts.items()]
     return MassRollup(
         rows,
-        float(exact_sum(row.total for row in rows if row.total is not None)),
-        [row.part_number for row in rows if row.total is None],
+        float(exact_sum(row.total_mass_kg for row in rows if row.total_mass_kg is not None)),
+        [row.part_number for row in rows if row.total_mass_kg is None],
         positive_number(graph.root.properties, "mass_kg"),
     )
 
@@ -197,4 +200,4 @@ def positive_number(properties: Mapping[str, Any], name: str) -> float | None:
 def _mass_row(item: Part, amount: Exact, is_assembly: bool) -> MassRow:
     mass = positive_number(item.properties, "mass_kg")
     total = float(exact_product((mass, amount))) if mass is not None else None
-    return MassRow(item.part_number, item.name, amount, mass, total, is_assembly)
+    return MassRow(item.part_number, item.name, plain(amount), mass, total, is_assembly)
