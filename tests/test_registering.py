@@ -10,6 +10,7 @@ from typing import NoReturn
 
 import pytest
 
+from silo.bom.categories import Categories
 from silo.bom.errors import ServerFaultError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.model import BomEntry, Extraction
@@ -58,6 +59,18 @@ def test_an_item_registered_from_this_very_file_is_found(tmp_path: Path) -> None
     digest = _sha256(content)
     known = silo.create_item("kindred-rd", "M01", "Original", properties={"file_sha256": digest})
     assert [s.part_number for s in offered(silo, tmp_path, candidate)["Copy"].similar] == [known.part_number]
+
+
+def test_a_server_without_categories_is_asked_for_no_items(tmp_path: Path) -> None:
+    """Another program answers at that address; each item would be refused for its empty category."""
+
+    class Other(FakeSilo):
+        def categories(self, *_: object) -> Categories:
+            return Categories({})
+
+    head = part(tmp_path, "Base Part")
+    with pytest.raises(ServerFaultError, match="has no categories"):
+        offer(Extraction(head, ()), {}, Other(), "kindred-rd", CONTROL)
 
 
 def test_where_the_server_cannot_be_searched_the_offer_says_so(tmp_path: Path) -> None:

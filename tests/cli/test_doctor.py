@@ -40,7 +40,7 @@ def freecad(folder: Path, monkeypatch: pytest.MonkeyPatch, *missing: str) -> Pat
 
 
 def seen(capsys: pytest.CaptureFixture[str]) -> dict[str, str]:
-    assert main(["doctor", "--json"]) == 3  # there is no server
+    assert main(["doctor", "--json"]) == 2  # there is no server
     found: dict[str, str] = json.loads(capsys.readouterr().out)
     return found
 
@@ -57,7 +57,7 @@ def test_it_says_where_each_part_looks(home: Path, capsys: pytest.CaptureFixture
 
 def test_a_folder_that_cannot_be_made_is_named(home: Path, capsys: pytest.CaptureFixture[str]) -> None:
     home.write_text("a file in the way")
-    assert main(["doctor"]) == 3
+    assert main(["doctor"]) == 2
     lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("✗")]
     assert [line.split()[1] for line in lines] == ["configuration", "data", "cache", "address"]
     assert f"{home} is no folder that you can write to; SILO_HOME names another one" in lines[1]

@@ -42,7 +42,7 @@ FULL = pytest.mark.usefixtures("needs_dev_full")
 
 
 @FULL
-@pytest.mark.parametrize("option", ["", "--json"])
+@pytest.mark.parametrize("option", ["", "--json", "--help"])
 def test_a_full_disk_is_one_sentence(gearbox: Path, option: str) -> None:
     """And not exit code 0: the answer did not arrive."""
     ran = shell(f"silo-mod bom '{gearbox}' {option} > /dev/full")

@@ -353,6 +353,16 @@ def test_a_folder_is_registered_as_a_whole(run: Any, silo: Any, gearbox: Path) -
     assert len(silo.client.search_items()) == 9
 
 
+@pytest.mark.parametrize("how", ["--yes", "--plan"])
+def test_a_file_that_cannot_be_read_is_something_left_undone(
+    run: Any, silo: Any, gearbox: Path, tmp_path: Path, how: str
+) -> None:
+    """Nobody knows what it holds; the others are registered."""
+    (gearbox.parent / "parts" / "Cover.FCStd").write_bytes(b"PK\x03\x04 cut short")
+    done = run("register", gearbox.parent, how, *([tmp_path / "plan.csv"] if how == "--plan" else []))
+    assert (done.code, "Cover.FCStd is left out" in done.err) == (1, True)
+
+
 def test_probable_duplicates_are_not_made_in_silence(
     run: Any, silo: Any, gearbox: Path, tmp_path: Path
 ) -> None:

@@ -166,12 +166,13 @@ def error_of(reply: Reply, *, writing: bool = False) -> SiloError:
     asked, host, status = reply.where.asked, reply.where.host, reply.status
     if status == 401 and not reply.secret:
         return AuthError(
-            f"{host} wants a token, and none was given. `silo-mod login {host}` asks for one and keeps it; "
+            f"{host} wants a token, and none was given. `silo-mod login URL` asks for one and keeps it; "
             "SILO_API_TOKEN or the settings name one too"
         )
     if status == 401:
         return AuthError(
-            f"{host} does not accept the token{told}. Give a valid one (SILO_API_TOKEN, or the settings)"
+            f"{host} does not accept the token{told}. Give a valid one (SILO_API_TOKEN, or the settings; "
+            "`silo-mod doctor` shows which one is used)"
         )
     if status == 403:
         return ForbiddenError(f"{asked}: this token may not do that{told}. Ask for the editor role")

@@ -8,13 +8,13 @@ import json
 import os
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from silo.bom.errors import InputError, NotFoundError, SiloError
+from silo.bom.errors import InputError, NotFoundError, RouteMissingError, SiloError
 from silo.bom.findings import respelt_findings
 from silo.bom.identity import walk_entries
 from silo.bom.links import extract
@@ -23,6 +23,7 @@ from silo.bom.roots import choose_assembly
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
+    from silo.api.wire import Item
     from silo.vault.plan import Plan
     from silo.vault.reading import Reading
 
@@ -37,8 +38,30 @@ def add_command(commands: Commands, name: str, help_text: str, example: str) -> 
         description=help_text[0].upper() + help_text[1:] + ".",
         epilog=f"example:\n  {example}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,  # --all is no --allow-missing
     )
     return parser
+
+
+def only_with(parser: argparse.ArgumentParser, needed: str, *options: str) -> None:
+    """Refuse ``options`` without the option ``needed``: a person who gave one believes that it did something.
+
+    Several needed ones, as "--apply --plan": any of them.
+    """
+    needs = parser.get_default("needs") or ()
+    parser.set_defaults(needs=(*needs, *((option, needed) for option in options)))
+
+
+def refuse_idle_options(parser: argparse.ArgumentParser, args: argparse.Namespace) -> None:
+    """Raise InputError for an option that would do nothing (:func:`only_with`)."""
+
+    def given(option: str) -> bool:
+        name = option.strip("-").replace("-", "_")
+        return bool(getattr(args, name) != parser.get_default(name))
+
+    for option, needed in getattr(args, "needs", ()):
+        if given(option) and not any(map(given, needed.split())):
+            raise InputError(f"{option} does nothing without {' or '.join(needed.split())}")
 
 
 def add_server_options(parser: argparse.ArgumentParser) -> None:
@@ -72,13 +95,14 @@ def add_json_option(parser: argparse.ArgumentParser) -> None:
 def add_reading_options(parser: argparse.ArgumentParser, *, jobs: bool = True) -> None:
     """``--index``, ``--no-index``, and for many files ``--jobs`` and ``--dask``."""
     group = parser.add_argument_group("reading")
-    group.add_argument(
+    index = group.add_mutually_exclusive_group()
+    index.add_argument(
         "--index",
         metavar="FILE",
         type=a_path,
         help="where to remember what files hold (else your cache)",
     )
-    group.add_argument("--no-index", action="store_true", help="read every file, and remember nothing")
+    index.add_argument("--no-index", action="store_true", help="read every file, and remember nothing")
     if jobs:
         group.add_argument(
             "--jobs", type=job_count, metavar="N", help="processes that read (default: the processors)"
@@ -191,14 +215,31 @@ def plan_of(args: argparse.Namespace) -> Iterator[tuple[Plan, Reading, str]]:
     from silo.files import documents_in
     from silo.vault.plan import make_plan
 
+    refuse_assembly_of([args.top], args.assembly)
     base = os.path.realpath(args.top)
     tops = documents_in([args.top])
     if not tops:
         raise InputError(f"no FreeCAD files (*.FCStd) in {args.top}")
     with reading_of(args) as reading:
         reading.index.expect(base)
-        plan = make_plan(tops, reading, assembly=args.assembly, hardware=not args.no_hardware)
+        plan = make_plan(tops, reading, hardware=not args.no_hardware)
         yield plan, reading, base
+
+
+def refuse_assembly_of(tops: Sequence[str], assembly: str | None) -> None:
+    """A name picks one of the assemblies of a file; the files of a folder have their own."""
+    if assembly and any(os.path.isdir(top) for top in tops):
+        raise InputError("--assembly picks an assembly of one file, and this is a folder; name the file")
+
+
+def named_item(client: SiloClient, number: str) -> Item:
+    """The item that a person named. InputError where there is none: it is the name that is wrong."""
+    try:
+        return client.get_item(number)
+    except RouteMissingError:
+        raise
+    except NotFoundError:
+        raise InputError(f"there is no item {number} on {client.base_url}") from None
 
 
 def reach(client: SiloClient, extraction: Extraction | None = None) -> None:

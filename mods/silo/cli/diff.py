@@ -69,7 +69,7 @@ def run_diff(args: argparse.Namespace) -> int:
     else:
         _show(whole, compared, names_of(whole, chain.from_iterable(lines)), base)
     # What cannot be compared whole is no answer, whether one wants to know of differences or not.
-    broken = any(blocking(one) for one, _ in compared)
+    broken = any(blocking(one) or one.assembly.part_number is None for one, _ in compared)
     return Exit.UNDONE if broken or (args.check and drifted) else Exit.DONE
 
 
@@ -94,7 +94,8 @@ def _folder(args: argparse.Namespace) -> int:
             for outcome in result.outcomes:
                 news = is_news(outcome)
                 whole = not blocking(outcome.resolved)
-                broken = broken or not whole or outcome.error is not None
+                numbered = outcome.resolved.assembly.part_number is not None
+                broken = broken or not whole or not numbered or outcome.error is not None
                 compared_count += outcome.plan is not None and whole
                 drifted = drifted or (outcome.plan is not None and outcome.plan.diff.drifted)
                 if args.json:

@@ -82,6 +82,7 @@ def add_bom_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--delimiter", help="of the BOM, one character")
     group.add_argument("--decimal", choices=(".", ","), help="decimal mark of the BOM")
     group.add_argument("--mass-unit", metavar="UNIT", help="of masses without one (kg, g, lb, …)")
+    common.only_with(parser, "--bom", "--column", "--encoding", "--delimiter", "--decimal", "--mass-unit")
 
 
 def add_result_options(parser: argparse.ArgumentParser) -> None:
@@ -111,6 +112,7 @@ def add_result_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--allow", action="append", default=[], metavar="CODE", help="with --strict: this warning is fine"
     )
+    common.only_with(parser, "--strict", "--allow")
 
 
 def add_push_options(parser: argparse.ArgumentParser) -> None:
@@ -121,6 +123,7 @@ def add_push_options(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument("--dry-run", action="store_true", help="with --push: only show what would be written")
     group.add_argument("--item", metavar="NUMBER", help="with --push: part number of the whole assembly")
+    common.only_with(parser, "--push", "--dry-run", "--item")
     common.add_server_options(parser)
 
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import difflib
 import os
 from collections.abc import Mapping
 
@@ -59,6 +60,11 @@ def run_where_used(args: argparse.Namespace) -> int:
                 unread.append(top)
             for used in answer.known.links:
                 users.setdefault(used, set()).add(top)
+    if part not in users and not os.path.lexists(part):
+        known = {relative(one, base): one for one in (*tops, *users)}
+        near = difflib.get_close_matches(relative(part, base), known, 2, 0.75)
+        meant = f"; did you mean {' or '.join(near)}?" if near else "."
+        raise InputError(f"{args.part}: there is no such file, and none in {args.vault} links to one{meant}")
     direct = sorted(users.get(part, ()))
     above = _above(part, users)
     roots = sorted(top for top in above if not users.get(top))

@@ -18,6 +18,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import TextIO, TypeVar
 
 from silo.bom.errors import CancelledError, Exit, InputError, SiloError, exit_of
+from silo.cli.common import refuse_idle_options
 
 T = TypeVar("T")
 
@@ -47,11 +48,14 @@ def build_parser() -> argparse.ArgumentParser:
         description="The BOM of FreeCAD assemblies in Silo: read, compare, sync, register; mass and inertia.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
     )
     parser.add_argument("--version", action="version", version=f"silo-mod {_version()}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name in _MODULES:
         importlib.import_module(f"silo.cli.{name}").register(commands)
+    for one in commands.choices.values():
+        one.set_defaults(parser=one)
     return parser
 
 
@@ -86,8 +90,11 @@ def _run(argv: Sequence[str] | None) -> int:
         if getattr(args, "ends_with_its_reader", False):
             sys.stdout.strict = True  # type: ignore[union-attr]
         _refuse_empty(args)
+        refuse_idle_options(args.parser, args)
         code: int = args.run(args)
         return code
+    except SystemExit as end:  # argparse: --help and --version are output like any other
+        return end.code if isinstance(end.code, int) else Exit.BAD_INPUT
     except KeyboardInterrupt:
         print("\nCancelled.", file=sys.stderr)
         return Exit.CANCELLED

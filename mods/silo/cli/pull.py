@@ -81,7 +81,8 @@ def run_pull(args: argparse.Namespace) -> int:
             is_open=lambda path: not args.even_if_open and opened.has_file(path),
             learn=lambda sha256, item, number: store.learn(client.base_url, sha256, item, number),
         )
-        with fetched(client, args.part_number, args.revision) as tree:
+        number = common.named_item(client, args.part_number).part_number
+        with fetched(client, number, args.revision) as tree:
             into.mkdir(parents=True, exist_ok=True)
             pulled = place(tree, into, rules)
     if args.json:

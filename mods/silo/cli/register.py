@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import shlex
 import sys
 import time
 from collections.abc import Mapping, Sequence
@@ -15,7 +16,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from silo.bom.declare import Modelled
 from silo.bom.errors import ConflictError, DocumentError, Exit, InputError
 from silo.bom.identity import walk_entries
 from silo.bom.model import Extraction
@@ -31,7 +31,7 @@ from silo.open_in_freecad import open_in_any
 from silo.registering.offer import Candidate, Offer, State, offer
 from silo.registering.on_disk import OPEN, Ask, carry_out_on_disk, is_own, seen_on_disk, whole_folder
 from silo.registering.orders import Order
-from silo.registering.table import doubts, orders_of, read_table, write_table
+from silo.registering.table import Row, doubts, orders_of, read_table, write_table
 from silo.registration import Journal, Registration, unclear
 
 if TYPE_CHECKING:
@@ -94,6 +94,8 @@ def register(commands: Commands) -> None:
     parser.add_argument("--category", help="this category for every part (assemblies keep theirs)")
     common.add_json_option(parser)
     common.add_server_options(parser)
+    common.only_with(parser, "--yes", "--duplicates")
+    common.only_with(parser, "--declare", "--apart")
     parser.set_defaults(run=run)
 
 
@@ -104,6 +106,10 @@ def run(args: argparse.Namespace) -> int:
             "register asks before it creates items, and there is nobody to ask here; say --yes, "
             "or write a table with --plan FILE, edit it, and use it with --apply FILE"
         )
+    if args.plan and args.json:
+        raise InputError("--plan writes a table and no JSON; leave out --json")
+    if args.category and (args.apply or args.undeclare):
+        raise InputError("--category does nothing here: the table, or the item, has its category")
     if (args.declare or args.undeclare) and (args.plan or args.apply or os.path.isdir(args.top)):
         raise InputError("--declare and --undeclare are for one file, and not for a table")
     if args.undeclare:
@@ -115,7 +121,7 @@ def run(args: argparse.Namespace) -> int:
         if os.path.lexists(args.plan):
             raise InputError(f"{args.plan} is there already, and may hold edits; name another file")
     rows = read_table(Path(args.apply).read_bytes(), args.apply) if args.apply else []
-    extraction, unused = _folder(args) if os.path.isdir(args.top) else (common.read_top(args), frozenset())
+    extraction, unused, unread = _read(args)
     base = os.path.realpath(args.top) if os.path.isdir(args.top) else base_of(extraction)
     with common.client_of(args) as client:
         schema = client.find_schema(args.schema)
@@ -124,29 +130,22 @@ def run(args: argparse.Namespace) -> int:
         if args.category and args.category not in found.categories:
             known = ", ".join(found.categories)
             raise InputError(f"--category: schema {schema} has no {args.category}; it has {known}")
-        run = _Run(args, client, schema, found, base)
-        if args.plan:
-            return run.write_plan(unused)
-        if args.apply:
-            planned = orders_of(rows, found, base, client, args.apply)
-            return run.register(planned.orders, planned.unlisted, already=planned.done)
-        if args.yes:
-            orders, left = run.all_but_duplicates(unused)
-            return run.register(orders, left)
-        counted = (one for one in found.candidates if one.article is None)
-        offered = [one for one in counted if one.entry.doc_path not in unused]
-        orders, left = Dialog(offered, found, client, base, is_own).ask()
-        return run.register(orders, left)
+        code = _Run(args, client, schema, found, base).as_asked(rows, unused)
+        return code or (Exit.UNDONE if unread else Exit.DONE)
 
 
 # --- what there is --------------------------------------------------------------------------------------
 
 
-def _folder(args: argparse.Namespace) -> tuple[Extraction, frozenset[str]]:
+def _read(args: argparse.Namespace) -> tuple[Extraction, frozenset[str], bool]:
+    """The components, the files that no assembly uses, and whether there is a file that cannot be read."""
+    if not os.path.isdir(args.top):
+        return common.read_top(args), frozenset(), False
     with common.plan_of(args) as (plan, reading, base):
         for path, error in plan.errors.items():
             print(f"silo-mod: {relative(path, base)} is left out: {error}", file=sys.stderr)
-        return whole_folder(plan, reading, base, hardware=not args.no_hardware)
+        extraction, unused = whole_folder(plan, reading, base, hardware=not args.no_hardware)
+        return extraction, unused, bool(plan.errors)
 
 
 def _offer(extraction: Extraction, client: SiloClient, schema: str, args: argparse.Namespace) -> Offer:
@@ -209,6 +208,19 @@ class _Run:
         self.args, self.client, self.schema, self.found, self.base = args, client, schema, found, base
         self.done: list[Registration] = []
 
+    def as_asked(self, rows: Sequence[Row], unused: frozenset[str]) -> int:
+        """With a table, with --yes, or with the answers of a person."""
+        if self.args.plan:
+            return self.write_plan(unused)
+        if self.args.apply:
+            planned = orders_of(rows, self.found, self.base, self.client, self.args.apply)
+            return self.register(planned.orders, planned.unlisted, already=planned.done)
+        if self.args.yes:
+            return self.register(*self.all_but_duplicates(unused))
+        counted = (one for one in self.found.candidates if one.article is None)
+        offered = [one for one in counted if one.entry.doc_path not in unused]
+        return self.register(*Dialog(offered, self.found, self.client, self.base, is_own).ask())
+
     def write_plan(self, unused: frozenset[str]) -> int:
         """The table; nothing is registered."""
         from silo.durable import replacing
@@ -229,7 +241,7 @@ class _Run:
         count = sum(not one.declared for one in self.found.candidates)
         print(
             f"{self.args.plan}: {count} {'row' if count == 1 else 'rows'}. Edit it, then: "
-            f"silo-mod register {self.args.top} --apply {self.args.plan}",
+            f"silo-mod register {shlex.quote(self.args.top)} --apply {shlex.quote(self.args.plan)}",
             file=sys.stderr,
         )
         return Exit.DONE
@@ -276,7 +288,9 @@ class _Run:
             one.article for one in self.found.candidates if one.article is not None and not one.declared
         ]
         declared = {one.proposal.entry.key for one in self.done}
-        report(
+        from silo.cli import show
+
+        show.registrations(
             self.args,
             self.base,
             self.done,
@@ -352,51 +366,3 @@ def _asker(how: str) -> Ask:
         return None if answer.lower() == "n" else unclear(proposal, found)
 
     return ask
-
-
-# --- what people and machines see -----------------------------------------------------------------------
-
-
-def report(
-    args: argparse.Namespace,
-    base: str,
-    done: Sequence[Registration],
-    left: Sequence[tuple[Proposal, str]],
-    articles: Sequence[Modelled],
-) -> None:
-    """What became of each; ``left``: proposals that were not registered, and why."""
-    from silo.cli import show
-
-    if args.json:
-        common.print_json(
-            {
-                "registered": [show.proposal_json(r.proposal, base, r) for r in done if r.error is None],
-                "failed": [show.proposal_json(r.proposal, base, r) for r in done if r.error is not None],
-                "unregistered": [show.proposal_json(proposal, base, note=why) for proposal, why in left],
-                "modelled": [show.article_json(one, base) for one in articles],
-            }
-        )
-        return
-    out = show.console()
-    if not done and not left:
-        out.print("Every component has its part number already.")
-    for result in done:
-        name = show.plain(result.proposal.name)
-        if result.error is None:
-            guess = " (the category is a guess)" if result.proposal.is_guess else ""
-            found = " (the item was there already)" if result.found else ""
-            out.print(f"✓ {result.part_number}  {name}{guess}{found}", markup=False)
-        else:
-            out.print(f"✗ {name}: {show.plain(str(result.error))}", style="red", markup=False)
-    for proposal, why in left:
-        where = proposal.entry.standard or relative(proposal.entry.doc_path, base)
-        reason = f" ({show.plain(why)})" if why else ""
-        text = f"⚠ {show.plain(where)}: unregistered, left out of the BOM{reason}"
-        out.print(text, style="yellow", markup=False)
-    if args.yes and any(why for _, why in left):
-        out.print(
-            "Is it the same part? --duplicates join takes the item, --duplicates new makes another; "
-            "--plan asks for each."
-        )
-    for line in show.articles_text(articles, base) if articles else ():
-        out.print(line, markup=False, highlight=False)

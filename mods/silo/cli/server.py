@@ -184,6 +184,8 @@ def run_watch(args: argparse.Namespace) -> int:
     with common.client_of(args) as client:
         with suppress(NotFoundError):  # a server that does not say who we are has answered all the same
             client.whoami()  # a wrong address or token is reported at once, not retried
+        if args.item:
+            args.item = common.named_item(client, args.item).part_number
         mode = client.ready().mode
         print(f"[{client.base_url}: {mode}]", file=sys.stderr)
         listener = EventListener(client, on_event=events.put, on_state=events.put)

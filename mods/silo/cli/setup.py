@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from silo.bom.errors import ConfigError, Exit, ForbiddenError, InputError, NotFoundError, SiloError
+from silo.bom.errors import ConfigError, Exit, ForbiddenError, InputError, NotFoundError, SiloError, exit_of
 from silo.cli import common
 from silo.cli.common import Commands
 
@@ -99,9 +99,9 @@ def _add_doctor(commands: Commands) -> None:
 
 
 def run_doctor(args: argparse.Namespace) -> int:
-    """Print what was found; 3 where something that the commands need does not work."""
+    """Print what was found; 2 or 3 where something that the commands need does not work."""
     found = {**_machine(), **_server(args)}
-    failed = [name for name, value in found.items() if isinstance(value, SiloError)]
+    failed = {name: value for name, value in found.items() if isinstance(value, SiloError)}
     if args.json:
         common.print_json({"ok": not failed, **{name: str(value) for name, value in found.items()}})
     else:
@@ -110,7 +110,7 @@ def run_doctor(args: argparse.Namespace) -> int:
         width = max(map(len, found))
         for name, value in found.items():
             print(f"{'✗' if name in failed else ' '} {name:<{width}}  {show.plain(str(value))}")
-    return Exit.REMOTE if failed else Exit.DONE
+    return max((exit_of(one) for one in failed.values()), default=Exit.DONE)
 
 
 def _machine() -> Rows:

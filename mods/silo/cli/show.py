@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import argparse
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -22,6 +23,7 @@ from silo.bom.naming import Proposal, display_name
 from silo.bom.paths import relative
 from silo.bom.report import base_of, shorten
 from silo.bom_sync import Outcome, Status
+from silo.cli import common
 from silo.registration import Registration
 
 _MARK = {
@@ -32,6 +34,8 @@ _MARK = {
 _MOST_MODELLED = 40
 # A tree longer than this helps nobody on a terminal; --json has it all.
 _MOST_LINES = 2000
+# A hostile file's name may have 60 MB; a path of the system has 4096 at most.
+_LONGEST = 5000
 
 
 class _Terminal(Console):
@@ -46,8 +50,9 @@ def console(*, stderr: bool = False) -> Console:
 
 
 def plain(text: str) -> str:
-    """Text of a file or a server without control characters: it may not steer the terminal."""
-    return "".join(c if c.isprintable() else "�" for c in text)
+    """Text of a file or a server without control characters: it may not steer the terminal, nor fill it."""
+    shown = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
+    return "".join(c if c.isprintable() else "�" for c in shown)
 
 
 def entry_text(entry: BomEntry, base: str) -> Text:
@@ -259,3 +264,46 @@ def proposal_json(
     if result is not None and result.error is not None:
         row |= {"error": {"code": result.error.code, "message": str(result.error)}}
     return row
+
+
+def registrations(
+    args: argparse.Namespace,
+    base: str,
+    done: Sequence[Registration],
+    left: Sequence[tuple[Proposal, str]],
+    articles: Sequence[Modelled],
+) -> None:
+    """What became of each; ``left``: proposals that were not registered, and why."""
+    if args.json:
+        common.print_json(
+            {
+                "registered": [proposal_json(r.proposal, base, r) for r in done if r.error is None],
+                "failed": [proposal_json(r.proposal, base, r) for r in done if r.error is not None],
+                "unregistered": [proposal_json(proposal, base, note=why) for proposal, why in left],
+                "modelled": [article_json(one, base) for one in articles],
+            }
+        )
+        return
+    out = console()
+    if not done and not left:
+        out.print("Every component has its part number already.")
+    for result in done:
+        name = plain(result.proposal.name)
+        if result.error is None:
+            guess = " (the category is a guess)" if result.proposal.is_guess else ""
+            found = " (the item was there already)" if result.found else ""
+            out.print(f"✓ {result.part_number}  {name}{guess}{found}", markup=False)
+        else:
+            out.print(f"✗ {name}: {plain(str(result.error))}", style="red", markup=False)
+    for proposal, why in left:
+        where = proposal.entry.standard or relative(proposal.entry.doc_path, base)
+        reason = f" ({plain(why)})" if why else ""
+        text = f"⚠ {plain(where)}: unregistered, left out of the BOM{reason}"
+        out.print(text, style="yellow", markup=False)
+    if args.yes and any(why for _, why in left):
+        out.print(
+            "Is it the same part? --duplicates join takes the item, --duplicates new makes another; "
+            "--plan asks for each."
+        )
+    for line in articles_text(articles, base) if articles else ():
+        out.print(line, markup=False, highlight=False)

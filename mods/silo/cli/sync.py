@@ -74,6 +74,7 @@ def run(args: argparse.Namespace) -> int:
     from silo.batch_report import Report, Summary, form_of
     from silo.vault.lock import only_job
 
+    common.refuse_assembly_of(args.tops, args.assembly)
     tops = documents_in(args.tops)
     if not tops:
         raise InputError(f"no FreeCAD files (*.FCStd) in {', '.join(args.tops)}")

@@ -17,7 +17,7 @@ from typing import Any, Protocol
 
 from silo.api.revisions import other_name
 from silo.bom.declare import Modelled
-from silo.bom.errors import CancelledError, NotFoundError, SiloError
+from silo.bom.errors import CancelledError, NotFoundError, ServerFaultError, SiloError
 from silo.bom.findings import FindingCode
 from silo.bom.identity import meta_key, walk_entries
 from silo.bom.model import BomEntry, Extraction
@@ -184,6 +184,8 @@ def offer(
     schema = api.find_schema(schema)
     numbers = _numbers_by_identity(resolved)
     categories = api.categories(schema)
+    if not categories:
+        raise ServerFaultError(f"schema {schema} has no categories on this server; is it a Silo server?")
     tree = (extraction.assembly, *extraction.entries)
     copies = [
         entry

@@ -254,7 +254,7 @@ def test_bom_and_material_options_reach_the_calculation(run: Run, arm: Path) -> 
         (["--default-density", "1e999"], "from 25 to 23000"),
         (["--timeout", "-1"], "--timeout"),
         (["--push"], "no Silo server is configured"),
-        (["--column", "mass"], "ROLE=HEADER"),
+        (["--bom", "bom.csv", "--column", "mass"], "ROLE=HEADER"),
         (["--materials", "none.csv"], "none.csv"),
     ],
 )
