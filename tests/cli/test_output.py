@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import os
+import random
 import shlex
 import subprocess
 import sys
@@ -13,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from fcstd_writer import Doc, locals_, part
 
 SILO_MOD = shlex.join([sys.executable, "-m", "silo.cli.main"])
 ASCII = {"PYTHONIOENCODING": "ascii"}
@@ -164,3 +166,18 @@ def test_a_part_has_an_empty_bom_and_nothing_beside(run: Any, gearbox: Path) -> 
     found = run("bom", gearbox.parent / "parts" / "Gear.FCStd", "--json").json()
     assert found["entries"] == []
     assert [finding["code"] for finding in found["findings"]] == ["empty_bom"]
+
+
+@pytest.mark.parametrize("words", [["bom"], ["sync", "--dry-run"], ["diff"], ["register", "--yes"]])
+def test_a_name_of_a_megabyte_does_not_fill_the_terminal(
+    run: Any, silo: Any, tmp_path: Path, words: list[str]
+) -> None:
+    """A hostile file's name may have 60 MB: the beginning of it says enough."""
+    name = random.Random(1).randbytes(500_000).hex()
+    part("part", "Box", Label=name).save(tmp_path / "part.FCStd")
+    top = Doc(label=name).link("L1", f"{name}.FCStd", "Box").link("L2", "part.FCStd", "Box")
+    top.add("App::Part", "Top", Label=name, Group=locals_("L1", "L2"), Type="Assembly")
+    done = run(words[0], top.save(tmp_path / "top.FCStd"), *words[1:])
+    assert done.code == 1
+    assert "there is no" not in done.err
+    assert len(done.out) + len(done.err) < 50_000

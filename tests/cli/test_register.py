@@ -354,12 +354,18 @@ def test_a_folder_is_registered_as_a_whole(run: Any, silo: Any, gearbox: Path) -
 
 
 @pytest.mark.parametrize("how", ["--yes", "--plan"])
+@pytest.mark.parametrize("damage", [b"PK\x03\x04 cut short", None])
+@pytest.mark.parametrize("folder", [True, False])
 def test_a_file_that_cannot_be_read_is_something_left_undone(
-    run: Any, silo: Any, gearbox: Path, tmp_path: Path, how: str
+    run: Any, silo: Any, gearbox: Path, tmp_path: Path, how: str, damage: bytes | None, folder: bool
 ) -> None:
     """Nobody knows what it holds; the others are registered."""
-    (gearbox.parent / "parts" / "Cover.FCStd").write_bytes(b"PK\x03\x04 cut short")
-    done = run("register", gearbox.parent, how, *([tmp_path / "plan.csv"] if how == "--plan" else []))
+    cover = gearbox.parent / "parts" / "Cover.FCStd"
+    cover.unlink()
+    if damage:
+        cover.write_bytes(damage)
+    words = [how, tmp_path / "plan.csv"] if how == "--plan" else [how]
+    done = run("register", gearbox.parent if folder else gearbox, *words)
     assert (done.code, "Cover.FCStd is left out" in done.err) == (1, True)
 
 

@@ -140,12 +140,23 @@ def run(args: argparse.Namespace) -> int:
 def _read(args: argparse.Namespace) -> tuple[Extraction, frozenset[str], bool]:
     """The components, the files that no assembly uses, and whether there is a file that cannot be read."""
     if not os.path.isdir(args.top):
-        return common.read_top(args), frozenset(), False
+        extraction = common.read_top(args)
+        return extraction, frozenset(), _tell_missing(extraction, base_of(extraction))
     with common.plan_of(args) as (plan, reading, base):
         for path, error in plan.errors.items():
             print(f"silo-mod: {relative(path, base)} is left out: {error}", file=sys.stderr)
         extraction, unused = whole_folder(plan, reading, base, hardware=not args.no_hardware)
-        return extraction, unused, bool(plan.errors)
+        return extraction, unused, _tell_missing(extraction, base) or bool(plan.errors)
+
+
+def _tell_missing(extraction: Extraction, base: str) -> bool:
+    """Report the files that nobody can register, for they are not there."""
+    from silo.cli.show import plain
+
+    missing = {entry.doc_path for entry in walk_entries(extraction.entries) if entry.missing}
+    for path in sorted(missing):
+        print(f"silo-mod: {plain(relative(path, base))} is left out: it is not there", file=sys.stderr)
+    return bool(missing)
 
 
 def _offer(extraction: Extraction, client: SiloClient, schema: str, args: argparse.Namespace) -> Offer:
