@@ -161,7 +161,7 @@ class InertiaReport:
     def get_summary(self) -> str:
         """All warnings by link, in words."""
         if not self.warnings:
-            return "No warnings: every part has its mass from the BOM."
+            return "No warnings."
         lines = [f"{counted(len(self.warnings), 'warning')}:"]
         by_link: dict[str, list[PartWarning]] = {}
         for warning in self.warnings:

@@ -205,6 +205,7 @@ def test_what_a_header_says_of_its_masses(bom: Bom, header: str, kg: float) -> N
     """12 in the cell of four pieces: by unit, by pieces, by one or all."""
     table = bom(f"Name,Qty,Material,{header}\nbolt,4,steel,12\n")
     assert table["bolt"].mass_kg == pytest.approx(kg)
+    assert table["bolt"].quantum_kg == pytest.approx(kg / 24)  # of half a unit in twelve
     assert codes(table) == []
 
 
@@ -219,6 +220,21 @@ def test_a_header_that_is_no_mass_is_not_taken_for_one(bom: Bom, inner: str) -> 
     assert codes(bom(text)) == [BomCode.MISSING_COLUMN]
     forced = bom(text, columns={"mass": f"Mass ({inner})"})
     assert any("is no mass by its header" in w.message for w in forced.warnings)
+
+
+def test_a_mass_of_two_readings_is_marked(bom: Bom) -> None:
+    """1234 or 1.234: used by the likelier mark, reported, and never pushed."""
+    table = bom('Name,Material,Mass\na,,"1,234 kg"\n')
+    assert (table["a"].mass_kg, table["a"].unsure) == (1234, True)
+    assert codes(table) == [BomCode.AMBIGUOUS_MASS]
+
+
+@pytest.mark.parametrize("text", ["-1", "as required", "0.5 m", "1/2", "4+1", "x4", "~4", "2 sets"])
+def test_a_quantity_that_is_no_count_is_reported(bom: Bom, text: str) -> None:
+    """It is not used: a total mass has nothing to be divided by then."""
+    table = bom(f'Name,Qty,Material,Total mass (kg)\na,"{text}",,4\n')
+    assert (table["a"].quantity, table["a"].mass_kg) == (None, None)
+    assert BomCode.UNREADABLE_QUANTITY in codes(table)
 
 
 def test_a_column_of_units_is_read(bom: Bom) -> None:

@@ -79,6 +79,26 @@ def test_a_second_sheet_with_a_bom_is_named() -> None:
     assert "sheet “B”" in warning.message
 
 
+def test_a_stray_cell_in_a_far_corner_is_named() -> None:
+    """Read as a full table it would be 17 thousand million cells; a long or a wide sheet is none."""
+    book = openpyxl.load_workbook(io.BytesIO(xlsx(BOM=[HEAD, ["a", 1, "steel", 1]])))
+    book["BOM"].cell(40, 500, "note")
+    book.save(out := io.BytesIO())
+    assert BOMParser().parse_bytes(out.getvalue())["a"].mass_kg == pytest.approx(1e-3)
+    book["BOM"].cell(1_048_576, 16_384, "x")
+    book.save(out := io.BytesIO())
+    with pytest.raises(InputError, match="reaches to XFD1048576"):
+        BOMParser().parse_bytes(out.getvalue())
+
+
+def test_a_workbook_that_unpacks_without_end_is_refused() -> None:
+    with zipfile.ZipFile(out := io.BytesIO(), "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("xl/worksheets/sheet1.xml", b" ")
+        archive.filelist[0].file_size = 10**10
+    with pytest.raises(InputError, match="unpacked"):
+        BOMParser().parse_bytes(out.getvalue())
+
+
 @pytest.mark.parametrize(
     ("data", "words"),
     [

@@ -459,7 +459,7 @@ def test_platings_grades_and_spellings(materials: MaterialTable, text: str, dens
     assert (found.material.density, found.doubt) == (density, "")
 
 
-@pytest.mark.parametrize("text", ["Air", "FEB", "Pb", "XY", "PZ"])
+@pytest.mark.parametrize("text", ["Air", "FEB", "Pb", "XY", "30 4", "1 7 4"])
 def test_short_texts_are_like_nothing(materials: MaterialTable, text: str) -> None:
     """Three letters are near to any three others; "Air" is no "acier"."""
     found = materials.find(text)

@@ -10,8 +10,12 @@ from __future__ import annotations
 
 import csv
 import io
+import re
+import zipfile
+import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import reduce
 from itertools import islice, zip_longest
 
 from silo.bom.errors import InputError
@@ -25,6 +29,8 @@ HEADER_WITHIN = 40
 DELIMITERS = (",", ";", "\t", "|")
 _WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 """How XLSX and ODS files begin, and XLS files."""
+MAX_UNPACKED, MOST_CELLS = 8 * MAX_BYTES, 20_000_000
+_REFERENCE = re.compile(rb'\sr="([A-Z]{1,3})([0-9]{1,7})"')
 _CODE_PAGES = ("cp1252", "cp932", "gb18030", "latin-1")
 
 
@@ -156,6 +162,7 @@ def _sheets(data: bytes, source: str) -> Iterator[tuple[str, str]]:
         raise InputError(
             f"{source}: this is a workbook; export it as CSV, or install silo-mod[inertia]"
         ) from error
+    _check_extent(data, source)
     try:
         book = load_workbook(io.BytesIO(data))
         for name in book.sheet_names:
@@ -165,6 +172,25 @@ def _sheets(data: bytes, source: str) -> Iterator[tuple[str, str]]:
             yield f"sheet “{name}”", out.getvalue()
     except CalamineError as error:
         raise InputError(f"{source}: the workbook cannot be read ({error})") from error
+
+
+def _check_extent(data: bytes, source: str) -> None:
+    """InputError where a stray cell in a far corner would cost the reader more memory than there is."""
+    try:
+        archive = zipfile.ZipFile(io.BytesIO(data))
+        if sum(info.file_size for info in archive.infolist()) > MAX_UNPACKED:
+            raise InputError(f"{source}: unpacked, the workbook is larger than {MAX_UNPACKED / 1e6:.0f} MB")
+        sheets = [n for n in archive.namelist() if n.startswith("xl/worksheets/") and n.endswith(".xml")]
+        found = {name: _REFERENCE.findall(archive.read(name)) for name in sheets}
+    except (zipfile.BadZipFile, zlib.error, OSError, EOFError, RuntimeError):
+        return  # the reader says what is wrong with it
+    for name, cells in found.items():
+        row = max((int(number) for _, number in cells), default=0)
+        column = max((letters.rjust(3, b"@") for letters, _ in cells), default=b"@@@")
+        width = reduce(lambda number, letter: number * 26 + letter - 64, column, 0)
+        if row * width > MOST_CELLS:
+            last = f"{column.decode().strip('@')}{row}"
+            raise InputError(f"{source}: {name} reaches to {last}; delete what stands outside of the table")
 
 
 def _shown(value: object) -> str:
