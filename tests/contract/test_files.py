@@ -170,3 +170,58 @@ def test_revisions_come_in_pages(api: Api) -> None:
         assert [r.revision_number for r in client.revisions(number)] == [7, 6, 5, 4, 3, 2, 1]
         assert [r.revision_number for r in client.revisions(number, newest=2)] == [7, 6]
         assert [r.revision_number for r in client.revisions(number, after=4)] == [7, 6, 5]
+
+
+def test_a_file_that_was_made_from_an_older_revision_is_refused(api: Api) -> None:
+    """409 with the newer one; nothing is added. With the newest as its base it passes, and that is kept."""
+    number = api.item()
+    first = upload(api, number, b"one", base_revision="0").json()
+    assert (first["revision_number"], first["base_revision"]) == (1, 0)
+    upload(api, number, b"one less", base_revision="1", comment="less")
+    refused = upload(api, number, b"one other", base_revision="1")
+    assert (refused.status, refused.json()["error"]) == (409, "newer_revision")
+    newer = refused.json()["revision"]
+    assert (newer["revision_number"], newer["comment"]) == (2, "less")
+    assert newer["file_checksum"] == hashlib.sha256(b"one less").hexdigest()
+    assert len(api.get(f"/api/items/{number}/revisions")) == 2
+    on_top = upload(api, number, b"one other", base_revision="2")
+    assert (on_top.status, on_top.json()["base_revision"]) == (201, 2)
+    assert upload(api, number, b"who knows").status == 201  # a client that does not say it
+
+
+def test_what_is_no_other_file_is_no_newer_one(api: Api) -> None:
+    """The same content, a repeat with its key, and a revision of properties alone."""
+    number = api.item()
+    key = {"Idempotency-Key": uuid.uuid4().hex}
+    upload(api, number, b"one")
+    mine = upload(api, number, b"two", base_revision="1", headers=key)
+    assert upload(api, number, b"two", base_revision="1").status == 201
+    upload(api, number, b"three", base_revision="3")
+    again = upload(api, number, b"two", base_revision="1", headers=key)
+    assert (again.status, again.json()) == (201, mine.json())
+    assert upload(api, number, b"another", base_revision="1", headers=key).status == 409
+    api.good("POST", f"/api/items/{number}/revisions", {"properties": {"mass_kg": 2}, "comment": "weighed"})
+    assert upload(api, number, b"five", base_revision="4").json()["revision_number"] == 6
+
+
+def test_a_bom_that_comes_late_does_not_undo_that_of_a_newer_file(api: Api) -> None:
+    """``document.revision``: the revision whose BOM it is; by its SHA-256 it may be the newest by another
+    number."""
+    number, bolt, nut = api.items(3)
+    upload(api, number, b"one")
+    upload(api, number, b"two")
+
+    def document(revision: int, content: bytes) -> dict[str, Any]:
+        checksum = hashlib.sha256(content).hexdigest()
+        return {"file": "Top.FCStd", "sha256": checksum, "revision": revision}
+
+    api.merge(number, {bolt: 2}, document=document(2, b"two"))
+    late = {
+        "entries": [{"child_part_number": nut, "quantity": 9}],
+        "document": document(1, b"one"),
+    }
+    error = api.bad(409, "POST", f"/api/items/{number}/bom/merge", late)
+    assert (error["error"], error["revision"]["revision_number"]) == ("newer_revision", 2)
+    assert api.quantities(number) == {bolt: 2}
+    api.merge(number, {bolt: 3}, document=document(1, b"two"))
+    assert api.quantities(number) == {bolt: 3}

@@ -428,3 +428,37 @@ def test_what_was_there_already_keeps_its_revision_over_a_hold(vault: Vault) -> 
     vault.send()
     assert (vault.waiting(), vault.lines()) == ((), {})
     assert "alice has committed revision 2 since" in vault.told[-1].entry.remark
+
+
+def test_a_bom_that_was_not_sent_makes_none_out_of_date(vault: Vault) -> None:
+    """What the pane says of an older held one stays true: no newer commit of it has arrived."""
+    mine(vault, b"one", UNKNOWN)
+    refuse_next_merge(vault)
+    vault.send()
+    mine(vault, b"longer", sha(b"one"))
+
+    def hook(called: str) -> None:
+        if called == "merge_bom":
+            vault.silo.before = lambda _name: None
+            theirs(vault, b"went further", 2)
+
+    vault.silo.before = hook
+    vault.send()
+    (held,) = vault.waiting()
+    assert (held.bom_left, held.superseded) == (True, False)
+
+
+def test_a_held_bom_does_not_go_after_a_file_with_a_colleagues_between(vault: Vault) -> None:
+    """Sent on top of theirs at a person's word: the older BOM knows neither."""
+    entry = mine(vault, b"one", UNKNOWN)
+    refuse_next_merge(vault)
+    vault.send()
+    theirs(vault, b"one less", 1)
+    on_top = file_only(vault, b"mine", sha(b"one"))
+    vault.send()
+    vault.outbox.retry(on_top.id)
+    vault.send()
+    assert contents(vault)[-1] == b"mine"
+    vault.outbox.retry(entry.id)
+    vault.send()
+    assert (vault.waiting(), vault.lines()) == ((), {})

@@ -273,8 +273,8 @@ class Store(Origins):
             if base is not None:
                 db.execute(
                     "UPDATE entry SET revision = ? WHERE server = ? AND identity = ? AND revision = ?"
-                    " AND NOT file_left AND id < ?",
-                    (revision, entry.server, entry.identity, base, entry.id),
+                    " AND NOT file_left",
+                    (revision, entry.server, entry.identity, base),
                 )
             for item in filter(None, {entry.identity, entry.part_number} if note else ()):
                 db.execute(
