@@ -329,6 +329,19 @@ def test_a_part_registered_alone_is_a_part(run: Any, silo: Any, tmp_path: Path) 
     assert not row["category"].startswith("A")
 
 
+def test_a_file_of_a_folder_that_cannot_be_read_is_work_left_undone(
+    run: Any, silo: Any, gearbox: Path
+) -> None:
+    """What is in it nobody knows; everything else is registered."""
+    (gearbox.parent / "Lost.FCStd").write_bytes(b"cut")
+    for _ in range(2):
+        ran = run("register", gearbox.parent, "--yes")
+        assert (ran.code, "Lost.FCStd is left out" in ran.err) == (1, True)
+    assert run("register", gearbox.parent, "--plan", gearbox.with_name("t.csv")).code == 1
+    (gearbox.parent / "Lost.FCStd").unlink()
+    assert run("register", gearbox.parent, "--yes").code == 0
+
+
 def test_a_folder_is_registered_as_a_whole(run: Any, silo: Any, gearbox: Path) -> None:
     """Backups and ignored files left out; what no assembly uses is for a person; twice gives nothing new."""
     vault = gearbox.parent

@@ -134,19 +134,20 @@ def test_one_bad_file_does_not_stop_a_folder(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """A truncated file is reported, parts are left alone, the rest is synced; exit code 1 and a report."""
+    """A truncated file and a link to nothing are reported, the rest is synced; exit code 1 and a report."""
     _use(machines.need(version), tmp_path, monkeypatch)
     good = (vault.folder / "plate.FCStd").read_bytes()
     (vault.folder / "aaa broken.FCStd").write_bytes(good[: len(good) // 2])
+    (vault.folder / "aab lost.FCStd").symlink_to("not-fetched")
     report = tmp_path / "report.md"
     assert main(["sync", "--via", "freecad", "--json", "--report", str(report), str(vault.folder)]) == 1
     results = {Path(one["top"]).name: one for one in _json(capsys)["results"]}
-    assert not results["aaa broken.FCStd"]["ok"]
+    assert not (results["aaa broken.FCStd"]["ok"] or results["aab lost.FCStd"]["ok"])
     assert results["bolt.FCStd"]["skipped"]
     assert results["top.FCStd"]["assemblies"][0]["status"] == "merged"
     assert vault.lines("top") == {"sub": 1}
     text = report.read_text()
-    assert "4 of 5 files in order" in text
+    assert "4 of 6 files in order" in text
     assert "aaa broken.FCStd" in text
 
 

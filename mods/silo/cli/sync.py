@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from silo.batch import Options, TopResult, result_json, stopped_by, sync_top
-from silo.bom.errors import InputError, SiloError
+from silo.bom.errors import DocumentError, InputError, SiloError
 from silo.cli import common
 from silo.cli.common import Commands
 from silo.files import check_writable, documents_in
@@ -187,12 +187,16 @@ def _by_freecad(
     from silo.freecadcmd.run import run_freecad
 
     stopped: SiloError | None = None
-    found = run_freecad(tops, args.assembly, hardware=not args.no_hardware)
+    asked = dict.fromkeys(top for top in tops if os.path.isfile(top))
+    found = run_freecad(list(asked), args.assembly, hardware=not args.no_hardware)
     told = _Progress(len(tops), always=True)
     for number, top in enumerate(tops):
         told.begin(top)
         if stopped is not None:
             yield TopResult(top, error=stopped)
+            continue
+        if top not in asked:  # a link to nothing, a folder that cannot be listed
+            yield TopResult(top, error=DocumentError(top, "it cannot be opened"))
             continue
         _, extraction = next(found)
         if number == 0 and not isinstance(extraction, SiloError):
