@@ -142,7 +142,8 @@ def test_one_bad_file_does_not_stop_a_folder(
     report = tmp_path / "report.md"
     assert main(["sync", "--via", "freecad", "--json", "--report", str(report), str(vault.folder)]) == 1
     results = {Path(one["top"]).name: one for one in _json(capsys)["results"]}
-    assert not (results["aaa broken.FCStd"]["ok"] or results["aab lost.FCStd"]["ok"])
+    assert not results["aaa broken.FCStd"]["ok"]
+    assert not results["aab lost.FCStd"]["ok"]
     assert results["bolt.FCStd"]["skipped"]
     assert results["top.FCStd"]["assemblies"][0]["status"] == "merged"
     assert vault.lines("top") == {"sub": 1}
