@@ -23,7 +23,6 @@ WORKERS = (
     "pane/banner",
     "pane/entries",
     "pane/waiting",
-    "preview/columns",
     "preview/flow",
     "preview/rows",
     "register/flow",

@@ -345,11 +345,6 @@ def add_resources(icons: str, translations: str) -> None:
         gui().updateLocale()
 
 
-def selected_objects() -> list[Any]:
-    """The objects that are selected in the active document."""
-    return list(gui().Selection.getSelection())
-
-
 # FreeCAD looks through all that is selected for each further object: 10 000 take it many seconds.
 MOST_SELECTED = 2000
 

@@ -12,7 +12,8 @@ from typing import Any
 from silo.workbench import dependencies
 from silo.workbench.commands import INSTALL, Command
 from silo.workbench.freecad import host
-from silo.workbench.gui.qt import QtCore, QtWidgets, Relay
+from silo.workbench.gui import widgets
+from silo.workbench.gui.qt import QtWidgets, Relay
 from silo.workbench.words import translate, visible
 
 # The one window; FreeCAD holds no reference to it.
@@ -71,9 +72,7 @@ class InstallWindow(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
             "Silo", "Silo needs these Python packages: {names}.\nThey are installed in {folder}."
         )
         text = text.replace("{names}", ", ".join(missing)).replace("{folder}", host.packages_folder())
-        self.text = QtWidgets.QLabel(text)
-        self.text.setWordWrap(True)
-        self.text.setTextInteractionFlags(QtCore.Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.text = widgets.label(text)
         self.bar = QtWidgets.QProgressBar()
         self.bar.setRange(0, 0)
         self.bar.hide()
