@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from fcstd_writer import Doc, XLink, locals_
 
-from silo.cli.demo_edit import remove_from_assembly, set_element_count
+from silo.cli.demo import remove_from_assembly, set_element_count
 
 
 @pytest.fixture

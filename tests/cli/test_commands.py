@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 import pytest
 from running_freecad import opened
 
-from silo.cli.demo_edit import remove_from_assembly, set_element_count
+from silo.cli.demo import remove_from_assembly, set_element_count
 from silo.cli.main import build_parser
 
 

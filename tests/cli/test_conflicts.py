@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 import requests
 
-from silo.cli.demo_edit import remove_from_assembly, set_element_count
+from silo.cli.demo import remove_from_assembly, set_element_count
 
 
 @pytest.fixture

@@ -23,7 +23,7 @@ from typing import Any
 import pytest
 import yaml
 
-from silo.cli.demo_edit import set_element_count
+from silo.cli.demo import set_element_count
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 NEEDED = ("git", "jq", "curl", "bash", "iconv")

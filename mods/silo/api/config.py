@@ -18,19 +18,21 @@ import os
 import re
 import stat
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from silo.api.address import ServerAddress
-from silo.bom.errors import ConfigError
+from silo.bom.errors import ConfigError, InputError
 from silo.bom.numbers import yes_or_no
 from silo.durable import replacing
 from silo.folders import config_folder
 from silo.platform import MODES_COUNT
 
 log = logging.getLogger("silo.api")
+
+Source = TypeVar("Source", bound=str)
 
 URL, TOKEN, VERIFY = "SILO_API_URL", "SILO_API_TOKEN", "SILO_SSL_VERIFY"
 
@@ -76,18 +78,18 @@ def resolve_server(
             raise ConfigError(f"{option} is empty; leave it out, or give a value (a variable may be unset)")
     stored = checked_config(path).get("server", {})
     file_url, file_token = _text(stored, "url", path), _text(stored, "token", path)
-    url, url_from = _first(("--server", server), (URL, env.get(URL)), (str(path), file_url))
+    url, url_from = first_of(("--server", server), (URL, env.get(URL)), (str(path), file_url))
     if url is None:
         raise ConfigError(f"no Silo server is configured. {_HOW}, or write both into {path}")
-    if file_url is None or not _same_server(url, file_url):
+    if not same_server(url, file_url):
         file_token = None
-    found, token_from = _first(("--token", token), (TOKEN, env.get(TOKEN)), (str(path), file_token))
+    found, token_from = first_of(("--token", token), (TOKEN, env.get(TOKEN)), (str(path), file_token))
     return ServerSettings(
         url=url,
         token=found,
         verify=_verify(verify, env.get(VERIFY), stored.get("verify"), path),
-        url_from=url_from,
-        token_from=token_from,
+        url_from=url_from or "",
+        token_from=token_from or "",
     )
 
 
@@ -166,15 +168,25 @@ def _text(table: Mapping[str, Any], key: str, path: Path) -> str | None:
     return value
 
 
-def _first(*candidates: tuple[str, str | None]) -> tuple[str | None, str]:
+def first_of(
+    *candidates: tuple[Source, str | Callable[[], str | None] | None],
+) -> tuple[str | None, Source | None]:
+    """The first setting that says anything, and who said so; a callable is asked when its turn comes."""
     for source, value in candidates:
-        if value is not None and value.strip():
-            return value.strip(), source
-    return None, ""
+        said = value() if callable(value) else value
+        if said is not None and said.strip():
+            return said.strip(), source
+    return None, None
 
 
-def _same_server(one: str, other: str) -> bool:
-    return ServerAddress.parse(one).origin == ServerAddress.parse(other).origin
+def same_server(one: str, other: str | None) -> bool:
+    """True where two addresses, as people write them, mean one server: a token for one is for the other."""
+    if not one or not other:
+        return False
+    try:
+        return ServerAddress.parse(one).origin == ServerAddress.parse(other).origin
+    except InputError:  # an address that is none has no token
+        return False
 
 
 def _verify(option: bool | str | None, variable: str | None, stored: Any, path: Path) -> bool | str:

@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""``silo-mod bom``: read an assembly's BOM from its files."""
+"""``silo-mod bom``, ``where-used`` and ``relink``: what files hold, which link to which, and mending that."""
 
 from __future__ import annotations
 
 import argparse
+import difflib
 import os
 from collections.abc import Mapping
 from dataclasses import replace
 
 from silo.batch import ask_for_moved
-from silo.bom.errors import Exit, InputError, SiloError
+from silo.bom.errors import DocumentError, Exit, InputError, SiloError
+from silo.bom.identity import walk_entries
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.paths import relative
 from silo.bom.report import base_of, bom_json, flat_json
@@ -17,10 +19,18 @@ from silo.bom.resolve import consolidation_findings
 from silo.bom_sync import resolve
 from silo.cli import common
 from silo.cli.common import Commands
+from silo.files import documents_in
+from silo.open_in_freecad import open_in_any
 
 
 def register(commands: Commands) -> None:
-    """Add the command."""
+    """Add the commands."""
+    _add_bom(commands)
+    _add_where_used(commands)
+    _add_relink(commands)
+
+
+def _add_bom(commands: Commands) -> None:
     parser = common.add_command(
         commands,
         "bom",
@@ -39,10 +49,10 @@ def register(commands: Commands) -> None:
     parser.add_argument("--resolve", action="store_true", help="ask the server for part numbers and names")
     common.add_json_option(parser)
     common.add_server_options(parser)
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run_bom)
 
 
-def run(args: argparse.Namespace) -> int:
+def run_bom(args: argparse.Namespace) -> int:
     """Print the BOM; 1 where an error says that it is not the whole one."""
     if args.verify:
         return _verify(args)
@@ -128,3 +138,180 @@ def _whole(entry: BomEntry, unresolved: Mapping[tuple[str, str], BomEntry]) -> B
         for one, child in zip(found, (*entry.children, *entry.unregistered), strict=True)
     )
     return replace(entry, children=tuple(children))
+
+
+def _add_where_used(commands: Commands) -> None:
+    parser = common.add_command(
+        commands,
+        "where-used",
+        "show which files of a vault link to a file, and which tops a change of it touches",
+        "silo-mod where-used vault/parts/Bracket.FCStd vault/",
+    )
+    parser.add_argument("part", metavar="PART.FCStd", help="the file; it need not be there any more")
+    parser.add_argument(
+        "vault", metavar="VAULT", nargs="?", default=".", help="the folder (default: this one)"
+    )
+    common.add_json_option(parser)
+    common.add_reading_options(parser)
+    parser.set_defaults(run=run_where_used)
+
+
+def run_where_used(args: argparse.Namespace) -> int:
+    """Print the files; those of an unchanged vault are known from the index."""
+    from silo.vault.reading import Question
+
+    if not os.path.isdir(args.vault):
+        raise InputError(f"{args.vault} is no folder. Name the folder of the vault.")
+    base, part = os.path.realpath(args.vault), os.path.realpath(args.part)
+    if not os.path.lexists(part) and os.path.lexists(inner := os.path.join(base, args.part)):
+        part = os.path.realpath(inner)  # as the other commands print it
+    tops = documents_in([base])
+    if part not in tops and not os.path.lexists(part) and not os.path.isdir(os.path.dirname(part)):
+        raise InputError(f"{args.part}: there is no such file, nor its folder.")
+    users: dict[str, set[str]] = {}
+    unread = []
+    with common.reading_of(args) as reading:
+        reading.index.expect(base)
+        for top, answer in zip(tops, reading.ask_many(map(Question, tops)), strict=True):
+            if "document" in answer.plain:
+                unread.append(top)
+            for used in answer.known.links:
+                users.setdefault(used, set()).add(top)
+    if part not in users and not os.path.lexists(part):
+        known = {relative(one, base): one for one in (*tops, *users)}
+        near = difflib.get_close_matches(relative(part, base), known, 2, 0.75)
+        meant = f"; did you mean {' or '.join(near)}?" if near else "."
+        raise InputError(f"{args.part}: there is no such file, and none in {args.vault} links to one{meant}")
+    direct = sorted(users.get(part, ()))
+    above = _above(part, users)
+    roots = sorted(top for top in above if not users.get(top))
+    if args.json:
+        common.print_json(
+            {
+                "part": relative(part, base),
+                "direct": [relative(one, base) for one in direct],
+                "all": [relative(one, base) for one in sorted(above)],
+                "tops": [relative(one, base) for one in roots],
+                "unreadable": [relative(one, base) for one in unread],
+            }
+        )
+        return Exit.UNDONE if unread else Exit.DONE
+    from silo.cli import show
+
+    out = show.console()
+    for one in direct:
+        out.print(show.plain(relative(one, base)), markup=False)
+    if not direct:
+        out.print(f"No file of {show.plain(args.vault)} links to it.", markup=False)
+    elif roots:
+        out.print(
+            f"Tops that a change touches: {', '.join(show.plain(relative(one, base)) for one in roots)}"
+        )
+    for one in unread:
+        out.print(
+            f"✗ {show.plain(relative(one, base))} could not be read, so its links are not known.",
+            markup=False,
+        )
+    return Exit.UNDONE if unread else Exit.DONE
+
+
+def _above(part: str, users: Mapping[str, set[str]]) -> set[str]:
+    """All files that use one, directly or not."""
+    found: set[str] = set()
+    left = [part]
+    while left:
+        for user in users.get(left.pop(), ()):
+            if user not in found and user != part:
+                found.add(user)
+                left.append(user)
+    return found
+
+
+def _add_relink(commands: Commands) -> None:
+    parser = common.add_command(
+        commands,
+        "relink",
+        "let the links of an assembly and its sub-assemblies lead to a file that has moved",
+        "silo-mod relink TopAssembly.FCStd --from parts/Bolt.FCStd --to hardware/Bolt.FCStd --dry-run",
+    )
+    parser.add_argument("top", metavar="TOP.FCStd", help="the assembly's file")
+    parser.add_argument(
+        "--from",
+        dest="old",
+        metavar="OLD",
+        required=True,
+        help="the file that the links record; relative to TOP's folder, as `silo-mod bom` prints it",
+    )
+    parser.add_argument("--to", dest="new", metavar="NEW", required=True, help="the file that is meant")
+    parser.add_argument(
+        "--even-if-open",
+        action="store_true",
+        help="also files that a running FreeCAD has open; whoever saves them there undoes this",
+    )
+    parser.add_argument("--dry-run", action="store_true", help="show what would change and write nothing")
+    common.add_json_option(parser)
+    parser.set_defaults(run=run_relink)
+
+
+def run_relink(args: argparse.Namespace) -> int:
+    """Mend the links; 2 where no link records OLD, or NEW does not hold what they want."""
+    from silo.fcstd.linked import Relinked, relink
+
+    folder = os.path.dirname(os.path.realpath(args.top))
+    paths = _documents(args.top)
+    new = _either(folder, args.new)
+    done: list[Relinked] = []
+    for old in dict.fromkeys((os.path.join(folder, args.old), os.path.abspath(args.old))):
+        done = done or relink(
+            paths,
+            os.path.normpath(old),
+            new,
+            dry_run=args.dry_run,
+            check=_any if args.even_if_open else _closed,
+        )
+    if not done:
+        raise InputError(f"no link of {args.top} and its sub-assemblies records {args.old}; nothing to mend")
+    if args.json:
+        rows = [
+            {"file": relative(one.path, folder), "links": one.links, "objects": list(one.objects)}
+            for one in done
+        ]
+        common.print_json({"dry_run": args.dry_run, "to": relative(new, folder), "files": rows})
+        return Exit.DONE
+    from silo.cli import show
+
+    out = show.console()
+    for one in done:
+        links = "1 link" if one.links == 1 else f"{one.links} links"
+        verb = "would lead" if args.dry_run else "now leads" if one.links == 1 else "now lead"
+        text = f"✓ {relative(one.path, folder)}: {links} {verb} to {relative(new, folder)}"
+        out.print(show.plain(text), markup=False)
+    return Exit.DONE
+
+
+def _any(_path: str) -> None:
+    return
+
+
+def _closed(path: str) -> None:
+    if open_in_any().has_file(path):
+        raise DocumentError(
+            path,
+            "it is open in FreeCAD, and saving it there would undo the change. Close it there, or mend the "
+            "links from there (BOM in Silo, Mend links); --even-if-open writes it all the same",
+        )
+
+
+def _documents(top: str) -> list[str]:
+    """The files of the tree, as far as they can be read."""
+    try:
+        extraction = common.read_assembly(top)
+    except SiloError:  # such as no assembly in the file: its own links can be mended all the same
+        return [top]
+    entries = walk_entries(extraction.entries)
+    return [top, *(entry.doc_path for entry in entries if not entry.missing and entry.doc_path)]
+
+
+def _either(folder: str, path: str) -> str:
+    beside = os.path.normpath(os.path.join(folder, path))
+    return beside if os.path.exists(beside) else os.path.abspath(path)

@@ -13,15 +13,17 @@ import queue
 import secrets
 import shutil
 import uuid
-from collections.abc import Iterator
+import zipfile
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import quote
+from xml.etree import ElementTree
 
 from silo.api.activity import activity_text
 from silo.batch import source_document
-from silo.bom.errors import Exit, InputError, ServerFaultError
+from silo.bom.errors import DocumentError, Exit, InputError, ServerFaultError
 from silo.bom.model import Extraction
 from silo.bom.report import base_of
 from silo.bom.resolve import consolidation_findings
@@ -29,6 +31,7 @@ from silo.bom_sync import Outcome, Status, resolve, sync_tree
 from silo.cli import common, show
 from silo.cli.common import Commands
 from silo.cli.server import need_server_extra
+from silo.durable import replace_patiently
 from silo.files import shipped
 from silo.folders import scratch_folder
 from silo.registering.on_disk import proposals_for, register_all
@@ -44,6 +47,8 @@ TOP = "TopAssembly.FCStd"
 # Left without a number on purpose, to show what becomes of such parts.
 UNREGISTERED = "MotorMount"
 EVENT_SECONDS = 20.0
+
+DOCUMENT_XML = "Document.xml"
 
 
 def register(commands: Commands) -> None:
@@ -202,8 +207,6 @@ class Demo:
             self.out.print(show.activity_box(box))
 
     def _edit(self) -> None:
-        from silo.cli.demo_edit import remove_from_assembly, set_element_count
-
         self.say("Edit: the cover goes, four more bolts come, a person adds glue in Silo")
         remove_from_assembly(self.top, "Cover")
         before, after = set_element_count(self.top, "CoverBolts", added=4)
@@ -231,3 +234,70 @@ class Demo:
                 self.events.get()
         except KeyboardInterrupt:
             self.out.print("\nStopped.")
+
+
+# --- the designer's edits, as FreeCAD would have saved them; only for files that we wrote ourselves ---------
+
+
+def remove_from_assembly(path: Path, label: str) -> None:
+    """Delete the link with this label from the file, as pressing Delete in the tree does."""
+
+    def edit(document: ElementTree.Element) -> None:
+        name = _object_with_label(path, document, label)
+        for members in document.iter("LinkList"):
+            for member in [m for m in members if m.get("value") == name]:
+                members.remove(member)
+            members.set("count", str(len(members)))
+        for part in ("Objects", "ObjectData"):
+            listed = _only(path, document.find(part), part)
+            for obj in [o for o in listed if (o.get("name") or o.get("Name")) == name]:
+                listed.remove(obj)
+            listed.set("Count", str(len(listed.findall("Object"))))
+
+    _edit(path, edit)
+
+
+def set_element_count(path: Path, label: str, added: int) -> tuple[int, int]:
+    """Give a link array more elements; returns the count before and after."""
+    counts: list[int] = []
+
+    def edit(document: ElementTree.Element) -> None:
+        name = _object_with_label(path, document, label)
+        data = document.find(f"ObjectData/Object[@name='{name}']")
+        value = _only(path, data, name).find(".//Property[@name='ElementCount']/Integer")
+        number = _only(path, value, "ElementCount")
+        counts.append(int(number.get("value", "0")))
+        number.set("value", str(counts[0] + added))
+
+    _edit(path, edit)
+    return counts[0], counts[0] + added
+
+
+def _object_with_label(path: Path, document: ElementTree.Element, label: str) -> str:
+    for obj in document.iterfind("ObjectData/Object"):
+        text = obj.find("Properties/Property[@name='Label']/String")
+        if text is not None and text.get("value") == label:
+            return obj.get("name", "")
+    raise DocumentError(str(path), f"it holds no object labelled {label!r}")
+
+
+def _only(path: Path, found: ElementTree.Element | None, what: str) -> ElementTree.Element:
+    if found is None:
+        raise DocumentError(str(path), f"it holds no {what}")
+    return found
+
+
+def _edit(path: Path, edit: Callable[[ElementTree.Element], None]) -> None:
+    with zipfile.ZipFile(path) as archive:
+        entries = {info: archive.read(info) for info in archive.infolist()}
+        comment = archive.comment
+    new = path.with_suffix(".new")
+    with zipfile.ZipFile(new, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.comment = comment
+        for info, content in entries.items():
+            if info.filename == DOCUMENT_XML:
+                document = ElementTree.fromstring(content)  # noqa: S314 - a file of our own example
+                edit(document)
+                content = ElementTree.tostring(document, encoding="utf-8", xml_declaration=True)
+            archive.writestr(info, content)
+    replace_patiently(new, path)

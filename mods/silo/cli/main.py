@@ -25,7 +25,6 @@ T = TypeVar("T")
 _MODULES = (
     "bom",
     "diff",
-    "linked_files",
     "sync",
     "register",
     "pull",

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from silo.api.config import same_server
 from silo.bom.errors import ConfigError
 from silo.workbench.settings.preferences import DEFAULTS, Preferences
 from silo.workbench.settings.server import (
@@ -18,7 +19,6 @@ from silo.workbench.settings.server import (
     Server,
     choose_server,
     read_known,
-    same_server,
 )
 
 HOME, OTHER = "https://silo.example.com", "https://other.example.com"

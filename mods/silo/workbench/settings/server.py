@@ -83,21 +83,22 @@ def choose_server(
         what :func:`silo.api.config.resolve_server` found in the configuration file (``url``, ``token``,
         ``verify``), or None.
     """
-    url, url_from, verify = _choose_url(known, env, file_server)
-    if not url:
+    from silo.api.config import TOKEN, URL, first_of, same_server  # not before FreeCAD's window stands
+
+    file_url, file_token = (file_server.url, file_server.token) if file_server is not None else (None, None)
+    url, url_from = first_of(
+        (Origin.ENVIRONMENT, env.get(URL)), (Origin.PREFERENCES, known.url), (Origin.FILE, file_url)
+    )
+    if url is None or url_from is None:
         return Server()
-    token, token_from = _choose_token(url, known, store, env, file_server)
-    return Server(url, token, verify, url_from, token_from)
-
-
-def _choose_url(known: Known, env: Mapping[str, str], file_server: Any) -> tuple[str, Origin, bool | str]:
-    if url := env.get("SILO_API_URL", "").strip():
-        return url, Origin.ENVIRONMENT, _verify_from(env, known.verify)
-    if known.url:
-        return known.url, Origin.PREFERENCES, _verify_from(env, known.verify)
-    if file_server is not None and file_server.url:
-        return file_server.url, Origin.FILE, file_server.verify
-    return "", Origin.NONE, True
+    verify = file_server.verify if url_from is Origin.FILE else _verify_from(env, known.verify)
+    token, token_from = first_of(
+        (Origin.ENVIRONMENT, env.get(TOKEN)),
+        (Origin.KEYRING, lambda: store.get(url)),  # which may ask the user
+        (Origin.PREFERENCES, lambda: known.token if same_server(url, known.url) else None),
+        (Origin.FILE, lambda: file_token if same_server(url, file_url) else None),
+    )
+    return Server(url, token or "", verify, url_from, token_from or Origin.NONE)
 
 
 def _verify_from(env: Mapping[str, str], otherwise: bool | str) -> bool | str:
@@ -105,22 +106,3 @@ def _verify_from(env: Mapping[str, str], otherwise: bool | str) -> bool | str:
 
     text = env.get(VERIFY, "").strip()
     return verify_of(VERIFY, text) if text else otherwise
-
-
-def _choose_token(
-    url: str, known: Known, store: TokenStore, env: Mapping[str, str], file_server: Any
-) -> tuple[str, Origin]:
-    if token := env.get("SILO_API_TOKEN", "").strip():
-        return token, Origin.ENVIRONMENT
-    if token := store.get(url):
-        return token, Origin.KEYRING
-    if known.token and same_server(url, known.url):
-        return known.token, Origin.PREFERENCES
-    if file_server is not None and file_server.token and same_server(url, file_server.url):
-        return file_server.token, Origin.FILE
-    return "", Origin.NONE
-
-
-def same_server(one: str, other: str) -> bool:
-    """True where two addresses, as people write them, mean one server."""
-    return bool(one) and one.strip().rstrip("/").lower() == other.strip().rstrip("/").lower()
