@@ -514,3 +514,12 @@ def test_two_items_that_want_one_place(project: Project, tmp_path: Path) -> None
     (lost,) = pulled.lost
     assert lost.path == "../lib/Nut.FCStd"
     assert lost.reason == f"{project.number('Plate')} and {project.number('Nut')} want the same place"
+
+
+def test_two_copies_in_the_folder_are_no_place(project: Project, tmp_path: Path) -> None:
+    """Which of them is meant is not guessed."""
+    project.commit()
+    into = tmp_path / "mine"
+    for folder in ("a", "b"):
+        project.pull(into / folder, "Plate")
+    assert states(project.pull(into, "Plate"), into) == {"Plate.FCStd": State.NEW}

@@ -122,7 +122,7 @@ class Rules:
     is_open
         FreeCAD has this file open, and its next save would undo what is written.
     learn
-        called with each file that is as in Silo: (SHA-256, item, revision).
+        called with each file as it is in Silo: (SHA-256, item, revision).
     """
 
     overwrite: bool = False
@@ -179,10 +179,9 @@ def _in_the_way(target: Path, base: Path) -> str:
 
 def _place(one: Fetched, target: Path, rules: Rules) -> Placed:
     number = one.revision.revision_number
+    rules.learn(one.sha256, one.item, number)
 
     def done(state: State, kept: Path | None = None) -> Placed:
-        if state not in (State.EDITED, State.OPEN):
-            rules.learn(one.sha256, one.item, number)
         return Placed(target, one.part_number, number, state, kept)
 
     try:

@@ -418,9 +418,16 @@ def test_a_bom_alone_is_that_of_the_file_in_silo(office: Office, flow: CommitFlo
     flow.sync_only(top)
     office.settle()
     assert bolts(office) == [2]
-    (box,) = [e for e in office.session.shown.activity.entries if e.title == "Not committed: Top"]
+    box = next(e for e in office.session.shown.activity.entries if e.title == "Not committed: Top")
     assert "not as it was committed. Commit it" in box.lines[0].text
-    top.recomputed = True  # nothing differs from the file
+    top.changed = False
+    Path(top.FileName).write_bytes(b"by somebody on the same share")
+    flow.sync_only(top)
+    office.settle()
+    assert bolts(office) == [2]
+    top.changed = True
+    office.desk.documents.save(top)
+    top.changed = top.recomputed = True  # nothing differs from the file
     flow.sync_only(top)
     office.settle()
     assert bolts(office) == [3]

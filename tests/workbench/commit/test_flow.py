@@ -197,3 +197,28 @@ def test_the_bom_is_that_of_the_file_whatever_is_edited_meanwhile(office: Office
     number = next(s.item.part_number for s in office.silo.items.values() if s.item.name == "Top")
     assert office.files("Top") == [b"two bolts"]
     assert [line.quantity for line in office.silo.get_bom(number)] == [2]
+
+
+class SlowDisk(Store):
+    """Copies wait until the test lets them go."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self.gate = threading.Event()
+
+    def finish(self, *arguments: Any, **more: Any) -> str:
+        self.gate.wait(30)
+        return super().finish(*arguments, **more)
+
+
+def test_a_second_commit_before_the_first_is_copied_is_made_from_it(office: Office, flow: CommitFlow) -> None:
+    """Neither is held because of the other."""
+    office.session.outbox = disk = SlowDisk(office.session.outbox.path)
+    doc = office.document("Plate", b"one")
+    for content in (b"one", b"two", b"three"):
+        doc.content, doc.changed = content, True
+        flow.start(doc)
+        office.desk.pass_turns()
+    disk.gate.set()
+    office.settle()
+    assert (office.files("Plate"), office.session.shown.waiting) == ([b"one", b"two", b"three"], ())
