@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
@@ -93,6 +93,7 @@ PATTERNS = (
     names=st.lists(st.sampled_from(NAMES[5:]), min_size=1, max_size=6),
     rules=st.lists(st.lists(st.sampled_from(PATTERNS), min_size=1, max_size=4), min_size=1, max_size=3),
 )
+@example(folders=[[], ["a"]], names=["T.FCStd", "u.fcstd"], rules=[["T.FCStd"], ["!T.FCStd", "u.fcstd"]])
 def test_what_is_ignored_is_what_git_would_ignore(
     folders: list[list[str]], names: list[str], rules: list[list[str]]
 ) -> None:
