@@ -148,6 +148,28 @@ def test_nothing_is_forwarded_to_a_links_target(tmp_path: Path) -> None:
     assert not link.isDerivedFrom("Part::Box")
 
 
+class _Shown:
+    """An object that has only attributes to show, as FreeCAD's."""
+
+    def __init__(self, obj: Any) -> None:
+        self._obj = obj
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._obj, name)
+
+
+def test_an_object_knows_its_own_properties_as_its_attributes_show_them(tmp_path: Path) -> None:
+    """Also what is not plain, what is empty, what is no property, and what is not there."""
+    doc = Doc("doc").add("Part::Box", "Box", Length=2.0, Empty="", Zero=0, SiloItemId="u", Suppressed=False)
+    doc.add("App::Part", "Part", Group=locals_("Box"), Shape=Raw("Part::PropertyPartShape", "<Part/>"))
+    path = doc.link("Link", "gone.FCStd", "Box", ElementCount=0).save(tmp_path / "doc.FCStd")
+    for obj, again in zip(open_document(path).Objects, open_document(path).Objects, strict=True):
+        for name in (*again.PropertiesList, "Name", "Document", "ancestry", "Gone", "Group", "Suppressed"):
+            for default in (None, 0, "other"):
+                found, wanted = own(obj, name, default), own(_Shown(again), name, default)
+                assert repr(found) == repr(wanted), (obj, name)
+
+
 def test_a_document_has_freecads_attributes(tmp_path: Path) -> None:
     """File, label, names, dates, texts; an unknown property is an AttributeError as in FreeCAD."""
     doc = Doc("the label", meta={"SiloUUID": "u-1"}, extra={"SiloUUID": "u-2"})

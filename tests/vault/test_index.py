@@ -6,6 +6,7 @@ The oracle is the same question asked of the files alone, by a session that know
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import shutil
@@ -251,6 +252,27 @@ def odd_target() -> Doc:
     for number in range(30):
         doc.add("Part::Box", f"More{number}", SiloItemId=f"more {number}")
     return doc
+
+
+def test_a_session_frees_what_it_made(vault: Path) -> None:
+    """Documents and their objects refer to each other; thousands of them must not wait for the collector."""
+    session = Session()
+    asked = [Question(str(path), below=below) for path in vault.glob("*.FCStd") for below in (True, False)]
+
+    def run() -> None:
+        for question in asked:
+            session.read(question)
+            session.ask(question)
+
+    run()
+    gc.collect()
+    gc.disable()
+    try:
+        for _ in range(5):
+            run()
+        assert gc.collect() < len(asked)
+    finally:
+        gc.enable()
 
 
 def trail_of(known: Known) -> object:

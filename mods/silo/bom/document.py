@@ -40,6 +40,7 @@ class ObjectLike(Protocol):
     None, or a tuple ``(object, sub_name)``), ``ElementCount``, ``ElementList``, ``Visibility``,
     ``ScaleVector``, ``ScaleList``, ``LinkCopyOnChangeSource``, ``Suppressed``, ``SiloBomExclude``,
     ``SiloItemId``, ``SiloUUID``, ``LinkProblem`` (ours, below), and for Draft arrays ``Base`` and ``Count``.
+    ``own_property(name, default)`` answers :func:`own` where an object knows its own properties at once.
     """
 
     @property
@@ -58,6 +59,8 @@ def derived(obj: Any, type_name: str) -> bool:
 
 def own(obj: object, name: str, default: Any = None) -> Any:
     """The object's own property ``name``; never that of a link's target."""
+    if (ask := getattr(type(obj), "own_property", None)) is not None:
+        return ask(obj, name, default)
     value = getattr(obj, name, default)
     # Most optional properties are unset on most objects; only a value that matters is worth asking the
     # (much dearer) list of the object's own properties.

@@ -137,6 +137,15 @@ class FcstdObject:
             properties.kept.pop(name, None)
         return value
 
+    def own_property(self, name: str, default: Any) -> Any:
+        """The value of a property, the default where there is none or it is not plain."""
+        mine = self.__dict__
+        if "properties" not in mine:
+            self._load()
+        if name not in mine["properties"].numbers:
+            return default
+        return mine[name] if name in mine else getattr(self, name, default)
+
     def unload(self) -> None:
         """Give back what was read of the object; it is read again when somebody asks."""
         del self.__dict__

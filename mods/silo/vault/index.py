@@ -307,4 +307,6 @@ def _below(folder: str) -> tuple[str, str]:
 
 def _text(path: str) -> str:
     # SQLite takes valid Unicode only. Two names may become one here; the marks tell their rows apart.
+    if path.isascii():
+        return path
     return path.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
