@@ -479,3 +479,16 @@ def test_a_bom_alone_of_a_file_that_was_saved_since(office: Office, flow: Commit
     office.settle()
     assert (bolts(office), office.session.shown.waiting) == ([3], ())
     assert office.desk.documents.base(top).origin == sha256(b"two bolts").hexdigest()
+
+
+def test_a_file_of_which_nobody_knows_the_origin_is_asked_about(office: Office, flow: CommitFlow) -> None:
+    """It was not hashed when it was opened: that is no reason to send it over a colleague's."""
+    doc = committed(office, flow, "Plate", b"one")
+    colleague(office, "Plate", b"one less", 1)
+    office.desk.documents.bases.clear()
+    edit(doc, b"from somewhere")
+    flow.start(doc)
+    office.settle()
+    assert office.files("Plate") == [b"one", b"one less"]
+    (held,) = office.session.shown.waiting
+    assert (held.state, held.newer["revision_number"]) == (State.HELD, 2)

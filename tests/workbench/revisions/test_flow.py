@@ -189,3 +189,13 @@ def test_what_theirs_links_to_and_is_not_here_is_named(day: Day) -> None:
     assert newest.revision_number == 3
     (line,) = day.office.session.shown.activity.entries[0].lines
     assert line.text.startswith("It links to New.FCStd, not in this folder: Open from Silo… fetches them.")
+
+
+def test_theirs_is_not_taken_where_it_is_not_what_they_committed(day: Day) -> None:
+    """Damaged in the server's store: mine stays, open and on the disk, and the commit still waits."""
+    stored = next(iter(day.office.silo.items.values()))
+    stored.files[2] = b"thei"
+    day.choose(Choice.TAKE)
+    assert Path(day.doc.FileName).read_bytes() == b"mine"
+    assert (day.cad.docs, day.kept(), day.held is None) == ([day.doc], [], False)
+    assert day.boxes()[0] == "Not fetched: Plate.FCStd"
