@@ -355,3 +355,13 @@ def test_a_urdf_in_degrees_is_doubted() -> None:
     assert "a → b" in found
     assert "rad" in found
     assert frame_doubts(robot.format(3.1415927).encode()) == ()
+
+
+def test_a_frame_that_only_turns_differs_as_well(assemble: Any, compute: Any, codes: Any) -> None:
+    """At one origin, turned by a quarter: the tensor is another one."""
+    turned = np.eye(4)
+    turned[:2, :2] = [[0, -1], [1, 0]]
+    asm = assemble(("l/a", box("a", 0.1, 0.2, 0.3)))
+    for frame, told in ((turned, True), (np.eye(4), False)):
+        report = compute(asm, "Name,Mass,Material\na,1 kg,\n", urdf_frames={"l": frame})
+        assert ("frame_differs" in codes(report)) is told

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from bodies import box
+from bodies import box, shape_only
 
 from silo.inertia.codes import Decided, Rule, Source
 
@@ -321,3 +321,32 @@ def test_of_two_different_marks_neither_is_an_occurrence(
     """A ratio or a running number tells parts apart."""
     report = compute(assemble(("l/a", cube(product))), HEAD + f"1,1,,,2.70 g,{row}\n")
     assert set(codes(report)) == {"not_in_bom", "row_unused"}
+
+
+def test_a_mass_that_fits_two_rows_is_settled_by_the_quantity(
+    assemble: Fixture, compute: Fixture, codes: Fixture
+) -> None:
+    """Both rows fit the small cube's mass; only one has as many pieces as the file."""
+    small, large = cube("b", key="small"), cube("b", 0.02, key="large")
+    asm = assemble(*((f"l/{s.key}{i}", s) for s in (small, large) for i in range(2)))
+    report = compute(asm, HEAD + "1,5,,steel,7.86 g,b\n2,2,,steel,7.85 g,b\n")
+    (found,) = [p for _, p in report.parts() if p.products == ("small",)]
+    assert (found.mass, found.decided_by) == (pytest.approx(7.85e-3), Decided.MASS)
+
+
+def test_a_surface_beside_a_solid_of_another_spelling_has_no_shape_to_compare(
+    assemble: Fixture, compute: Fixture, codes: Fixture
+) -> None:
+    report = compute(
+        assemble(("l/a", cube("bolt")), ("k/b", shape_only("Bolt"))), HEAD + "1,2,,,2.70 g,bolt\n"
+    )
+    assert "ambiguous" not in codes(report)
+
+
+def test_two_parts_of_one_count_are_not_told_apart_by_it(assemble: Fixture, compute: Fixture) -> None:
+    """Each has two pieces, one row says two: the mass decides, not the order of appearance."""
+    large, small = cube("b", 0.02, key="large"), cube("b", key="small")
+    asm = assemble(*((f"l/{s.key}{i}", s) for s in (large, small) for i in range(2)))
+    report = compute(asm, HEAD + "1,2,,steel,7.85 g,b\n2,3,,steel,62.80 g,b\n")
+    masses = {p.products: p.mass for _, p in report.parts()}
+    assert masses == {("large",): pytest.approx(62.8e-3), ("small",): pytest.approx(7.85e-3)}

@@ -449,6 +449,7 @@ def test_coats_that_count_and_fills_are_no_material(materials: MaterialTable, te
         *(("Titanium Grade 5 black anodized", 4430), ("copper natural", 8960), ("plastic ABS", 1050)),
         *(("GG-25", 7200), ("AISI316L", 8000), ("EN-AW 6082-T6", 2700), ("C 45", 7850), ("SUS440C", 7700)),
         *(("TiN", 5220), ("TIN", 7290), ("4140", 7850), ("8.8", 7850), ("Duralumin", 2780), ("ADC12", 2710)),
+        *(("carbon steel, plate", 7850), ("silicon carbide, black", 3100), ("nickel silver wire", 8730)),
         *(("Soft PVC", 1250), ("Ultem 2300", 1510), ("silicon steel", 7650), ("zn plated steel", 7850)),
     ],
 )
