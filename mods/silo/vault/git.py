@@ -186,7 +186,11 @@ def _batch(repository: str) -> Iterator[tuple[BinaryIO, BinaryIO]]:
     ) as process:
         assert process.stdin is not None  # both are pipes
         assert process.stdout is not None
-        yield process.stdin, process.stdout  # type: ignore[misc]
+        try:
+            yield process.stdin, process.stdout  # type: ignore[misc]
+        finally:
+            with suppress(BrokenPipeError):  # git died, and does not take what is left
+                process.stdin.close()
 
 
 def _content(ask: BinaryIO, answer: BinaryIO, blob: str, name: str) -> bytes:
