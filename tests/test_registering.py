@@ -6,14 +6,14 @@ from __future__ import annotations
 import hashlib
 import zipfile
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import pytest
 
-from silo.bom.categories import Categories
 from silo.bom.errors import ServerFaultError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.model import BomEntry, Extraction
+from silo.bom.naming import Categories
 from silo.registering.offer import Candidate, Offer, Seen, State, offer
 from silo.testing import FakeSilo
 from silo.workbench.register.rows import EditedRow
@@ -59,6 +59,28 @@ def test_an_item_registered_from_this_very_file_is_found(tmp_path: Path) -> None
     digest = _sha256(content)
     known = silo.create_item("kindred-rd", "M01", "Original", properties={"file_sha256": digest})
     assert [s.part_number for s in offered(silo, tmp_path, candidate)["Copy"].similar] == [known.part_number]
+
+
+def test_six_hundred_components_are_looked_up_in_two_questions(tmp_path: Path) -> None:
+    """Not in one each: a vault has ten thousand; the last one is looked up like the first."""
+
+    class Counting(FakeSilo):
+        asked = 0
+
+        def find_look_alikes(self, *args: Any, **more: Any) -> Any:
+            self.asked += 1
+            return super().find_look_alikes(*args, **more)
+
+    silo = Counting()
+    known = silo.create_item("kindred-rd", "M01", "Lid 599").part_number
+    entries = tuple(
+        BomEntry(str(tmp_path / f"{n}.FCStd"), object_name="Body", label=f"Lid {n}", quantity=1)
+        for n in range(600)
+    )
+    head = BomEntry(str(tmp_path / "Top.FCStd"), label="Top", is_assembly=True, level=0)
+    found = offer(Extraction(head, entries), {}, silo, "kindred-rd", CONTROL, most=None)
+    alike = {c.proposal.name: [s.part_number for s in c.similar] for c in found.candidates if c.similar}
+    assert (len(found.candidates), alike, silo.asked) == (601, {"Lid 599": [known]}, 2)
 
 
 def test_a_server_without_categories_is_asked_for_no_items(tmp_path: Path) -> None:
