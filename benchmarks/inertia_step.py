@@ -39,7 +39,7 @@ from silo.inertia.core import combine_arrays, place
 from silo.inertia.geometry.kernel import occt
 from silo.inertia.geometry.options import ReadOptions
 from silo.inertia.geometry.step.read import read_step
-from silo.inertia.geometry.worker import without
+from silo.inertia.geometry.read import without
 without("scipy", "networkx")
 import trimesh.triangles
 occt.quiet()

@@ -26,9 +26,8 @@ from silo.durable import remove_patiently, replacing
 from silo.files import content_hash
 from silo.folders import cache_folder
 from silo.inertia.geometry import store
-from silo.inertia.geometry.labels import file_key
+from silo.inertia.geometry.labels import file_key, step_files
 from silo.inertia.geometry.options import Reading, ReadOptions
-from silo.inertia.geometry.step.folder import step_files
 from silo.inertia.model import Assembly
 
 KERNELS = ("cadquery-ocp-novtk", "cadquery-ocp", "trimesh", "manifold3d", "numpy")

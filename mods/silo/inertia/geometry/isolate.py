@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Reading in a child process: the geometry kernel may crash, hang or eat memory, and only the child does.
 
-The child (:mod:`worker`) gets its task as one JSON line, answers with JSON lines (progress, then done or
+The child (:func:`read.main`) gets its task as one JSON line, answers with JSON lines (progress, then done or
 error), and leaves the result in a file in a folder that is ours. Its standard error is kept for the message.
 """
 
@@ -26,7 +26,7 @@ from silo.inertia.geometry.options import Progress, ReadOptions
 
 POLL_SECONDS = 0.05
 _OUT_OF_MEMORY = ("MemoryError", "bad_alloc", "Cannot allocate memory", "failed to map segment")
-_WORKER = "from silo.inertia.geometry.worker import main; main()"
+_WORKER = "from silo.inertia.geometry.read import main; main()"
 
 
 def run(path: Path, options: ReadOptions, result: Path, command: Sequence[str] = ()) -> None:

@@ -16,9 +16,8 @@ from pathlib import Path
 
 from silo.bom.errors import DocumentError, InputError
 from silo.inertia.geometry.helpers import WORTH_HELP, Helpers
-from silo.inertia.geometry.labels import file_key
+from silo.inertia.geometry.labels import file_key, step_files
 from silo.inertia.geometry.options import ReadOptions
-from silo.inertia.geometry.step.folder import step_files
 from silo.inertia.geometry.step.part21 import scan
 from silo.inertia.geometry.step.product_text import WANTED, Products, count_placed, read_products
 from silo.inertia.geometry.step.regroup import regrouped

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 from silo.inertia.geometry.graph import IDENTITY, Child, Node, bottom_up, count_instances
-from silo.inertia.geometry.step.folder import bare_stem
+from silo.inertia.geometry.labels import bare_stem
 from silo.inertia.geometry.step.part21 import Part21, Typed, Value, number, ref, refs, text
 
 _DEFINITIONS = (

@@ -18,9 +18,8 @@ from silo.bom.errors import DocumentError, InputError
 from silo.inertia.geometry.graph import Child, bottom_up
 from silo.inertia.geometry.helpers import WORTH_HELP, Helpers
 from silo.inertia.geometry.kernel.solids import measure
-from silo.inertia.geometry.labels import file_key
+from silo.inertia.geometry.labels import bare_stem, file_key, step_files
 from silo.inertia.geometry.options import ReadOptions
-from silo.inertia.geometry.step.folder import bare_stem, step_files
 from silo.inertia.geometry.step.xcaf import Stated, StepFile, load
 from silo.inertia.model import GeometryCode, GeometryProblem
 
