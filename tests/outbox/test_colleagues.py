@@ -462,3 +462,22 @@ def test_a_held_bom_does_not_go_after_a_file_with_a_colleagues_between(vault: Va
     vault.outbox.retry(entry.id)
     vault.send()
     assert (vault.waiting(), vault.lines()) == ((), {})
+
+
+def test_a_lost_answer_is_found_behind_a_colleagues_commit(vault: Vault) -> None:
+    """Ours arrived, theirs was made from it: ours is not held, and not sent again."""
+    file_only(vault, b"one", UNKNOWN)
+    vault.send()
+    file_only(vault, b"two", sha(b"one"))
+
+    def lose(called: str) -> None:
+        if called == "upload_file":
+            vault.silo.after = lambda _name: None
+            raise UnreachableError("no answer")
+
+    vault.silo.after = lose
+    vault.send()
+    theirs(vault, b"three", 2)
+    vault.send(force=True)
+    assert (vault.waiting(), contents(vault)) == ((), [b"one", b"two", b"three"])
+    assert vault.told[-1].revision == 2
