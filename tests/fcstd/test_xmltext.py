@@ -221,6 +221,15 @@ def test_lost_object_data_is_noticed(tmp_path: Path) -> None:
     assert "does not hold its data" in reason(save_xml(tmp_path / "lost.FCStd", xml))
 
 
+def test_data_in_another_order_than_the_list_goes_to_its_objects(tmp_path: Path) -> None:
+    """Two objects of one type and with the same properties, whose data stands the other way round."""
+    xml = Doc("doc").add("Part::Box", "First", Height=1.0).add("Part::Box", "Second", Height=2.0).xml()
+    head, first, second = re.split(r'(?=<Object name="First")|(?=<Object name="Second")', xml)
+    data, tail = second[: second.index("</Object>") + 9], second[second.index("</Object>") + 9 :]
+    path = save_xml(tmp_path / "other.FCStd", head + data + "\n" + first.rstrip() + tail)
+    assert [obj.Height for obj in open_document(path).Objects] == [1.0, 2.0]
+
+
 def test_an_object_listed_twice_is_refused(tmp_path: Path) -> None:
     """Two objects of one name: nobody knows which a link means."""
     listed = '<Object type="Part::Box" name="Box" id="1000" />'
