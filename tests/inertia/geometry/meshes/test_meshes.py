@@ -22,6 +22,7 @@ from silo.inertia.geometry.mesh import (
     mesh_volume,
     simplified,
     winding_number,
+    without_doubled,
 )
 from silo.inertia.model import Assembly, GeometryCode, Prototype
 
@@ -47,6 +48,20 @@ def only(assembly: Assembly) -> Prototype:
     """The assembly's only prototype."""
     (prototype,) = assembly.prototypes.values()
     return prototype
+
+
+def test_repeated_triangles_and_those_that_meet_their_back() -> None:
+    """A triangle is the same whichever corner it begins with; turned over it is its own back."""
+    mesh = mesh_of(brick())
+    for first in range(len(mesh.faces)):
+        again = np.array([np.roll(mesh.faces[first], shift) for shift in (0, 1, 2)])
+        kept, repeated, met = without_doubled(Mesh(mesh.vertices, np.concatenate([mesh.faces, again])))
+        assert (repeated, met) == (3, 0)
+        assert sorted(map(tuple, kept.faces.tolist())) == sorted(map(tuple, mesh.faces.tolist()))
+    wall = np.array([[0, 3, 5], [5, 3, 0]])
+    assert not {frozenset(wall[0].tolist())} & {frozenset(face) for face in mesh.faces.tolist()}
+    kept, repeated, met = without_doubled(Mesh(mesh.vertices, np.concatenate([mesh.faces, wall])))
+    assert (repeated, met, len(kept)) == (0, 2, len(mesh))
 
 
 @pytest.mark.parametrize("suffix", ["stl", "ply", "obj"])
