@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""A small caller of a server, and its event stream; standard library only."""
+"""A small caller of a server, and its event stream."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Self
 from urllib.parse import quote, urlsplit
+
+from urllib3.util import wait_for_read
 
 TIMEOUT = 60
 
@@ -77,6 +79,10 @@ class Api:
             body = json.dumps(value).encode()
             sent.setdefault("Content-Type", "application/json")
         connection = getattr(self._local, "connection", None)
+        if connection is not None and connection.sock is not None and wait_for_read(connection.sock, timeout=0):
+            # The server has closed what stood idle for a while, as servers may.
+            self.forget_connection()
+            connection = None
         if connection is None:
             connection = http.client.HTTPConnection(self._host, self._port, timeout=TIMEOUT)
             self._local.connection = connection
