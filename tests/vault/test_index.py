@@ -367,6 +367,18 @@ def test_a_file_that_was_only_touched_is_known_by_its_content(vault: Path, tmp_p
         assert reading.asked == len(questions(vault)) - 8, "only the files that are not there"
 
 
+def test_a_part_that_became_a_symlink_is_the_file_that_it_leads_to(vault: Path, tmp_path: Path) -> None:
+    """The content is the same; the component is not."""
+    index, asked = tmp_path / "index", Question(str(vault / "d.FCStd"))
+    indexed(vault, index)
+    (vault / "a.FCStd").rename(vault / "moved.FCStd")
+    os.symlink("moved.FCStd", vault / "a.FCStd")
+    with Index(index, contents=Contents(clock=later)) as memory:
+        found = next(Reading(memory).ask_many([asked]))
+    assert found.plain == json.loads(Session().ask(asked).answer)
+    assert "moved.FCStd" in found.known.answer
+
+
 def test_another_current_folder_is_another_file(
     vault: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
