@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 
 from silo.api.wire import MergeEntry, MergeRequest
 from silo.bom.errors import ReadOnlyError, ServerFaultError, UnreachableError
-from silo.durable import Stamp
 from silo.outbox.entry import Commit, Entry, State, new_key
 from silo.outbox.send import send_all
 from silo.outbox.store import Store
@@ -79,7 +78,7 @@ class DyingStore(Store):
         super().finish(key, source)
         self.fate.meet(local=True)
 
-    def _copied(self, source: Path, copy: Path, stamp: Stamp | None) -> tuple[str, int]:
+    def _copied(self, source: Path, copy: Path, stamp: str) -> tuple[str, int]:
         self.fate.meet(local=True)
         found = super()._copied(source, copy, stamp)
         self.fate.meet(local=True)

@@ -18,7 +18,7 @@ import pytest
 
 from silo.bom.errors import DocumentError, InputError
 from silo.bom.model import BomEntry, Extraction
-from silo.durable import Stamp, replacing, stamp_of
+from silo.durable import replacing, stamp_of
 from silo.outbox.database import OutboxError
 from silo.outbox.entry import Commit, State, new_key
 from silo.outbox.send import send_all
@@ -140,7 +140,7 @@ class Moody(Store):
 
     error: OSError | None = None
 
-    def _copied(self, source: Path, copy: Path, stamp: Stamp | None) -> tuple[str, int]:
+    def _copied(self, source: Path, copy: Path, stamp: str) -> tuple[str, int]:
         if self.error is not None:
             raise self.error
         return super()._copied(source, copy, stamp)
@@ -306,7 +306,7 @@ def test_what_is_written_after_the_commit_is_no_part_of_it(store: Store, documen
         store.stage(made)
         write(document, f"{name} later".encode())
         with pytest.raises(DocumentError, match=r"written again since the commit.*commit it again"):
-            store.finish(made.key, document, stamp=made.stamp)
+            store.finish(made.key, document)
         assert store.entries() == ()
         store.sweep()
         assert list(store.copies.iterdir()) == []
@@ -331,3 +331,19 @@ def test_several_programs_may_make_the_outbox_at_once(tmp_path: Path) -> None:
     with ThreadPoolExecutor(8) as pool:
         list(pool.map(first, range(8)))
     assert len(Store(path).entries()) == 8
+
+
+def test_a_second_name_that_is_written_to_in_place_is_no_commit(store: Store, document: Path) -> None:
+    """``cp`` over the project's file writes into the content that the second name keeps."""
+    made = commit(document)
+    held = store.hold(str(document), made.key)
+    store.stage(replace(made, file=held, stamp=stamp_of(document)))
+    document.write_bytes(b"a colleague's, by cp")
+    again = Store(store.path)  # as after a restart of FreeCAD
+    assert again.finish(made.key) == ""
+    (entry,) = again.entries()
+    assert (entry.state, entry.sha256) == (State.HELD, "")
+    assert "was written again since the commit; commit it again" in entry.reason
+    again.retry(entry.id)
+    assert send_all(again, FakeSilo()).sent == []
+    assert [one.state for one in again.entries()] == [State.HELD]

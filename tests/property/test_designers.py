@@ -25,7 +25,6 @@ import pytest
 from desk import Desk, Document, Documents, Office, Silo
 
 from silo.bom.errors import SiloError, UnreachableError
-from silo.durable import Stamp
 from silo.outbox.entry import Entry, State
 from silo.outbox.store import Store
 from silo.workbench.commit.desk import Answer, Look
@@ -53,7 +52,7 @@ class Disk(Store):
     def hold(self, path: str, key: str) -> Path | None:
         return None if self.other else super().hold(path, key)
 
-    def _copied(self, source: Path, copy: Path, stamp: Stamp | None) -> tuple[str, int]:
+    def _copied(self, source: Path, copy: Path, stamp: str) -> tuple[str, int]:
         if self.full:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         return super()._copied(source, copy, stamp)

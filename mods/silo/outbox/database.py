@@ -21,7 +21,7 @@ from silo.api.address import canonical
 from silo.bom.errors import DocumentError, InputError
 from silo.durable import private_file, sync_folder
 
-VERSION = 4
+VERSION = 5
 # What a saved file was made from is forgotten after two years.
 _REMEMBERED = 2 * 366 * 86400.0
 # A copy of a file that was replaced is kept for so long, or until a person deletes it.
@@ -45,6 +45,7 @@ CREATE TABLE entry (
     copy TEXT NOT NULL DEFAULT '',
     sha256 TEXT NOT NULL DEFAULT '',
     size INTEGER NOT NULL DEFAULT 0,
+    stamp TEXT NOT NULL DEFAULT '',        -- JSON; of the file at the commit
     bom_left INTEGER NOT NULL DEFAULT 0,
     allow_missing INTEGER NOT NULL DEFAULT 0,
     remark TEXT NOT NULL DEFAULT '',

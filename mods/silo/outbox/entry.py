@@ -126,6 +126,8 @@ class Entry:
     renamed
         its file has another name than the item's: :data:`ASKED` whether it is the same part, or a person's
         word that it is :data:`SAME_PART`.
+    stamp
+        of its file at the commit, as JSON; "" where it was not looked at.
     superseded
         a newer file or BOM of the same item has arrived, so that this one would undo it.
     """
@@ -160,6 +162,7 @@ class Entry:
     place: str = ""
     links: str = ""
     renamed: str = ""
+    stamp: str = ""
     superseded: bool = False
 
     @property

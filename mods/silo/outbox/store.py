@@ -30,7 +30,7 @@ from typing import Any
 from silo.api.address import canonical
 from silo.bom.errors import ConflictError, DocumentError, InputError
 from silo.bom.report import to_plain
-from silo.durable import Stamp, remove_patiently, replacing, stamp_of
+from silo.durable import remove_patiently, replacing, stamp_of
 from silo.files import content_hash
 from silo.folders import data_folder
 from silo.outbox.database import Origins, insert
@@ -52,6 +52,10 @@ _AS_GIVEN = (
     *("key", "path", "label", "identity", "part_number", "taken_at", "comment", "allow_missing", "remark"),
     *("sha256", "request", "origin", "on_top_of"),
 )
+
+
+class _WrittenError(OSError):
+    """The file has another content by now."""
 
 
 class Store(Origins):
@@ -89,6 +93,7 @@ class Store(Origins):
             "server": canonical(server) if server else "",
             "state": State.KEEPING if commit.file is not None else State.WAITING,
             "properties": _strict_json(commit.properties),
+            "stamp": json.dumps(commit.stamp) if commit.stamp else "",
             "file_left": commit.file is not None,
             "file_name": os.path.basename(commit.path) or (commit.file.name if commit.file else ""),
             "copy": f"{commit.key}{commit.file.suffix[:20]}" if commit.file is not None else "",
@@ -108,27 +113,23 @@ class Store(Origins):
         """True where this program staged a commit and is about to copy its file: nobody else does it then."""
         return key in self._coming
 
-    def finish(
-        self, key: str, source: Path | None = None, origin: str = "", stamp: Stamp | None = None
-    ) -> str:
-        """Make the copy of a staged commit's file; what is held under a second name is read rather than
-        ``source``.
+    def finish(self, key: str, source: Path | None = None, origin: str = "") -> str:
+        """Make the copy of a staged commit's file, from its second name rather than from ``source``.
 
         Where the disk does not take it, a commit with a second name stays and is tried again later. One
-        without is forgotten and :class:`DocumentError` says so: nothing could be sent that is surely what was
-        committed. So it is where ``source`` has no longer the ``stamp`` that it had at the commit.
+        without is forgotten, and DocumentError says so. A file that was written since the commit is not sent.
 
         ``origin`` replaces that of the commit: the commit before it may have been copied only now. Returns
         the file's SHA-256, "" where there is no copy of it.
         """
         try:
-            self._finish(key, source, origin, stamp)
+            self._finish(key, source, origin)
         finally:
             self._coming.discard(key)
         entry = self.by_key(key)
         return entry.sha256 if entry is not None else ""
 
-    def _finish(self, key: str, source: Path | None, origin: str, stamp: Stamp | None) -> None:
+    def _finish(self, key: str, source: Path | None, origin: str) -> None:
         entry = self.by_key(key)
         if entry is None or not entry.file_left or entry.sha256:
             return
@@ -140,7 +141,14 @@ class Store(Origins):
             self.update(entry.id, state=State.HELD, reason=text)
             return
         try:
-            sha256, size = self._copied(content, copy, stamp if content is source else None)
+            sha256, size = self._copied(content, copy, entry.stamp)
+        except _WrittenError as error:
+            if held is not None:
+                told = f"{entry.path or entry.file_name}: {error}; commit it again, then discard this"
+                self.update(entry.id, state=State.HELD, reason=told)
+                return
+            self.discard(entry.id)
+            raise DocumentError(str(content), f"{error}; nothing was kept, commit it again") from error
         except OSError as error:
             told = f"cannot be copied for sending ({error.strerror or error})"
             if held is not None or content is copy:
@@ -156,7 +164,7 @@ class Store(Origins):
     def add(self, commit: Commit, server: str = "") -> Entry:
         """Both at once: on disk with its copy when it returns."""
         self.stage(commit, server)
-        self.finish(commit.key, commit.file, stamp=commit.stamp)
+        self.finish(commit.key, commit.file)
         entry = self.by_key(commit.key)
         if entry is None:
             raise InputError(f"{commit.path}: discarded while it was kept")
@@ -317,7 +325,7 @@ class Store(Origins):
                 if folder.name not in keys and self.clock() - folder.stat().st_mtime > _HELD_AGE:
                     shutil.rmtree(folder, ignore_errors=True)
 
-    def _copied(self, source: Path, copy: Path, stamp: Stamp | None) -> tuple[str, int]:
+    def _copied(self, source: Path, copy: Path, stamp: str) -> tuple[str, int]:
         if source == copy:
             return content_hash(copy), copy.stat().st_size
         digest, size = hashlib.sha256(), 0
@@ -326,8 +334,8 @@ class Store(Origins):
                 digest.update(block)
                 size += len(block)
                 write.write(block)
-            if stamp is not None and stamp_of(read.fileno()) != stamp:
-                raise OSError("it was written again since the commit")
+            if stamp and json.dumps(stamp_of(read.fileno())) != stamp:
+                raise _WrittenError("it was written again since the commit")
         return digest.hexdigest(), size
 
     def _drop_files(self, entry: Entry) -> None:

@@ -14,7 +14,7 @@ from desk import Office
 from server_testing import wait_until
 
 from silo.bom.errors import SiloError, UnreachableError
-from silo.durable import Stamp, stamp_of
+from silo.durable import stamp_of
 from silo.outbox.entry import UNKNOWN, Commit, State
 from silo.outbox.send import send_all
 from silo.outbox.store import Store
@@ -50,7 +50,7 @@ class SlowStore(Store):
         self.gate = threading.Event()
         self.copies_made = 0
 
-    def _copied(self, source: Path, copy: Path, stamp: Stamp | None) -> tuple[str, int]:
+    def _copied(self, source: Path, copy: Path, stamp: str) -> tuple[str, int]:
         self.gate.wait(30)
         self.copies_made += 1
         return super()._copied(source, copy, stamp)

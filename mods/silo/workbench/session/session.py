@@ -138,7 +138,7 @@ class Session:
 
         def finish(_control: Control) -> None:
             made_from = base.origin if base is not None and commit.origin else ""
-            content = self.outbox.finish(commit.key, commit.file, made_from, commit.stamp)
+            content = self.outbox.finish(commit.key, commit.file, made_from)
             if base is not None:
                 base.committed(content)
 
