@@ -35,9 +35,9 @@ from silo.inertia.geometry.kernel import occt
 from silo.inertia.geometry.kernel.closure import beside_edges
 from silo.inertia.geometry.kernel.moments import solid_moments
 from silo.inertia.geometry.measured import Notes
-from silo.inertia.geometry.step.read import lost_stretches
-from silo.inertia.geometry.step.xcaf import StepFile
-from silo.inertia.model import GeometryCode
+from silo.inertia.geometry.step.read import lost_stretches, stated_totals
+from silo.inertia.geometry.step.xcaf import Stated, StepFile
+from silo.inertia.model import GeometryCode, Prototype
 
 
 def compound(*shapes: Any) -> Any:
@@ -214,6 +214,17 @@ def test_stretches_that_the_kernel_drops_are_reported() -> None:
     mirrored = {**plain, "top": Node("top", "top", (Child("part", "part", np.diag([-1.0, 1, 1, 1])),))}
     assert lost_stretches(StepFile(Path("x.step"), stretched=2, nodes=mirrored)) == []
     assert lost_stretches(StepFile(Path("x.step"), stretched=0, nodes=plain)) == []
+
+
+@pytest.mark.parametrize(("stated", "doubts"), [(8e-6, 0), (1e-6, 1), (None, 0)])
+def test_a_stated_total_counts_scaled_parts_as_they_stand(stated: float | None, doubts: int) -> None:
+    """A part of 1 cm³, placed twice as large and mirrored: its assembly has 8 cm³."""
+    use = Child("part", "part", np.diag([-2.0, 2, 2, 1]))
+    nodes = {"top": Node("top", "top", (use,)), "part": Node("part", "part", (), True)}
+    stating = {"top": Stated(stated), "part": Stated()}
+    step = StepFile(Path("x.step"), nodes=nodes, stated=stating, roots=[Child("top", "top")])
+    found = stated_totals(step, {"part": Prototype("part", "part", volume_m3=1e-6)})
+    assert [problem.code for problem in found] == doubts * [GeometryCode.STATED_VOLUME]
 
 
 def test_a_solid_inside_out_is_turned_and_said(box: Any, tmp_path: Path, read_in: Any, codes_of: Any) -> None:
