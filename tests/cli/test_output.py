@@ -82,15 +82,16 @@ def test_watch_ends_with_its_reader(silo: Any) -> None:
 
 
 @pytest.mark.usefixtures("needs_signals")
-def test_a_term_signal_ends_a_command_as_ctrl_c_does() -> None:
+def test_a_term_signal_ends_a_command_as_ctrl_c_does(tmp_path: Path) -> None:
     """Exit code 130, with a sentence: nobody takes it for done."""
+    (tmp_path / "x.FCStd").touch()
     code = (
         "import sys, time\nfrom silo.cli import bom, main\n"
         "bom.run = lambda args: (print('up', flush=True), time.sleep(60))\n"
         "sys.argv = ['silo-mod', 'bom', 'x.FCStd']\nsys.exit(main.main())"
     )
     with subprocess.Popen(
-        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=tmp_path
     ) as job:
         assert job.stdout is not None
         assert job.stderr is not None

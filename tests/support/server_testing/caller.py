@@ -79,7 +79,11 @@ class Api:
             body = json.dumps(value).encode()
             sent.setdefault("Content-Type", "application/json")
         connection = getattr(self._local, "connection", None)
-        if connection is not None and connection.sock is not None and wait_for_read(connection.sock, timeout=0):
+        if (
+            connection is not None
+            and connection.sock is not None
+            and wait_for_read(connection.sock, timeout=0)
+        ):
             # The server has closed what stood idle for a while, as servers may.
             self.forget_connection()
             connection = None
