@@ -87,7 +87,7 @@ def test_a_term_signal_ends_a_command_as_ctrl_c_does(tmp_path: Path) -> None:
     (tmp_path / "x.FCStd").touch()
     code = (
         "import sys, time\nfrom silo.cli import bom, main\n"
-        "bom.run = lambda args: (print('up', flush=True), time.sleep(60))\n"
+        "bom.run_bom = lambda args: (print('up', flush=True), time.sleep(60))\n"
         "sys.argv = ['silo-mod', 'bom', 'x.FCStd']\nsys.exit(main.main())"
     )
     with subprocess.Popen(
