@@ -225,3 +225,28 @@ def test_a_bom_that_comes_late_does_not_undo_that_of_a_newer_file(api: Api) -> N
     assert api.quantities(number) == {bolt: 2}
     api.merge(number, {bolt: 3}, document=document(1, b"two"))
     assert api.quantities(number) == {bolt: 3}
+
+
+def test_the_bom_of_an_older_file_is_known_by_its_content(api: Api) -> None:
+    """A file that was not fetched anew, in a vault that is synced at night, says no revision."""
+    number, bolt, nut = api.items(3)
+    for content in (b"one", b"two"):
+        upload(api, number, content)
+
+    def document(content: bytes) -> dict[str, Any]:
+        return {"file": "Top.FCStd", "sha256": hashlib.sha256(content).hexdigest()}
+
+    api.merge(number, {bolt: 2}, document=document(b"two"))
+    for dry_run in (True, False):
+        stale = {
+            "entries": [{"child_part_number": nut, "quantity": 9}],
+            "document": document(b"one"),
+            "dry_run": dry_run,
+        }
+        error = api.bad(409, "POST", f"/api/items/{number}/bom/merge", stale)
+        assert (error["error"], error["revision"]["revision_number"]) == ("newer_revision", 2)
+    assert api.quantities(number) == {bolt: 2}
+    api.merge(number, {bolt: 3}, document=document(b"edited, and in no revision"))
+    upload(api, number, b"one", comment="back to it")
+    api.merge(number, {bolt: 4}, document=document(b"one"))
+    assert api.quantities(number) == {bolt: 4}

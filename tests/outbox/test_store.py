@@ -131,7 +131,6 @@ def test_sweeping_leaves_a_copy_that_is_being_made(store: Store, document: Path)
     assert [*store.copies.iterdir()]
     (entry,) = store.entries()
     store.discard(entry.id)
-    store.sweep()
     assert [*store.copies.iterdir()] == []
 
 

@@ -167,10 +167,12 @@ class Database:
     def _make_tables(self) -> None:
         with self._translated(), closing(self._connect(self.path)) as db:
             db.row_factory = sqlite3.Row
+            if db.execute("PRAGMA journal_mode").fetchone()[0] != "wal":
+                # SQLite does not wait for others here. Where another is at it, the next start finds it done.
+                with suppress(sqlite3.OperationalError):
+                    db.execute("PRAGMA journal_mode = WAL")
             if _version(db) == VERSION:
                 return
-            if db.execute("PRAGMA journal_mode").fetchone()[0] != "wal":
-                db.execute("PRAGMA journal_mode = WAL")
             db.execute("PRAGMA synchronous = FULL")
             with _transaction(db):
                 version = _version(db)

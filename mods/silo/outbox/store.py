@@ -307,8 +307,7 @@ class Store(Origins):
         return path
 
     def sweep(self) -> None:
-        """Remove files whose row is gone, second names for which no commit came, and what was kept aside long
-        ago."""
+        """Remove files whose row is gone, second names without a commit, and what was kept aside long ago."""
         self._make_ready()
         self.forget_aside()
         with suppress(OSError):
@@ -317,8 +316,7 @@ class Store(Origins):
             held = [*self._held.iterdir()] if self._held.is_dir() else []
             keys = {entry.key for entry in self.entries()}
             for file in files:
-                # Also of a copy that is being made, which has a point before its name.
-                if file.name.lstrip(".").split(".")[0] not in keys:
+                if _key_of(file) not in keys:
                     with suppress(OSError):
                         remove_patiently(file)
             for folder in held:
@@ -340,9 +338,10 @@ class Store(Origins):
 
     def _drop_files(self, entry: Entry) -> None:
         """Remove what the row had; what cannot be removed now is swept up later."""
-        if entry.copy:
-            with suppress(OSError):
-                remove_patiently(self.copies / entry.copy)
+        with suppress(OSError):
+            for file in [*self.copies.iterdir()]:
+                if _key_of(file) == entry.key:
+                    remove_patiently(file)
         shutil.rmtree(self._held / entry.key, ignore_errors=True)
 
     def _one(self, where: str, *values: Any) -> Entry | None:
@@ -399,3 +398,8 @@ def _strict_json(data: Any) -> str:
         return json.dumps(dict(data), allow_nan=False)
     except (TypeError, ValueError, RecursionError) as error:
         raise InputError(f"these properties cannot be sent as JSON: {error}") from error
+
+
+def _key_of(copy: Path) -> str:
+    """Whose copy it is; one that is being made, or was cut off, has a point before its name."""
+    return copy.name.lstrip(".").split(".")[0]

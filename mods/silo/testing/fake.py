@@ -51,6 +51,7 @@ from silo.testing.store import (
     Stored,
     check_base,
     check_cycle,
+    check_document,
     entries_of,
     missing_of,
     with_components,
@@ -291,8 +292,8 @@ class FakeSilo(FakeStore):
                 raise VersionConflictError(
                     f"the BOM of {part_number} is at version {stored.item.bom_version}"
                 )
-            if request.document is not None and not request.dry_run:
-                check_base(stored, request.document.revision, request.document.sha256)
+            if request.document is not None:
+                check_document(stored, request.document.revision, request.document.sha256)
             return self._merge(stored, request, content)
 
     def _merge(self, stored: Stored, request: MergeRequest, content: list[tuple[str, float]]) -> MergeResult:

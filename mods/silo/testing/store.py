@@ -66,6 +66,13 @@ def check_base(stored: Stored, base: int | None, checksum: str | None) -> None:
     )
 
 
+def check_document(stored: Stored, base: int | None, checksum: str | None) -> None:
+    """The server's rule for a merge: without a revision, an older file is known by its content."""
+    if base is None and checksum:
+        base = max((r.revision_number for r in stored.revisions if r.file_checksum == checksum), default=None)
+    check_base(stored, base, checksum)
+
+
 def _nothing(name: str) -> None:
     return None
 

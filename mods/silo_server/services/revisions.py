@@ -109,9 +109,26 @@ def check_base(tx: Tx, item: Item, base: int, checksum: str | None = None) -> No
         return
     raise NewerRevisionError(
         f"{newest.created_by} committed revision {newest.revision_number} of {item.part_number}, and this "
-        f"was made from revision {base}. Look at the newer one; it is the base_revision to send this on top",
+        f"was made from revision {base}. Fetch the newer one first (silo-mod pull, Open from Silo), or "
+        "commit this on top of it in FreeCAD",
         revision_to_wire(item.part_number, newest),
     )
+
+
+def check_document(tx: Tx, item: Item, base: int | None, checksum: str | None) -> None:
+    """Raise :class:`NewerRevisionError` where a BOM is that of an older file and would undo the newest one's.
+
+    ``base``: the revision that the document says it is. Without it the content counts: a file that is an
+    older revision, and was not edited, is known by its ``checksum``.
+    """
+    if base is None and checksum:
+        base = tx.conn.scalar(
+            select(func.max(revisions.c.revision_number)).where(
+                revisions.c.item_id == item.id, revisions.c.file_checksum == checksum
+            )
+        )
+    if base is not None:
+        check_base(tx, item, base, checksum)
 
 
 def list_revisions(

@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from hashlib import sha256
+from pathlib import Path
 
 import pytest
 from desk import Document, Office
@@ -53,6 +55,34 @@ def test_compare_sync_and_compare_again(office: Office, flow: PreviewFlow, top: 
     flow.again(top.FileName)
     office.settle()
     assert not window.filled[1].top.diff.drifted
+
+
+def test_a_sync_does_not_undo_a_colleagues_newer_file(
+    office: Office, flow: PreviewFlow, top: Document
+) -> None:
+    """Neither with edits nor without: the window shows the document as it is, made from an older revision."""
+    number = "M01-0001"
+    Path(top.FileName).write_bytes(b"three plates")
+    office.silo.upload_file(number, top.FileName, "mine")
+    office.desk.documents.base(top).origin = sha256(b"three plates").hexdigest()
+    flow.start(top)
+    office.settle()
+    (window,) = office.desk.previews
+    window.wishes.sync(window.filled[0], False, False)
+    office.settle()
+    theirs = office.folder / "theirs.FCStd"
+    theirs.write_bytes(b"without plates")
+    office.silo.user = "alice"
+    office.silo.upload_file(number, theirs, "less")
+    for edited in (False, True):
+        top.changed = edited
+        top.parts = dict.fromkeys(top.parts, 5)
+        flow.again(top.FileName)
+        office.settle()
+        window.wishes.sync(window.filled[-1], False, False)
+        office.settle()
+        assert [line.quantity for line in office.silo.get_bom(number)] == [3], edited
+        assert "alice has committed revision 2 since" in office.sent[-1].entry.remark
 
 
 def test_a_closed_document_is_reported_in_its_window(

@@ -199,6 +199,19 @@ class CommitFlow:
         made = Taken(row, taken, new_key(), base=None if by_fork else base)
         self._keep(made, "", with_file=False, content=content)
 
+    def made_from(self, commit: Commit, doc: Any) -> Commit:
+        """A commit of a BOM as it is shown, with what its document was made from: it must not undo the BOM of
+        a colleague's newer file. ``doc``: None where the file is not open."""
+        from silo.files import sha256_of  # late: FreeCAD's start waits for this module
+
+        if doc is None:
+            return replace(commit, sha256=sha256_of(commit.path))
+        documents = self._desk.documents
+        base = documents.base(doc)
+        as_saved = not documents.is_modified(doc) and not base.replaced
+        content = sha256_of(commit.path) if as_saved else ""
+        return replace(commit, origin=base.origin or UNKNOWN, sha256=content)
+
     def send(self, doc: Any, comment: str) -> None:
         """Send a document that has just been saved, as it is."""
         path = one_path(doc.FileName)

@@ -148,5 +148,11 @@ class PreviewFlow:
 
         for taken in to_sync(preview, below=below):
             commit = commit_of(taken, key=new_key(), allow_missing=allow_missing)
-            if commit is not None:
+            if commit is None:
+                continue
+            try:
+                commit = self._commits.made_from(commit, self._desk.find(taken.path))
+            except SiloError as error:
+                failed(error)
+            else:
                 self._session.keep(commit, failed=failed)

@@ -39,7 +39,7 @@ from silo_server.services.bom.last_sync import LastSync, last_sync, remember
 from silo_server.services.bom.lines import lines_of
 from silo_server.services.bom.merge_json import MergeOrder, event_of
 from silo_server.services.items import get_item
-from silo_server.services.revisions import check_base
+from silo_server.services.revisions import check_document
 from silo_server.values import Item, Line, LineState
 
 
@@ -66,6 +66,7 @@ def preview_merge(tx: Tx, part_number: str, order: MergeOrder, expected: int | N
     """The answer that :func:`merge_bom` would give, without changing anything."""
     parent = get_item(tx, part_number)
     check_version(parent, expected)
+    check_document(tx, parent, order.document_revision, order.document_sha256)
     prepared = _prepare(tx, parent, order)
     answer = answer_of(prepared.plan.diff, parent.part_number, order.sync_id, order.left_out)
     return MergeOutcome(dumps(answer), parent.bom_version)
@@ -83,9 +84,7 @@ def merge_bom(tx: Tx, part_number: str, order: MergeOrder, expected: int | None)
     if earlier is not None:
         return earlier
     check_version(parent, expected)
-    if order.document_revision is not None:
-        # The BOM of an older file that comes late would undo that of the newer one.
-        check_base(tx, parent, order.document_revision, order.document_sha256)
+    check_document(tx, parent, order.document_revision, order.document_sha256)
     prepared = _prepare(tx, parent, order)
     changes = _line_changes(tx, prepared)
     change_id, version = apply_changes(tx, parent, changes, _note(prepared, order))
