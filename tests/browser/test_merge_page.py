@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import pytest
 from playwright.sync_api import Page, Route, expect
 from server_testing import Api, bom, wait_until
-from settled import measured
+from settled import measured, wait_for_cursor
 
 from silo_server.run import RunningServer
 
@@ -200,7 +200,7 @@ def test_lines_are_added_changed_and_removed(api: Api, visit: Visit) -> None:
     expect(line_of(page, child)).to_contain_text("2.5 m")
     page.get_by_role("link", name=f"Edit {child}").click()
     form = page.locator("#edit")
-    expect(form.get_by_label("Quantity")).to_be_focused()
+    wait_for_cursor(form.get_by_label("Quantity"))
     form.get_by_label("Quantity").fill("3")
     form.get_by_label("Reference designators").fill("R1, R2 R3")
     form.get_by_label("Notes").fill("cut to length")
@@ -211,6 +211,18 @@ def test_lines_are_added_changed_and_removed(api: Api, visit: Visit) -> None:
     page.get_by_role("button", name="Remove from BOM").click()
     expect(page.locator(".notice")).to_contain_text(f"{child} removed")
     assert api.lines(parent) == {}
+
+
+def test_the_line_to_edit_is_in_sight(api: Api, visit: Visit) -> None:
+    """Also the last one of many; the cursor is in its field."""
+    parent, *children = api.items(80)
+    api.merge(parent, dict.fromkeys(children, 1))
+    page = visit("editor")
+    page.goto(f"/items/{parent}/bom")
+    page.get_by_role("link", name=f"Edit {children[-1]}").click()
+    quantity = page.locator("#edit").get_by_label("Quantity")
+    wait_for_cursor(quantity)
+    expect(quantity).to_be_in_viewport()
 
 
 def test_what_is_wrong_is_said_and_nothing_typed_is_lost(api: Api, visit: Visit) -> None:

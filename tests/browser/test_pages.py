@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Locator, Page, Route, expect
 from server_testing import Api, bom, form_body
-from settled import measured
+from settled import measured, wait_for_cursor
 
 Visit = Callable[..., Page]
 
@@ -117,7 +117,7 @@ def test_the_tree_opens_and_closes(machine: dict[str, str], visit: Visit) -> Non
     twist.focus()
     page.keyboard.press("Enter")
     expect(screw).to_be_visible()
-    expect(twist).to_be_focused()
+    wait_for_cursor(twist)
     expect(twist).to_have_attribute("aria-expanded", "true")
     assert measured(page, "window.still")
     page.reload()

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import Locator, Page, expect
 from server_testing import Api
-from settled import measured
+from settled import measured, wait_for_cursor
 
 Visit = Callable[..., Page]
 
@@ -174,9 +174,9 @@ def test_the_keyboard_is_enough(visit: Visit) -> None:
     page.goto("/items")
     page.keyboard.press("Tab")
     skip = page.get_by_role("link", name="Skip to content")
-    expect(skip).to_be_focused()
+    wait_for_cursor(skip)
     expect(skip).to_be_in_viewport()
     page.keyboard.press("Enter")
     page.keyboard.press("Tab")
-    expect(page.get_by_label("Search")).to_be_focused()
+    wait_for_cursor(page.get_by_label("Search"))
     assert measured(page.get_by_label("Search"), "e => getComputedStyle(e).outlineStyle") == "solid"

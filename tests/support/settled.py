@@ -50,6 +50,12 @@ def picture_of(part: Locator) -> bytes:
     return part.screenshot()
 
 
+def wait_for_cursor(part: Locator) -> None:
+    """Wait until what a person types goes into this field."""
+    field = part.element_handle()
+    part.page.wait_for_function("field => field === document.activeElement", arg=field, polling=100)
+
+
 def come_late(context: BrowserContext, seconds: float) -> None:
     """From now on, what pages need beside their text comes so many seconds late."""
 

@@ -28,6 +28,7 @@ from inside import (
     addon,
     assembly,
     boxes,
+    button_texts,
     dialog,
     labels,
     part,
@@ -190,7 +191,7 @@ def held(one: Any, doc: Any) -> None:
     path = doc.FileName
     one.commits.run(plan(doc, one.desk.documents).rows, "mine")
     wait(lambda: [entry for entry in one.session.shown.waiting if entry.newer] and settled())
-    wait(lambda: "Take theirs" in buttons(one.dock))
+    wait(lambda: "Take theirs" in button_texts(one.dock))
     said = wait(
         lambda: [text.text() for text in one.dock.findChildren(QtWidgets.QLabel) if "by them" in text.text()]
     )
@@ -199,7 +200,7 @@ def held(one: Any, doc: Any) -> None:
     picture(one.dock, "held")
     (entry,) = one.session.shown.waiting
     tell(held_all=read(lambda: one.buttons.act(Action(Do.DETAILS, "", target=str(entry.id)))))
-    tell(held=[entry.reason for entry in one.session.shown.waiting], held_buttons=buttons(one.dock))
+    tell(held=[entry.reason for entry in one.session.shown.waiting], held_buttons=button_texts(one.dock))
     many(one, entry)
     press(one.dock, "Open theirs beside mine")
     beside = wait(lambda: found_open("revisions", "Held"))
@@ -223,7 +224,7 @@ def many(one: Any, entry: Any) -> None:
     def seen(texts: Callable[[list[str]], bool]) -> bool:
         # News of the session may draw over it at any moment; drawn again, it costs nothing where it stands.
         one.dock.update_shown(crowd)
-        return texts(buttons(one.dock)) and not cut(one.dock)
+        return texts(button_texts(one.dock)) and not cut(one.dock)
 
     wait(lambda: seen(lambda found: "… and 4 more" in found))
     picture(one.dock, "many held")
@@ -237,17 +238,13 @@ def many(one: Any, entry: Any) -> None:
     wait(all_seen)
     one.dock.update_shown(one.session.shown)
     one.dock.setFloating(False)
-    wait(lambda: buttons(one.dock).count("Discard") == 1)
+    wait(lambda: button_texts(one.dock).count("Discard") == 1)
 
 
 def cut(widget: Any) -> list[str]:
     """The texts that need more height than they have."""
     found = [label for label in widget.findChildren(QtWidgets.QLabel) if label.isVisible() and label.text()]
     return [label.text() for label in found if label.height() < label.heightForWidth(label.width())]
-
-
-def buttons(widget: Any) -> list[str]:
-    return [b.text() for b in widget.findChildren(QtWidgets.QPushButton) if b.isVisible()]
 
 
 def choose_folder(folder: Path) -> None:

@@ -151,8 +151,12 @@ def press(widget: Any, text: str) -> None:
         if button.isVisible() and button.text() == text:
             button.click()
             return
-    texts = [b.text() for b in widget.findChildren(QtWidgets.QPushButton) if b.isVisible()]
-    raise AssertionError(f"no button {text!r}; there are {texts}")
+    raise AssertionError(f"no button {text!r}; there are {button_texts(widget)}")
+
+
+def button_texts(widget: Any) -> list[str]:
+    """What the visible buttons say."""
+    return [b.text() for b in widget.findChildren(QtWidgets.QPushButton) if b.isVisible()]
 
 
 @contextmanager

@@ -12,11 +12,11 @@ sys.path.insert(0, os.environ["SILO_TEST_CASES"])
 from inside import (
     App,
     Gui,
-    QtWidgets,
     addon,
     ask,
     assembly,
     boxes,
+    button_texts,
     labels,
     link,
     part,
@@ -89,10 +89,6 @@ def read_only(one: Any, other: Any, bolt: Any) -> None:
     wait(lambda: one.session.shown.connection == "online")
     wait(lambda: settled() and not waiting(one) and len(boxes("BOM Updated")) > before)
     tell(released=boxes("BOM Updated")[0])
-
-
-def button_texts(window: Any) -> list[str]:
-    return [button.text() for button in window.findChildren(QtWidgets.QPushButton) if button.isVisible()]
 
 
 def press_soon(window: Any, text: str) -> None:

@@ -16,6 +16,7 @@ from inside import (
     ask,
     assembly,
     boxes,
+    button_texts,
     dialog,
     labels,
     link,
@@ -110,7 +111,8 @@ def story() -> None:
     tell(offline=labels(one.dock), waiting=[w.label for w in one.session.shown.waiting])
     before = len(boxes("BOM Updated: " + numbers["Top"]))
     ask("server up")
-    press(one.dock, "Try again")
+    if "Try again" in button_texts(one.dock):  # unless the add-on itself was quicker
+        press(one.dock, "Try again")
     wait(lambda: len(boxes("BOM Updated: " + numbers["Top"])) > before and settled())
     wait(lambda: not one.session.shown.waiting)
     tell(after=pane()[0], connection=one.session.shown.connection)

@@ -71,6 +71,3 @@ if (form) {
 // Back and forward: the whole page, with its form as it was then. A link to a place on this page comes here as
 // well; it must not throw away what somebody is typing.
 addEventListener("popstate", () => here() !== address && location.reload());
-
-// A link to a place on a page may leave out the field that the page wants to begin with.
-if (location.hash) document.querySelector("[autofocus]")?.focus();
