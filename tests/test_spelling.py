@@ -67,6 +67,22 @@ def test_every_normal_form_of_a_name_is_one_path(disk: Path) -> None:
     assert real(disk / NFD.upper() / f"{NFD}.FCStd") == str(wanted)
 
 
+class OtherNumbers(Spelling):
+    """A disk that numbers files in its listings otherwise, as some network disks do."""
+
+    def _listing(self, folder: str) -> dict[int, list[str]]:
+        return {-number: names for number, names in super()._listing(folder).items()}
+
+
+def test_a_listing_with_other_numbers_has_the_names(disk: Path) -> None:
+    wanted = disk / "Büchse" / "Büchse.FCStd"
+    wanted.parent.mkdir()
+    wanted.write_text("x")
+    (wanted.parent / "Bolt.FCStd").write_text("y")
+    assert OtherNumbers().real(str(disk / NFD.upper() / f"{NFD}.FCStd")) == str(wanted)
+    assert OtherNumbers().real(str(disk / "büchse" / "BOLT.fcstd")) == str(wanted.with_name("Bolt.FCStd"))
+
+
 def test_a_path_that_is_not_there_is_spelt_as_far_as_it_goes(disk: Path) -> None:
     (disk / "Parts").mkdir()
     assert real(disk / "PARTS" / "new.FCStd") == str(disk / "Parts" / "new.FCStd")

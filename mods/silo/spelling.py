@@ -99,8 +99,10 @@ class Spelling:
             if name.isascii() and spellings:
                 self._exact.add(folder)
             return name
-        names = self._listing(folder).get(status.st_ino, ())
-        if not names or name in names:  # a hard link may have several names
+        listing = self._listing(folder)
+        # Some network disks number a file in a listing otherwise than by itself.
+        names = listing.get(status.st_ino) or [one for names in listing.values() for one in names]
+        if name in names:  # a hard link may have several names
             return name
         return next((other for other in names if folded(other) == folded(name)), name)
 
