@@ -157,6 +157,17 @@ def sha256_of(path: str) -> str:
         raise DocumentError(path, error.strerror or str(error)) from error
 
 
+def bare_checksum(checksum: str | None) -> str:
+    """A SHA-256 as a server may name it, in lower-case hex; "" where it names none."""
+    return (checksum or "").lower().removeprefix("sha256:")
+
+
+def seen_as(number: int, checksum: str | None) -> str:
+    """What names the file of a revision that a person saw: by its content too, where the server knows that; a
+    server that was restored gives the same number to another file."""
+    return f"{number} {bare_checksum(checksum)}".strip()
+
+
 def shipped() -> Path:
     """The folder with the example and the add-on's own files: the checkout, or what the wheel holds of it."""
     wheel = Path(__file__).parent / "shipped"

@@ -16,13 +16,15 @@ from typing import Any
 
 import pytest
 
+from silo.api.revisions import standing
+from silo.api.wire import Revision
 from silo.bom.errors import DocumentError, InputError
 from silo.bom.model import BomEntry, Extraction
 from silo.durable import replacing, stamp_of
 from silo.outbox.database import OutboxError
 from silo.outbox.entry import Commit, State, new_key
 from silo.outbox.send import send_all
-from silo.outbox.store import Store
+from silo.outbox.store import Store, seen
 from silo.testing import FakeSilo
 
 
@@ -346,3 +348,11 @@ def test_a_second_name_that_is_written_to_in_place_is_no_commit(store: Store, do
     again.retry(entry.id)
     assert send_all(again, FakeSilo()).sent == []
     assert [one.state for one in again.entries()] == [State.HELD]
+
+
+@pytest.mark.parametrize("written", ["{}", "sha256:{}"])
+def test_a_revision_that_a_person_saw_is_known_however_its_checksum_is_written(written: str) -> None:
+    checksum = written.format("AB" * 32)
+    theirs = Revision(revision_number=2, file_name="A.FCStd", file_checksum=checksum)
+    assert standing([theirs], "", seen=seen({"revision_number": 2, "file_checksum": checksum})).newer is None
+    assert standing([theirs], "", seen=seen({"revision_number": 2, "file_checksum": "cd" * 32})).newer

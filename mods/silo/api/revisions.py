@@ -16,6 +16,7 @@ from silo.api.transport import Cancel
 from silo.api.wire import Revision
 from silo.bom.errors import ConflictError, NewerRevisionError, NotFoundError, ServerFaultError
 from silo.durable import remove_patiently
+from silo.files import bare_checksum, seen_as
 from silo.folders import scratch_folder
 
 
@@ -80,7 +81,7 @@ def standing(
     mine = [
         r
         for r in files
-        if seen == f"{r.revision_number} {checksum_of(r)}".strip()
+        if seen == seen_as(r.revision_number, r.file_checksum)
         or (checksum_of(r) == origin if checksum_of(r) else r.revision_number == known)
     ]
     base = max(mine, key=lambda r: r.revision_number, default=None)
@@ -208,7 +209,7 @@ def find_arrived(
 
 def checksum_of(revision: Revision) -> str:
     """The SHA-256 of a revision's file in lower-case hex; "" where the server names none."""
-    return (revision.file_checksum or "").lower().removeprefix("sha256:")
+    return bare_checksum(revision.file_checksum)
 
 
 def _same_content(

@@ -31,7 +31,7 @@ from silo.api.address import canonical
 from silo.bom.errors import ConflictError, DocumentError, InputError
 from silo.bom.report import to_plain
 from silo.durable import remove_patiently, replacing, stamp_of
-from silo.files import content_hash
+from silo.files import content_hash, seen_as
 from silo.folders import data_folder
 from silo.outbox.database import Origins, insert
 from silo.outbox.entry import ASKED, SAME_PART, Commit, Entry, State
@@ -316,7 +316,7 @@ class Store(Origins):
             held = [*self._held.iterdir()] if self._held.is_dir() else []
             keys = {entry.key for entry in self.entries()}
             for file in files:
-                if _key_of(file) not in keys:
+                if _key_of(file.name) not in keys:
                     with suppress(OSError):
                         remove_patiently(file)
             for folder in held:
@@ -339,9 +339,9 @@ class Store(Origins):
     def _drop_files(self, entry: Entry) -> None:
         """Remove what the row had; what cannot be removed now is swept up later."""
         with suppress(OSError):
-            for file in [*self.copies.iterdir()]:
-                if _key_of(file) == entry.key:
-                    remove_patiently(file)
+            for name in os.listdir(self.copies):
+                if _key_of(name) == entry.key:
+                    remove_patiently(self.copies / name)
         shutil.rmtree(self._held / entry.key, ignore_errors=True)
 
     def _one(self, where: str, *values: Any) -> Entry | None:
@@ -364,9 +364,8 @@ def on_top(comment: str, newer: Mapping[str, Any]) -> str:
 
 
 def seen(newer: Mapping[str, Any]) -> str:
-    """What names a colleague's revision that a person saw: by its content, where the server knows that; a
-    server that was restored gives the same number to another file."""
-    return f"{newer['revision_number']} {newer.get('file_checksum') or ''}".strip()
+    """What names a colleague's revision that a person saw."""
+    return seen_as(newer["revision_number"], newer.get("file_checksum"))
 
 
 def _place(copy: Path, path: str) -> dict[str, str]:
@@ -400,6 +399,6 @@ def _strict_json(data: Any) -> str:
         raise InputError(f"these properties cannot be sent as JSON: {error}") from error
 
 
-def _key_of(copy: Path) -> str:
+def _key_of(copy: str) -> str:
     """Whose copy it is; one that is being made, or was cut off, has a point before its name."""
-    return copy.name.lstrip(".").split(".")[0]
+    return copy.lstrip(".").split(".")[0]
