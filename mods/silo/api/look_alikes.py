@@ -45,14 +45,9 @@ class LookAlikeCalls(FileCalls):
         """
 
         def batch(some: Sequence[tuple[str, str]]) -> dict[tuple[str, str], list[LookAlike]]:
-            reply = self._change(
-                "POST",
-                f"items like {len(some)} components",
-                *("items", "look-alikes"),
-                body=LookAlikesBody(wanted=[{"name": name, "sha256": digest} for name, digest in some]),
-                repeatable=True,
-                cancelled=cancelled,
-            )
+            asked = LookAlikesBody(wanted=[{"name": name, "sha256": digest} for name, digest in some])
+            subject = f"items like {len(some)} components"
+            reply = self._ask(subject, "items", "look-alikes", body=asked, cancelled=cancelled)
             answer = reply.model(LookAlikesAnswer).look_alikes
             if len(answer) != len(some):
                 raise ServerFaultError(f"wanted {len(some)} lists of look-alikes, got {len(answer)}")

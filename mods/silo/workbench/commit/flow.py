@@ -27,7 +27,7 @@ from silo.outbox.store import on_top, seen
 from silo.spelling import one_path
 from silo.workbench.commit.decisions import Decisions
 from silo.workbench.commit.desk import Answer, Desk
-from silo.workbench.commit.plan import MOST_S, Plan, Row, State, Taken, Taker, plan, refusal
+from silo.workbench.commit.plan import Plan, Row, State, Taken, Taker, is_edited, plan, refusal
 from silo.workbench.commit.snapshot import Snapshot
 from silo.workbench.commit.theirs import Asked, Choice, Theirs, look
 from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone, not_in_silo_key
@@ -187,7 +187,7 @@ class CommitFlow:
             taken = self.snapshot(doc)
             if not (taken.identity and taken.is_assembly):
                 return
-            edited = documents.is_modified(doc) and documents.is_edited(doc, time.thread_time() + MOST_S)
+            edited = is_edited(documents, doc)
             if not by_fork and (edited or base.replaced):
                 told = translate("Silo", "Its BOM was not synced: it is not as it was committed. Commit it.")
                 raise DocumentError(taken.path, told)

@@ -48,6 +48,11 @@ class Documents(Protocol):
     def base(self, doc: Any, /) -> Base: ...
 
 
+def is_edited(documents: Documents, doc: Any) -> bool:
+    """True where a document differs from its file; one that FreeCAD only marked does not."""
+    return documents.is_modified(doc) and documents.is_edited(doc, time.thread_time() + MOST_S)
+
+
 class State(StrEnum):
     """How a document stands before a commit."""
 
@@ -297,15 +302,11 @@ class Taker:
                 taken = Taken(row, error=SiloError(problem))
             yield taken
 
-    def _is_edited(self, doc: Any) -> bool:
-        documents = self.documents
-        return documents.is_modified(doc) and documents.is_edited(doc, time.thread_time() + MOST_S)
-
     def _one(self, row: Row) -> Taken:
         base = self.documents.base(row.document)
         # What somebody else has written is no file of ours: ours is written anew, at a person's word. What
         # was edited while documents before it were saved goes along: the BOM is that of the file.
-        if row.state is not State.SAVED or base.replaced or self._is_edited(row.document):
+        if row.state is not State.SAVED or base.replaced or is_edited(self.documents, row.document):
             if base.replaced and not row.replaced:
                 told = "somebody has written it since this commit was asked for; nothing was saved over it. "
                 raise DocumentError(row.path, told + "Commit it again, and choose which one counts")

@@ -66,7 +66,6 @@ def preview_merge(tx: Tx, part_number: str, order: MergeOrder, expected: int | N
     """The answer that :func:`merge_bom` would give, without changing anything."""
     parent = get_item(tx, part_number)
     check_version(parent, expected)
-    check_document(tx, parent, order.document_revision, order.document_sha256)
     prepared = _prepare(tx, parent, order)
     answer = answer_of(prepared.plan.diff, parent.part_number, order.sync_id, order.left_out)
     return MergeOutcome(dumps(answer), parent.bom_version)
@@ -84,7 +83,6 @@ def merge_bom(tx: Tx, part_number: str, order: MergeOrder, expected: int | None)
     if earlier is not None:
         return earlier
     check_version(parent, expected)
-    check_document(tx, parent, order.document_revision, order.document_sha256)
     prepared = _prepare(tx, parent, order)
     changes = _line_changes(tx, prepared)
     change_id, version = apply_changes(tx, parent, changes, _note(prepared, order))
@@ -100,6 +98,7 @@ def merge_bom(tx: Tx, part_number: str, order: MergeOrder, expected: int | None)
 
 
 def _prepare(tx: Tx, parent: Item, order: MergeOrder) -> _Prepared:
+    check_document(tx, parent, order.document_revision, order.document_sha256)
     lines = lines_of(tx, parent)
     child_ids, names = _children(tx, order, lines)
     entries: list[dict[str, Any]] = [
