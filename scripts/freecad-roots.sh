@@ -6,7 +6,7 @@
 #
 #   scripts/freecad-roots.sh [build [SUITE…]]       build or complete roots (default: all that this machine lacks)
 #   scripts/freecad-roots.sh --list                 name, version, Python, command, dependency folder
-#   scripts/freecad-roots.sh run NAME COMMAND…      run a command of that root (freecadcmd, freecad, xvfb-run …)
+#   scripts/freecad-roots.sh run NAME COMMAND…      run a command of that root (freecadcmd, freecad …)
 #   scripts/freecad-roots.sh remove NAME            delete a root
 #
 # A build can be stopped at any time and started again: it continues where it was. Mounts are made in a mount
@@ -27,7 +27,7 @@ declare -A FREECAD_OF=([bookworm]=0.20 [trixie]=1.0 [sid]=1.1)
 RECIPE=2
 # The second line is what FreeCAD's window needs under Xvfb and what apt would only recommend.
 PACKAGES=(freecad freecad-python3 ca-certificates
-  xvfb xauth libgl1-mesa-dri fonts-dejavu-core procps)
+  libgl1-mesa-dri fonts-dejavu-core procps)
 # What the add-on needs inside FreeCAD; package.xml declares the same.
 DEPENDENCIES=(requests pydantic sseclient-py)
 # Folders that belong to the machine's own system. Every other top folder (home, tmp, srv, …) is shown inside
@@ -170,7 +170,7 @@ write_wrappers() {
   # The roots outlive the checkout that made them, and so must the way into them.
   cp "$SELF" "$enter.$$"
   mv "$enter.$$" "$enter"
-  for command in freecadcmd freecad xvfb-run; do
+  for command in freecadcmd freecad; do
     printf '#!/bin/sh\nSILO_FREECAD_ROOTS="%s" exec "%s" run "%s" %s "$@"\n' \
       "$CACHE" "$enter" "$name" "$command" >"$CACHE/bin/$name/$command"
     chmod +x "$CACHE/bin/$name/$command"

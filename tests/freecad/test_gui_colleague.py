@@ -44,7 +44,7 @@ def _day(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     (folder / "alice").mkdir()
     (folder / "bob").mkdir()
     with window(request.param, folder / "alice") as alice:
-        bob = Window(alice.freecad, folder / "bob", alice.server, {}, screen=50)
+        bob = Window(alice.freecad, folder / "bob", alice.server, {})
         told: dict[str, Any] = {}
         for one in (alice, bob):
             one.prepare()

@@ -43,7 +43,7 @@ class FreeCAD:
         return ".".join(str(part) for part in self.version[:2])
 
     def sibling(self, program: str) -> str:
-        """Another program of the same FreeCAD: ``freecad``, ``xvfb-run``."""
+        """Another program of the same FreeCAD, such as ``freecad``."""
         beside = Path(self.command).parent / program
         return str(beside) if beside.exists() else program
 

@@ -26,10 +26,6 @@ TOKEN = "silo_" + "0123456789abcdef" * 2
 TIMEOUT_S = 180
 SCRIPTS = Path(__file__).parent
 
-# "xvfb-run -a" looks for a free screen and takes it later; two that look at once would find the same one.
-WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
-FIRST_SCREEN = 99
-
 # No start page (it needs a browser engine) and no notification area (FreeCAD 1.0 deadlocks in it without a
 # screen); facts §6.5.
 _SEED = """<?xml version="1.0" encoding="UTF-8" standalone="no" ?>
@@ -80,8 +76,6 @@ class Window:
     folder: Path
     server: Server
     answers: dict[str, Callable[[], Any]] = field(default_factory=dict)
-    # Two that run at once look for free screens from here.
-    screen: int = 0
     pixels: str = "1600x1000"
 
     @property
@@ -133,24 +127,14 @@ class Window:
         told = self.folder / "told.json"
         told.unlink(missing_ok=True)
         log = self.folder / "freecad.log"
-        first = str(FIRST_SCREEN + 100 * WORKER + self.screen)
-        command = [
-            self.freecad.sibling("xvfb-run"),
-            *("-n", first, "-a", "-s", f"-screen 0 {self.pixels}x24"),
-            self.freecad.command.replace("freecadcmd", "freecad"),
-            str(SCRIPTS / script),
-        ]
-        if self.freecad.name != "own":
-            # The wrapper enters the root; inside it, both programs have their plain names.
-            command[-2] = "freecad"
-        with log.open("wb") as output, self._answering():
+        with log.open("wb") as output, _display(self.pixels) as display, self._answering():
             process = subprocess.Popen(
-                command,
+                [self.freecad.sibling("freecad"), str(SCRIPTS / script)],
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=subprocess.STDOUT,
                 cwd=self.folder,
-                env={**os.environ, **self.environment(), **(env or {})},
+                env={**os.environ, **self.environment(), "DISPLAY": display, **(env or {})},
                 start_new_session=True,
             )
             try:
@@ -159,6 +143,7 @@ class Window:
                 os.killpg(process.pid, signal.SIGKILL)
                 process.wait()
                 raise AssertionError(f"FreeCAD did not end\n{self._report(log)}") from None
+        # The shell that entered a root ends with 137 where FreeCAD was killed.
         wanted = {code, 128 - code if code < 0 else code}
         assert ended in wanted, f"FreeCAD ended with {ended}\n{self._report(log)}"
         found = json.loads(told.read_text()) if told.exists() else {}
@@ -194,11 +179,29 @@ class Window:
 
 
 @contextmanager
+def _display(pixels: str) -> Iterator[str]:
+    """A screen of its own. Xvfb finds a free number itself, so several can start at once."""
+    # "xvfb-run" would cover the exit code of FreeCAD with its own where its clean-up fails.
+    read, write = os.pipe()
+    options = ["-displayfd", str(write), "-screen", "0", f"{pixels}x24", "-nolisten", "tcp"]
+    server = subprocess.Popen(["Xvfb", *options], pass_fds=[write], stdin=subprocess.DEVNULL)
+    os.close(write)
+    try:
+        with open(read, encoding="ascii") as answer:
+            number = answer.readline().strip()
+        assert number, "Xvfb did not start"
+        yield f":{number}"
+    finally:
+        server.terminate()
+        server.wait()
+
+
+@contextmanager
 def window(version: str, folder: Path) -> Iterator[Window]:
     """A FreeCAD of this version with a running server; skips loudly where the machine has none."""
     freecad = machines.need(version)
-    if shutil.which(freecad.sibling("xvfb-run")) is None:
-        machines.miss("xvfb-run is not installed")
+    if shutil.which("Xvfb") is None:
+        machines.miss("Xvfb is not installed")
     server = Server(folder)
     server.up()
     try:
