@@ -250,3 +250,24 @@ def test_the_bom_of_an_older_file_is_known_by_its_content(api: Api) -> None:
     upload(api, number, b"one", comment="back to it")
     api.merge(number, {bolt: 4}, document=document(b"one"))
     assert api.quantities(number) == {bolt: 4}
+
+
+def test_a_bom_does_not_go_without_its_file(api: Api) -> None:
+    """``document.revision`` and its SHA-256 name a file that is not here: the server was restored since, and
+    the number is free, or that of a colleague's file."""
+    number, bolt = api.items(2)
+    upload(api, number, b"one")
+    for revision in (1, 2):
+        for dry_run in (True, False):
+            gone = {
+                "entries": [{"child_part_number": bolt, "quantity": 9}],
+                "document": {
+                    "file": "Top.FCStd",
+                    "sha256": hashlib.sha256(b"gone").hexdigest(),
+                    "revision": revision,
+                },
+                "dry_run": dry_run,
+            }
+            error = api.bad(409, "POST", f"/api/items/{number}/bom/merge", gone)
+            assert error["error"] == "missing_revision"
+    assert api.quantities(number) == {}

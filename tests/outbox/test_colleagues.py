@@ -481,3 +481,41 @@ def test_a_lost_answer_is_found_behind_a_colleagues_commit(vault: Vault) -> None
     vault.send(force=True)
     assert (vault.waiting(), contents(vault)) == ((), [b"one", b"two", b"three"])
     assert vault.told[-1].revision == 2
+
+
+@pytest.mark.parametrize("colleague", [False, True])
+def test_a_bom_does_not_go_without_its_file(vault: Vault, *, colleague: bool) -> None:
+    """The server was restored between the two. Its number may be free, or a colleague's by now."""
+    file_only(vault, b"one", UNKNOWN)
+    vault.send()
+    entry = mine(vault, b"longer", sha(b"one"))
+    refuse_next_merge(vault)
+    vault.send()
+    restored(vault, 1)
+    if colleague:
+        theirs(vault, b"less", 1)
+    vault.outbox.retry(entry.id)
+    vault.send()
+    if colleague:
+        (held,) = vault.waiting()
+        assert (held.file_left, held.bom_left, held.newer["revision_number"]) == (True, True, 2)
+        assert (contents(vault), vault.lines()) == ([b"one", b"less"], {})
+    else:
+        assert (vault.waiting(), contents(vault)) == ((), [b"one", b"longer"])
+        assert vault.lines() == {"F01-0001": 6}
+
+
+def test_a_restore_between_the_look_and_the_merge_is_caught_by_the_server(vault: Vault) -> None:
+    """The file goes once more with the next run, then its BOM."""
+    mine(vault, b"one", UNKNOWN)
+
+    def hook(called: str) -> None:
+        if called == "merge_bom":
+            vault.silo.before = lambda _name: None
+            restored(vault, 0)
+
+    vault.silo.before = hook
+    assert "is not on this server" in vault.send().failed[0].reason
+    assert (contents(vault), vault.lines()) == ([], {})
+    vault.send(force=True)
+    assert (vault.waiting(), contents(vault), vault.lines()) == ((), [b"one"], {"F01-0001": 3})

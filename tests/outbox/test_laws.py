@@ -189,6 +189,4 @@ def test_each_commit_arrives_once_and_in_order(actions: list[Any], drawn: list[s
         assert left == refused
         store.fate = Fate([])
         store.sweep()
-        assert {path.name for path in store.copies.iterdir()} == {
-            e.copy for e in store.entries() if e.file_left
-        }
+        assert {path.name for path in store.copies.iterdir()} == {e.copy for e in store.entries() if e.copy}

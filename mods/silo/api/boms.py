@@ -15,6 +15,8 @@ from silo.api.wire import Answer, BomLine, MergeRequest, MergeResult, Quantity, 
 from silo.bom.errors import (
     ConflictError,
     CycleError,
+    MissingRevisionError,
+    NewerRevisionError,
     NotFoundError,
     RouteMissingError,
     VersionConflictError,
@@ -117,8 +119,9 @@ class BomCalls(Caller):
         Raises :class:`NotFoundError` for an unknown assembly but :class:`RouteMissingError` for a server
         that knows neither merge nor single lines, :class:`RejectedError` with all bad entries,
         :class:`CycleError`, :class:`ServerFaultError` for an answer that reports a failure or that the BOM
-        does not bear out,
-        :class:`VersionConflictError` for ``if_match``, :class:`ReadOnlyError`.
+        does not bear out, :class:`VersionConflictError` for ``if_match``, :class:`NewerRevisionError` and
+        :class:`MissingRevisionError` for a ``document`` that is not the newest file or not there,
+        :class:`ReadOnlyError`.
         """
         once = partial(self._merge_once, part_number, if_match=if_match, cancelled=cancelled)
         host = self._address.host
@@ -134,7 +137,8 @@ class BomCalls(Caller):
         except CycleError:
             raise
         except ConflictError as error:
-            if isinstance(error, VersionConflictError) or request.dry_run:
+            decided = VersionConflictError, NewerRevisionError, MissingRevisionError
+            if isinstance(error, decided) or request.dry_run:
                 raise
             rest = without_manual(self, part_number, request, lambda r: self._result(part_number, r, once(r)))
             if rest is None:

@@ -25,6 +25,7 @@ from silo.bom.errors import (
     ConflictError,
     CycleError,
     ForbiddenError,
+    MissingRevisionError,
     NewerRevisionError,
     NotFoundError,
     ReadOnlyError,
@@ -187,6 +188,8 @@ def error_of(reply: Reply, *, writing: bool = False) -> SiloError:
     if status == 409:
         if said.code == NewerRevisionError.code and said.revision is not None:
             return NewerRevisionError(f"{asked}{told}", said.revision)
+        if said.code == MissingRevisionError.code:
+            return MissingRevisionError(f"{asked}{told}")
         cycle = len(said.path) > 1
         return (
             CycleError(said.path)

@@ -116,6 +116,16 @@ REPACKED = (".kc",)
 """Files that a server packs anew: what comes down differs from what went up."""
 
 
+def is_there(revisions: Iterable[Revision], file_name: str, sha256: str, number: int | None) -> bool:
+    """True where a file that became revision ``number`` is among these. The checksum decides where it is that
+    of the file as it was sent."""
+    by_number = Path(file_name).suffix.lower() in REPACKED
+    return any(
+        checksum_of(r) == sha256 or (r.revision_number == number and (by_number or not checksum_of(r)))
+        for r in revisions
+    )
+
+
 class Downloads(Protocol):
     """What is needed of a Silo."""
 

@@ -21,6 +21,7 @@
     ├── ConflictError           nobody's: two truths met (409)
     │   ├── CycleError          the BOM would contain itself
     │   ├── NewerRevisionError  somebody committed the item since this file was opened
+    │   ├── MissingRevisionError  the server does not have the file that this BOM is of
     │   └── VersionConflictError  412: somebody else changed it first
     └── CancelledError          a person stopped it; not a failure
 
@@ -193,6 +194,12 @@ class NewerRevisionError(ConflictError):
     def __init__(self, message: str, revision: Mapping[str, Any]) -> None:
         super().__init__(message)
         self.revision = revision
+
+
+class MissingRevisionError(ConflictError):
+    """The server does not have, or has no more, the file that a BOM is of: the file has to go first."""
+
+    code = "missing_revision"
 
 
 class VersionConflictError(ConflictError):

@@ -24,8 +24,10 @@ from silo.api.policy import Backoff, Scope, Then, judge
 from silo.api.revisions import (
     MayHaveArrivedError,
     SentFile,
+    checksum_of,
     find_arrived,
     is_newest,
+    is_there,
     newest_number,
     other_name,
     standing,
@@ -37,6 +39,7 @@ from silo.bom.errors import (
     ConflictError,
     DocumentError,
     InputError,
+    MissingRevisionError,
     NewerRevisionError,
     NotFoundError,
     RouteMissingError,
@@ -186,6 +189,8 @@ class _Run:
             return None
         entry = replace(entry, part_number=number)
         self.store.update(entry.id, part_number=number)
+        if entry.has_file and not entry.file_left and not self._is_there(entry):
+            entry = self._again(entry)
         sent = Sent(entry, number, resolved=resolved, revision=entry.revision)
         if entry.file_left:
             try:
@@ -207,6 +212,20 @@ class _Run:
             except SiloError as error:
                 _refuse(error, refused)
         return sent
+
+    def _is_there(self, entry: Entry) -> bool:
+        """False where a file that was sent is gone, and its BOM would go alone: the server was restored."""
+        try:
+            known = self.client.revisions(entry.part_number)
+        except RouteMissingError:
+            return True
+        return is_there(known, entry.file_name, entry.sha256, entry.revision)
+
+    def _again(self, entry: Entry) -> Entry:
+        """The file has to go once more; what was seen of the server says nothing of it as it is now."""
+        unsent = {"file_left": True, "base_revision": None, "revision": None}
+        self.store.update(entry.id, **unsent)
+        return replace(entry, **unsent)
 
     def _resolved(self, entry: Entry, extraction: str) -> Resolved:
         try:
@@ -347,6 +366,11 @@ class _Run:
                 error.revision.get("created_by") or "somebody", error.revision.get("revision_number", "?")
             )
             return replace(sent, status=None, entry=replace(entry, remark=remark))
+        except MissingRevisionError as error:
+            if not entry.has_file:
+                raise
+            self._again(entry)
+            raise _PassingError(str(error)) from error
         self.store.arrived(entry, "bom")
         return replace(sent, status=Status.MERGED, result=result, sync_id=wanted.sync_id or "")
 
@@ -364,7 +388,10 @@ class _Run:
         )
         if stands.newer is not None:
             raise stands.refusal(entry.part_number)
-        return replace(entry, revision=stands.base.revision_number if stands.base is not None else None)
+        base = stands.base
+        return (
+            entry if base is None else replace(entry, revision=base.revision_number, sha256=checksum_of(base))
+        )
 
     def _named(self, entry: Entry, request: str) -> MergeRequest:
         """The request with its name and its document, where it does not have them yet."""
@@ -377,7 +404,7 @@ class _Run:
             document = SourceDocument(
                 file=Path(entry.path).name, folder=project_folder(entry.path), sha256=entry.sha256 or None
             )
-        if document is not None and document.revision is None:
+        if document is not None and (document.revision is None or entry.has_file):
             document = document.model_copy(update={"revision": entry.revision})
         return wanted.model_copy(update={"sync_id": wanted.sync_id or entry.key, "document": document})
 

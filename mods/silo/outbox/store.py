@@ -262,7 +262,8 @@ class Store(Origins):
         base: int | None = None,
         note: bool = True,
     ) -> None:
-        """The server has its file or its BOM. An entry of which nothing is left is gone, with its copy.
+        """The server has its file or its BOM. An entry of which nothing is left is gone, with its copy; until
+        then a server that is restored from a backup may need the copy once more.
 
         base
             the revision that the file was made from. A BOM of that one which a person still has to look at
@@ -290,7 +291,7 @@ class Store(Origins):
                     " DO UPDATE SET entry_id = max(entry_id, excluded.entry_id)",
                     (entry.server, item, kind, entry.id),
                 )
-        if kind == "file" or not left:
+        if not left:
             self._drop_files(entry)
 
     # -- copies -----------------------------------------------------------------------------------------

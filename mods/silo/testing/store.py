@@ -24,6 +24,7 @@ from silo.api.wire import (
 )
 from silo.bom.errors import CycleError, NewerRevisionError, NotFoundError, ReadOnlyError, RejectedError
 from silo.bom.left_out import Reason, remembered
+from silo.bom.undoing import base_of, would_undo
 
 CATEGORIES = {
     "A01": "Mechanical assembly",
@@ -56,9 +57,9 @@ class Stored:
 
 
 def check_base(stored: Stored, base: int | None, checksum: str | None) -> None:
-    """The server's rule: a file was committed after ``base``, and it is not this one."""
+    """Raise :class:`NewerRevisionError` for a file that would undo the newest one."""
     newest = next((r for r in reversed(stored.revisions) if r.file_checksum), None)
-    if base is None or newest is None or newest.revision_number <= base or newest.file_checksum == checksum:
+    if newest is None or not would_undo(newest, base, checksum):
         return
     raise NewerRevisionError(
         f"{newest.created_by} committed revision {newest.revision_number} of {stored.item.part_number}",
@@ -67,10 +68,9 @@ def check_base(stored: Stored, base: int | None, checksum: str | None) -> None:
 
 
 def check_document(stored: Stored, base: int | None, checksum: str | None) -> None:
-    """The server's rule for a merge: without a revision, an older file is known by its content."""
-    if base is None and checksum:
-        base = max((r.revision_number for r in stored.revisions if r.file_checksum == checksum), default=None)
-    check_base(stored, base, checksum)
+    """The same for the BOM of a file."""
+    same = [r.revision_number for r in stored.revisions if checksum and r.file_checksum == checksum]
+    check_base(stored, base_of(base, checksum, max(same, default=None)), checksum)
 
 
 def _nothing(name: str) -> None:

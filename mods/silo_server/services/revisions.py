@@ -11,6 +11,7 @@ from typing import Any
 from sqlalchemy import Row, func, insert, select, update
 
 from silo.bom.errors import ConflictError, NewerRevisionError, NotFoundError
+from silo.bom.undoing import base_of, would_undo
 from silo_server.db.engine import Tx
 from silo_server.db.tables import items, revisions
 from silo_server.json_values import check_json, dumps, loads
@@ -61,8 +62,8 @@ def add_revision(
         earlier = _by_key(tx, item, idempotency_key, file)
         if earlier is not None:
             return earlier
-    if file is not None and origin.base_revision is not None:
-        check_base(tx, item, origin.base_revision, file.checksum)
+    if file is not None:
+        _check_base(tx, item, origin.base_revision, file.checksum)
     last = tx.conn.scalar(select(func.max(revisions.c.revision_number)).where(revisions.c.item_id == item.id))
     number = (last or 0) + 1
     snapshot = dict(item.properties) if properties is None else dict(properties)
@@ -99,13 +100,9 @@ def add_revision(
     return revision
 
 
-def check_base(tx: Tx, item: Item, base: int, checksum: str | None = None) -> None:
-    """Raise :class:`NewerRevisionError` where a file was committed after ``base``.
-
-    A newer revision with this very ``checksum`` is no other file.
-    """
-    newest = _newest_file(tx, item)
-    if newest is None or newest.revision_number <= base or newest.file_checksum == checksum:
+def _check_base(tx: Tx, item: Item, base: int | None, checksum: str | None) -> None:
+    newest = _newest_file(tx, item) if base is not None else None
+    if newest is None or not would_undo(newest, base, checksum):
         return
     raise NewerRevisionError(
         f"{newest.created_by} committed revision {newest.revision_number} of {item.part_number}, and this "
@@ -116,19 +113,12 @@ def check_base(tx: Tx, item: Item, base: int, checksum: str | None = None) -> No
 
 
 def check_document(tx: Tx, item: Item, base: int | None, checksum: str | None) -> None:
-    """Raise :class:`NewerRevisionError` where a BOM is that of an older file and would undo the newest one's.
-
-    ``base``: the revision that the document says it is. Without it the content counts: a file that is an
-    older revision, and was not edited, is known by its ``checksum``.
-    """
-    if base is None and checksum:
-        base = tx.conn.scalar(
-            select(func.max(revisions.c.revision_number)).where(
-                revisions.c.item_id == item.id, revisions.c.file_checksum == checksum
-            )
-        )
-    if base is not None:
-        check_base(tx, item, base, checksum)
+    """Raise :class:`NewerRevisionError` where a BOM is that of an older file and would undo the newest one's,
+    :class:`MissingRevisionError` where its file is not here (:func:`silo.bom.undoing.base_of`)."""
+    same = select(func.max(revisions.c.revision_number)).where(
+        revisions.c.item_id == item.id, revisions.c.file_checksum == checksum
+    )
+    _check_base(tx, item, base_of(base, checksum, tx.conn.scalar(same) if checksum else None), checksum)
 
 
 def list_revisions(

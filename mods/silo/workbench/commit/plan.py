@@ -304,6 +304,9 @@ class Taker:
 
     def _one(self, row: Row) -> Taken:
         base = self.documents.base(row.document)
+        if one_path(row.document.FileName) != row.path:
+            told = "it was saved under another name since this commit was asked for; commit it again"
+            raise DocumentError(row.path, told)
         # What somebody else has written is no file of ours: ours is written anew, at a person's word. What
         # was edited while documents before it were saved goes along: the BOM is that of the file.
         if row.state is not State.SAVED or base.replaced or is_edited(self.documents, row.document):

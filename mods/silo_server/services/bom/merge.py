@@ -76,7 +76,7 @@ def merge_bom(tx: Tx, part_number: str, order: MergeOrder, expected: int | None)
 
     Raises NotFoundError (parent), RejectedError (all bad entries at once), CycleError, VersionConflictError,
     ConflictError (the ``sync_id`` was used for something else), NewerRevisionError (the document is not the
-    item's newest file).
+    item's newest file), MissingRevisionError (its file is not here).
     """
     parent = get_item(tx, part_number, lock=True)
     earlier = _replay(tx, parent, order)
