@@ -12,12 +12,15 @@ from uuid import uuid4
 import pytest
 
 from silo.api.client import SiloClient
-from silo.api.wire import MergeEntry, MergeRequest, MergeResult
+from silo.api.files import Origin
+from silo.api.wire import MergeEntry, MergeRequest, MergeResult, SourceDocument
 from silo.bom.diff import diff_bom
 from silo.bom.errors import (
     ConflictError,
     CycleError,
     InputError,
+    MissingRevisionError,
+    NewerRevisionError,
     NotFoundError,
     RejectedError,
     VersionConflictError,
@@ -361,3 +364,93 @@ def test_a_merge_is_announced(silo: Silo) -> None:
     replay = silo.open_events(str(int(event.id.partition("-")[0]) - 1))
     assert next(iter(replay)) == event
     replay.close()
+
+
+def sha(content: str) -> str:
+    return hashlib.sha256(content.encode()).hexdigest()
+
+
+def with_files(silo: Silo, folder: Path) -> str:
+    """An item whose revisions 1 to 5 are the files one, two, one again, a change of properties, three."""
+    number = make(silo, "Top", "A01")
+    for content in ("one", "two", "one", "", "three"):
+        if content:
+            (folder / "Top.FCStd").write_text(content)
+            silo.upload_file(number, folder / "Top.FCStd", content)
+        else:
+            silo.update_item(number, properties={"mass_kg": 2})
+    return number
+
+
+OLDER, GONE = NewerRevisionError, MissingRevisionError
+
+
+@pytest.mark.parametrize(
+    ("base", "content", "refusal"),
+    [
+        (None, "mine", None),
+        (5, "mine", None),
+        (6, "mine", None),
+        (4, "mine", OLDER),
+        (3, "one", OLDER),
+        (0, "two", OLDER),
+        (0, "three", None),
+    ],
+)
+def test_a_file_that_would_undo_the_newest_is_refused(
+    silo: Silo, tmp_path: Path, base: int | None, content: str, refusal: type[ConflictError] | None
+) -> None:
+    """By the revision that it was made from; the newest file itself undoes nothing."""
+    number, file = with_files(silo, tmp_path), tmp_path / "Top.FCStd"
+    file.write_text(content)
+    origin = Origin(base_revision=base)
+    if refusal is None:
+        assert silo.upload_file(number, file, origin=origin).revision_number == 6
+        return
+    with pytest.raises(refusal) as caught:
+        silo.upload_file(number, file, origin=origin)
+    assert isinstance(caught.value, NewerRevisionError)
+    newer = caught.value.revision
+    assert (newer["revision_number"], newer["file_checksum"], newer["comment"]) == (5, sha("three"), "three")
+    assert len(silo.revisions(number)) == 5
+
+
+@pytest.mark.parametrize("dry_run", [False, True])
+@pytest.mark.parametrize(
+    ("revision", "content", "refusal"),
+    [
+        (None, None, None),
+        (None, "three", None),
+        (None, "edited", None),
+        (None, "one", OLDER),
+        (None, "two", OLDER),
+        (5, "three", None),
+        (1, "three", None),
+        (5, "one", None),
+        (3, "one", OLDER),
+        (2, "two", OLDER),
+        (2, None, OLDER),
+        (5, None, None),
+        (5, "gone", GONE),
+        (2, "gone", GONE),
+        (6, "gone", GONE),
+    ],
+)
+def test_the_bom_of_a_file_that_would_undo_the_newest_is_refused(
+    silo: Silo,
+    tmp_path: Path,
+    revision: int | None,
+    content: str | None,
+    refusal: type[ConflictError] | None,
+    dry_run: bool,
+) -> None:
+    """By the revision, by the content, or by both; a file that the server does not have goes first."""
+    number, bolt = with_files(silo, tmp_path), make(silo, "Bolt", "F01")
+    document = SourceDocument(file="Top.FCStd", revision=revision, sha256=sha(content) if content else None)
+    wanted = request(None, dry_run=dry_run, **{key(bolt): 4}).model_copy(update={"document": document})
+    if refusal is None:
+        assert [line.part_number for line in silo.merge_bom(number, wanted).diff.added] == [bolt]
+        return
+    with pytest.raises(refusal):
+        silo.merge_bom(number, wanted)
+    assert silo.get_bom(number) == []

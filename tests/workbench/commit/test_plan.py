@@ -194,6 +194,16 @@ def test_a_failure_does_not_stop_the_others() -> None:
     assert documents.saved == ["Top"]
 
 
+def test_a_document_that_was_saved_as_another_file_is_not_sent() -> None:
+    """Its old file and its new BOM are two things; neither file is written nor sent."""
+    documents, doc = Documents(), Doc("Top", changed=True)
+    planned = plan(doc, documents)
+    doc.FileName = "/v/Variant.FCStd"
+    (taken,) = taker(documents).each(planned.rows)
+    assert "under another name" in str(taken.error)
+    assert (taken.snapshot, documents.saved) == (None, [])
+
+
 def test_a_document_without_identity_is_not_held() -> None:
     """There is nothing to send it to, so no copy is kept."""
     documents = Documents()
