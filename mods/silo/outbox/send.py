@@ -223,9 +223,8 @@ class _Run:
 
     def _again(self, entry: Entry) -> Entry:
         """The file has to go once more; what was seen of the server says nothing of it as it is now."""
-        unsent = {"file_left": True, "base_revision": None, "revision": None}
-        self.store.update(entry.id, **unsent)
-        return replace(entry, **unsent)
+        self.store.update(entry.id, file_left=True, base_revision=None, revision=None)
+        return replace(entry, file_left=True, base_revision=None, revision=None)
 
     def _resolved(self, entry: Entry, extraction: str) -> Resolved:
         try:
