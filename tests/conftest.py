@@ -13,8 +13,14 @@ import pytest
 from hypothesis import HealthCheck, settings
 from sharing import scheduler
 
-# Time is measured in benchmarks; a test on a busy machine is not wrong for being slow.
-settings.register_profile("unhurried", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+# Time is measured in benchmarks; a test on a busy machine is not wrong for being slow. The examples are the
+# same in each run, so that no landing fails by chance; SILO_LONG=1 hunts with new ones.
+settings.register_profile(
+    "unhurried",
+    deadline=None,
+    derandomize=not os.environ.get("SILO_LONG"),
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
+)
 settings.load_profile("unhurried")
 
 

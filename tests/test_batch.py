@@ -87,7 +87,7 @@ PATTERNS = (
 @pytest.mark.skipif(shutil.which("git") is None, reason="git is not on this machine")
 @pytest.mark.usefixtures("needs_case")
 @pytest.mark.filterwarnings("ignore::FutureWarning")
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     folders=st.lists(st.lists(st.sampled_from(NAMES[:5]), max_size=3), min_size=1, max_size=5),
     names=st.lists(st.sampled_from(NAMES[5:]), min_size=1, max_size=6),
@@ -227,7 +227,7 @@ def test_no_token_is_shown_in_a_repr() -> None:
 
 
 @given(st.text(st.sampled_from("ab1 |`*_[]()<>#@&;~$\\-+.!\n\t\x00\u202e\ud800é:"), max_size=30))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_text_of_others_is_shown_in_markdown_and_does_nothing(text: str) -> None:
     """In a table, a list and a heading; the oracle is a reader of Markdown. Nobody is notified by a name."""
     shown = " ".join("".join(c if c.isprintable() else " " for c in text).split())

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 from fcstd_writer import Doc, XLink, locals_
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from other_disk import other_disk
 
@@ -169,7 +169,7 @@ def respelt(draw: st.DrawFn) -> str:
     return unicodedata.normalize(draw(st.sampled_from(("NFC", "NFD"))), other)
 
 
-@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=40)
 @given(recorded=st.lists(respelt(), min_size=1, max_size=6), folder=st.uuids())
 def test_any_spelling_gives_the_same_bom_on_every_disk(
     disk: Path, tmp_path: Path, recorded: list[str], folder: uuid.UUID

@@ -9,7 +9,7 @@ import re
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from silo.api.config import config_path, load_config, resolve_server, save_config
@@ -168,7 +168,6 @@ def test_the_path_follows_the_platform(tmp_path: Path) -> None:
 texts = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=20)
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(texts, st.one_of(st.booleans(), texts))
 def test_what_is_saved_is_read_again(tmp_path: Path, token: str, verify: bool | str) -> None:
     """Whatever the texts hold."""

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from real_silo import FAULTS, TOKEN, Moods, RealSilo, real_silo
 
@@ -224,12 +224,7 @@ def story(desk: Desk) -> None:
     check_held_once(desk)
 
 
-@settings(
-    max_examples=6,
-    deadline=None,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-    derandomize=True,
-)
+@settings(max_examples=6)
 @given(data=st.data())
 def test_the_whole_story_in_mixed_moods(tmp_path_factory: pytest.TempPathFactory, data: Any) -> None:
     """Any three switches at once."""

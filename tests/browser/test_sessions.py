@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import pytest
 from playwright.sync_api import Dialog, Page, Route, expect
-from server_testing import Api, bom
+from server_testing import Api, bom, wait_until
 from settled import measured
 
 Visit = Callable[..., Page]
@@ -219,19 +219,18 @@ def test_restoring_does_not_revert_what_came_meanwhile(api: Api, visit: Visit, u
 def test_a_second_click_sends_nothing(visit: Visit, user: str) -> None:
     """While the answer to the first is on its way."""
     page = enter(visit, user, "/account")
-    sent: list[str] = []
-
-    def late(route: Route) -> None:
-        sent.append(route.request.url)
-        page.wait_for_timeout(300)
-        route.continue_()
-
-    page.route("**/account/tokens", late)
+    sent: list[Route] = []
+    page.route("**/account/tokens", lambda route: sent.append(route))
     page.get_by_label("Name of a new token").fill("laptop")
-    measured(
-        page.locator("form[action$=tokens]"),
-        "form => { form.requestSubmit(); setTimeout(() => form.requestSubmit(), 100) }",
-    )
+    form = page.locator("form[action$=tokens]")
+    twice = "form => { form.requestSubmit(); setTimeout(() => { form.requestSubmit(); console.log('twice'); }) }"
+    with (
+        page.expect_request("**/account/tokens"),
+        page.expect_console_message(lambda message: message.text == "twice"),
+    ):
+        measured(form, twice)
+    wait_until(lambda: bool(sent or page.wait_for_timeout(10)), "the request")
+    sent[0].continue_()
     expect(page.get_by_label("The token")).to_be_visible()
     assert len(sent) == 1
     expect(page.get_by_role("rowheader", name="laptop")).to_have_count(1)

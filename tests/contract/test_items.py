@@ -9,7 +9,7 @@ import uuid
 from urllib.parse import quote
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from server_testing import Api, bom, form_body
 
@@ -267,7 +267,7 @@ def test_no_query_is_an_error(api: Api, query: str) -> None:
 
 
 @given(name=st.text(min_size=1, max_size=40))
-@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=50)
 def test_an_item_is_found_by_each_word_of_its_name(api: Api, name: str) -> None:
     """Whatever the script: what the index has is what the query asks for, on both databases."""
     words = words_of(name)

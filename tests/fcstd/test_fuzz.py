@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from fcstd_writer import Doc, container, locals_, part
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from silo.bom.document import LinkProblem
@@ -20,11 +20,7 @@ from silo.fcstd import Library, Limits, stamp
 
 LIMITS = Limits(document_xml=1 << 20, packed=1 << 20, side_entry=1 << 16, objects=1000)
 
-relaxed = settings(
-    max_examples=250,
-    deadline=None,
-    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
-)
+relaxed = settings(max_examples=250)
 
 
 def top() -> Doc:

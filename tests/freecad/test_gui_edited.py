@@ -12,9 +12,6 @@ from gui_cases.window import Window, window
 
 pytestmark = [pytest.mark.freecad, pytest.mark.slow]
 
-# Milliseconds of the GUI thread, for 42 files.
-MOST = 150
-
 
 @pytest.fixture(name="freecad", scope="module", params=WANTED)
 def _freecad(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Window]:
@@ -35,11 +32,6 @@ def test_a_recompute_is_no_edit(said: dict[str, Any]) -> None:
     assert states.pop("Part7") == "changed"
     assert set(states.values()) == {"recomputed"}
     assert len(states) == 41
-
-
-def test_the_check_does_not_hold_up_the_window(said: dict[str, Any]) -> None:
-    """Processor time, which other work on the machine does not change much; the benchmark has the figures."""
-    assert said["took"] < MOST
 
 
 def test_only_what_was_edited_is_checked(said: dict[str, Any]) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 from bodies import box, cylinder
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from silo.inertia.links import link_map, origin_frame
@@ -32,7 +32,7 @@ places = st.tuples(
     st.tuples(*[st.floats(-3, 3)] * 3),
 )
 layouts = st.lists(places, min_size=1, max_size=10)
-quietly = settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+quietly = settings(max_examples=40)
 
 
 def build(layout: list[Any], outer: np.ndarray | None = None) -> Assembly:

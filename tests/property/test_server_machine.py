@@ -318,7 +318,6 @@ def test_the_server_behaves_like_the_model(kind: str) -> None:
                 settings=settings(
                     max_examples=15,
                     stateful_step_count=20,
-                    deadline=None,
                     suppress_health_check=list(HealthCheck),
                 ),
             )

@@ -192,7 +192,7 @@ def damaged(content: bytes, at: float, how: str) -> bytes:
     )
 
 
-Vault.TestCase.settings = settings(max_examples=12, stateful_step_count=12, deadline=None)
+Vault.TestCase.settings = settings(max_examples=12, stateful_step_count=12)
 TestVault = Vault.TestCase
 
 
@@ -200,7 +200,7 @@ class LongVault(Vault):
     """The same hunt, for longer."""
 
 
-LongVault.TestCase.settings = settings(max_examples=400, stateful_step_count=25, deadline=None)
+LongVault.TestCase.settings = settings(max_examples=400, stateful_step_count=25)
 TestLongVault = pytest.mark.slow(LongVault.TestCase)
 if not os.environ.get("SILO_LONG"):
     del TestLongVault

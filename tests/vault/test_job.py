@@ -86,7 +86,7 @@ def vaults(draw: st.DrawFn) -> dict[int, dict[int, int]]:
     }
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(vaults())
 def test_the_boms_are_those_of_each_file_alone(
     tmp_path_factory: pytest.TempPathFactory, holds: dict[int, dict[int, int]]

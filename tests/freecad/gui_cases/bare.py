@@ -9,18 +9,21 @@ from typing import Any
 
 sys.path.insert(0, os.environ["SILO_TEST_CASES"])
 
-from inside import Gui, QtCore, QtWidgets, labels, tell, wait
+from inside import Gui, QtWidgets, labels, run, tell, wait
+
+
+def report() -> list[str]:
+    """What the report view says of us."""
+    texts = [w.toPlainText() for w in Gui.getMainWindow().findChildren(QtWidgets.QTextEdit)]
+    return [line for text in texts for line in text.splitlines() if "Silo" in line or "Traceback" in line]
 
 
 def look() -> None:
     from silo.workbench.freecad import host
 
-    texts = [w.toPlainText() for w in Gui.getMainWindow().findChildren(QtWidgets.QTextEdit)]
     tell(
         on_path=host.packages_folder() in [os.path.normpath(entry) for entry in sys.path],
-        report=[
-            line for text in texts for line in text.splitlines() if "Silo" in line or "Traceback" in line
-        ],
+        report=report(),
     )
     Gui.activateWorkbench("SiloModWorkbench")
     bar = Gui.getMainWindow().findChild(QtWidgets.QToolBar, "Silo")
@@ -35,7 +38,6 @@ def look() -> None:
     os.environ["PIP_FIND_LINKS"] = os.environ["SILO_TEST_WHEELS"]
     press(window)
     tell(after=labels(window), button=window.button.isVisible())
-    os._exit(0)
 
 
 def press(window: Any) -> None:
@@ -44,4 +46,4 @@ def press(window: Any) -> None:
     wait(lambda: not window.bar.isVisible())
 
 
-QtCore.QTimer.singleShot(1500, look)
+run(look, ready=report)

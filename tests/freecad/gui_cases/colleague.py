@@ -44,7 +44,6 @@ from silo.workbench.pane.activity import Action, Do
 
 SHARED = Path(os.environ["SILO_TEST_SHARED"])
 NAMES = ("Left", "OnTop", "Taken", "Copied", "Held")
-LONG_S = 120
 
 
 def say(what: str) -> None:
@@ -52,7 +51,7 @@ def say(what: str) -> None:
 
 
 def until(what: str) -> None:
-    wait((SHARED / what).exists, LONG_S)
+    wait((SHARED / what).exists)
 
 
 def remove(doc: Any, name: str) -> None:
@@ -129,13 +128,13 @@ def alice() -> None:
     wait(lambda: one.session.shown.connection == "online")
     for doc in (bolt.Document, plate.Document, *tops.values()):
         commit(doc, "first")
-    wait(lambda: not one.session.shown.waiting, LONG_S)
+    wait(lambda: not one.session.shown.waiting)
     say("ready")
     until("opened")
     for doc in tops.values():
         remove(doc, "Plate")
         commit(doc, "without the plate")
-    wait(lambda: not one.session.shown.waiting and settled(), LONG_S)
+    wait(lambda: not one.session.shown.waiting and settled())
     tell(boxes=len(boxes("BOM Updated")))
     say("committed")
 

@@ -114,7 +114,7 @@ def moved_part(one: Any) -> None:
     wait(lambda: window._preview is not None)
     photograph(window, "broken")
     tell(can_mend=window.relink_button.isVisibleTo(window), tip=window.relink_button.toolTip())
-    window._preview, before = window._preview, window._preview
+    before = window._preview
     window.relink_button.click()
     wait(lambda: window._preview is not None and window._preview is not before)
     target = top.getObject("First").LinkedObject
@@ -126,12 +126,7 @@ def moved_part(one: Any) -> None:
         top.getObject("First"), App.Vector(50, 0, 0), App.Vector(0, 9, 0), App.Vector(), 3, 1, 1
     )
     top.getObject("First").Visibility = True
-    holder = (
-        top.getObject("First").InList[0]
-        if False
-        else next(o for o in top.Objects if o.isDerivedFrom("App::Part"))
-    )
-    holder.addObject(array)
+    next(o for o in top.Objects if o.isDerivedFrom("App::Part")).addObject(array)
     top.recompute()
     window.verify_button.click()
     tell(differs=window._view_text.text(), selection=[obj.Name for obj in Gui.Selection.getSelection()])

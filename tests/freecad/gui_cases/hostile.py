@@ -11,7 +11,6 @@ from typing import Any
 
 sys.path.insert(0, os.environ["SILO_TEST_CASES"])
 
-import inside
 from inside import (
     FOLDER,
     VAULT,
@@ -161,6 +160,4 @@ def story() -> None:
     tell(report=report_view())
 
 
-# FreeCAD 1.1 alone needs half a minute to open this.
-inside.LONGEST_S = 170
 run(story)

@@ -23,7 +23,7 @@ from silo.api.client import SiloClient
 from silo_server.run import RunningServer, running_server
 
 TOKEN = "silo_" + "0123456789abcdef" * 2
-TIMEOUT_S = 180
+TIMEOUT_S = 300
 SCRIPTS = Path(__file__).parent
 
 # No start page (it needs a browser engine) and no notification area (FreeCAD 1.0 deadlocks in it without a
@@ -183,7 +183,8 @@ def _display(pixels: str) -> Iterator[str]:
     """A screen of its own. Xvfb finds a free number itself, so several can start at once."""
     # "xvfb-run" would cover the exit code of FreeCAD with its own where its clean-up fails.
     read, write = os.pipe()
-    options = ["-displayfd", str(write), "-screen", "0", f"{pixels}x24", "-nolisten", "tcp"]
+    # Without "-noreset" the end of the first of two programs would be the end of the other's connection.
+    options = ["-displayfd", str(write), "-screen", "0", f"{pixels}x24", "-nolisten", "tcp", "-noreset"]
     server = subprocess.Popen(["Xvfb", *options], pass_fds=[write], stdin=subprocess.DEVNULL)
     os.close(write)
     try:

@@ -11,7 +11,7 @@ from typing import Any
 import jsonschema_rs
 import pytest
 from bodies import box, placement, shape_only
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from silo.inertia.bom import BOMEntry, BomTable
@@ -41,9 +41,7 @@ MASSES = (None, 0.0, 0.0785, 0.5)
 SCHEMA = json.loads(
     (Path(__file__).parents[3] / "mods" / "silo" / "inertia" / "schema.json").read_text("utf-8")
 )
-quietly = settings(
-    max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None
-)
+quietly = settings(max_examples=60)
 
 
 @st.composite

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from bodies import box, placement
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from silo.inertia.model import Assembly, Instance, Prototype
@@ -174,7 +174,7 @@ class Writer:
         return text if self.header_unit else f"{text} {unit}"
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=300)
 @given(st.integers(0, 2**32))
 def test_a_wrong_mass_is_never_silent(compute: Callable[..., Any], seed: int) -> None:
     """Per part: the truth within the stated rounding, or a warning that names the part."""
