@@ -21,7 +21,7 @@ from settled import come_late
 from silo_server.run import RunningServer, running_server
 
 TOKEN = "silo_" + "browser0" * 5
-SECONDS = 20
+SECONDS = 60
 # Style sheets, scripts and pictures come so many seconds late: a hunt for tests that depend on time.
 LATE = float(os.environ.get("SILO_LATE_ASSETS", "0"))
 

@@ -29,7 +29,7 @@ def ask(silo: Any, method: str, path: str, body: Any = None) -> Any:
         silo.client.base_url + path,
         json=body,
         headers={"Authorization": f"Bearer {silo.token}"},
-        timeout=30,
+        timeout=120,
     )
     answer.raise_for_status()
     return answer.json()

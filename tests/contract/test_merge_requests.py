@@ -184,7 +184,7 @@ def test_two_merges_at_once_cannot_close_a_ring_together(api: Api) -> None:
 
         def merge(parent: str, child: str, gate: threading.Barrier, out: list[int]) -> None:
             mine = api.as_(api.token)
-            gate.wait(10)
+            gate.wait(60)
             out.append(mine.call("POST", bom(parent, "merge"), merge_body({child: 1})).status)
 
         threads = [

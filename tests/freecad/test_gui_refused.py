@@ -42,7 +42,7 @@ class Server:
     def mode(self, mode: str) -> bool:
         url = f"{self.freecad.server.url}/api/admin/mode"
         head = {"Authorization": f"Bearer {TOKEN}"}
-        requests.put(url, json={"mode": mode}, headers=head, timeout=10).raise_for_status()
+        requests.put(url, json={"mode": mode}, headers=head, timeout=60).raise_for_status()
         return True
 
 

@@ -247,7 +247,7 @@ def test_half_a_request_is_not_waited_for_for_ever(
 ) -> None:
     """The server hangs up by itself; it says why where there was a request to answer."""
     url = f"sqlite:///{tmp_path / 'x.db'}"
-    settings = Settings(database_url=url, request_head_seconds=0.2, request_body_seconds=0.2)
+    settings = Settings(database_url=url, request_head_seconds=0.6, request_body_seconds=0.6)
     with running_server(url, token="silo_half", settings=settings) as server:
         parts = urlsplit(server.base_url)
         with socket.create_connection((parts.hostname, parts.port), timeout=30) as connection:

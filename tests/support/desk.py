@@ -32,7 +32,7 @@ from silo.workbench.session.shown import Listener
 from silo.workbench.settings.preferences import DEFAULTS, Preferences
 from silo.workbench.settings.server import Known
 
-WAIT_S = 30
+WAIT_S = 60
 
 
 class Gui:

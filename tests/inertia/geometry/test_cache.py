@@ -53,7 +53,7 @@ def test_other_content_or_options_are_read_anew(box: Any, step_part: Any, kept: 
     read(path, options=kept())
     with pytest.raises(DocumentError):
         read(path, options=kept(memory_mb=IMPOSSIBLE, eps=1e-6))
-    assert read(path, options=kept(memory_mb=IMPOSSIBLE, timeout_s=5)).instances
+    assert read(path, options=kept(memory_mb=IMPOSSIBLE, timeout_s=50)).instances
     path.write_bytes(path.read_bytes() + b"\n")
     with pytest.raises(DocumentError):
         read(path, options=kept(memory_mb=IMPOSSIBLE))

@@ -57,6 +57,6 @@ def test_a_pipe_is_written_to_and_stays_a_pipe(tmp_path: Path) -> None:
     reader = threading.Thread(target=lambda: read.append(pipe.read_bytes()))
     reader.start()
     write_whole(pipe, b"report")
-    reader.join(timeout=10)
+    reader.join(timeout=60)
     assert read == [b"report"]
     assert pipe.is_fifo()

@@ -12,7 +12,7 @@ import pytest
 from silo.workbench.session.gui_thread_gc import collect_due, collection_off
 from silo.workbench.session.jobs import Control, Job, Worker
 
-WAIT_S = 10
+WAIT_S = 60
 
 
 class Window:

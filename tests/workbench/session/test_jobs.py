@@ -13,7 +13,7 @@ import pytest
 from silo.bom.errors import CancelledError, InputError, SiloError
 from silo.workbench.session.jobs import Busy, Control, Job, Worker
 
-WAIT_S = 10
+WAIT_S = 60
 
 
 class Gui:
