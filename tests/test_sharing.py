@@ -22,7 +22,8 @@ def test_the_matrix_and_a_browser_s_file_stay_whole() -> None:
 
 
 def test_others_go_alone() -> None:
-    """Also those that are made for several values."""
+    """Also those that are made for several values, and the longest of the browser."""
+    assert len({group_of(f"tests/browser/test_accessibility.py::test_y[{n}]") for n in range(3)}) == 3
     assert len({group_of(f"tests/bom/test_x.py::test_y[{n}]") for n in range(3)}) == 3
     assert group_of("tests/freecad/test_gui_corners.py::test_new") != group_of(
         "tests/freecad/test_gui_corners.py::test_other"
