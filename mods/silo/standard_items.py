@@ -16,10 +16,8 @@ from typing import Any
 from silo.bom.errors import SiloError
 from silo.bom.identity import walk_entries
 from silo.bom.model import BomEntry
-from silo.bom.naming import Proposal
 from silo.durable import private_folder, replacing
 from silo.folders import data_folder
-from silo.registration import Registration, RegistrationApi
 
 # Each costs a request, and only while nobody has registered the part.
 MOST_LOOKED_UP = 200
@@ -81,14 +79,14 @@ def find_items(
         if (item := by_description(designation, api)) is not None:
             searched[uuid] = item
     if searched:
-        memory.remember(_server(api), {uuid: str(item["id"]) for uuid, item in searched.items()})
+        memory.remember(server_of(api), {uuid: str(item["id"]) for uuid, item in searched.items()})
     return found | searched
 
 
 def _remembered(
     wanted: Mapping[str, str], api: Any, memory: Memory
 ) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    known = memory.known(_server(api))
+    known = memory.known(server_of(api))
     for uuid, item_id in ((uuid, known[uuid]) for uuid in wanted if uuid in known):
         if (item := api.get_item_by_uuid(item_id)) is not None:
             yield uuid, item
@@ -112,35 +110,6 @@ def by_description(designation: str, api: Any) -> Mapping[str, Any] | None:
     return same[0] if len(same) == 1 else None
 
 
-def register_standard(
-    proposal: Proposal, api: RegistrationApi, *, schema: str, memory: Memory | None = None
-) -> Registration:
-    """Register a standard part: join the item that the server has, else make one. No file is written.
-
-    A repeat is harmless: the derived UUID is the key of the request.
-    """
-    entry = proposal.entry
-    uuid, designation = entry.silo_uuid or "", entry.standard or ""
-    memory = memory or Memory()
-    try:
-        item = api.get_item_by_uuid(uuid) or by_description(designation, api)
-        found = item is not None
-        if item is None:
-            item = api.create_item(
-                schema,
-                proposal.category,
-                designation,
-                item_type=proposal.item_type,
-                properties={"standard": designation},
-                idempotency_key=uuid,
-            )
-        item_id = str(item["id"])
-        if item_id.lower() != uuid.lower():
-            memory.remember(_server(api), {uuid: item_id})
-    except SiloError as error:
-        return Registration(proposal, error=error)
-    return Registration(proposal, part_number=str(item["part_number"]), item_id=item_id, found=found)
-
-
-def _server(api: Any) -> str:
+def server_of(api: Any) -> str:
+    """How a memory names the server."""
     return str(getattr(api, "base_url", ""))

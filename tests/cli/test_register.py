@@ -22,11 +22,12 @@ from silo.bom.naming import Proposal
 from silo.cli.common import read_assembly
 from silo.cli.register_dialog import Dialog
 from silo.fcstd import open_document
+from silo.registering.items import component_key
+from silo.registering.journal import Journal
 from silo.registering.offer import Candidate, Offer, Similar, State
 from silo.registering.on_disk import carry_out_on_disk, proposals_for
 from silo.registering.orders import Order
 from silo.registering.table import ITEM_TYPES
-from silo.registration import Journal, component_key
 from silo.testing import FakeSilo
 
 CATEGORIES = {"A01": "Assembly", "F01": "Fastener, screw", "M01": "Machined part", "M06": "Machined frame"}

@@ -18,9 +18,9 @@ from silo.bom.findings import Finding
 from silo.bom.model import BomEntry, Extraction
 from silo.durable import stamp_of
 from silo.outbox.report import Sent
+from silo.registering.items import Registration
 from silo.registering.offer import Candidate, Offer, Seen, State
 from silo.registering.orders import Order
-from silo.registration import Registration
 from silo.testing import FakeSilo
 from silo.workbench.commit.desk import Answer, Look
 from silo.workbench.commit.opened import Base

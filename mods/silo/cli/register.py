@@ -25,14 +25,15 @@ from silo.bom.report import base_of
 from silo.cli import common
 from silo.cli.common import Commands
 from silo.cli.register_dialog import Dialog
-from silo.declaring import chosen, modelled
 from silo.files import check_writable
 from silo.open_in_freecad import open_in_any
+from silo.registering.items import Ask, Registration, unclear
+from silo.registering.journal import Journal
+from silo.registering.modelled import chosen, modelled
 from silo.registering.offer import Candidate, Offer, State, offer
-from silo.registering.on_disk import OPEN, Ask, carry_out_on_disk, is_own, seen_on_disk, whole_folder
+from silo.registering.on_disk import OPEN, carry_out_on_disk, is_own, seen_on_disk, whole_folder
 from silo.registering.orders import Order
 from silo.registering.table import Row, doubts, orders_of, read_table, write_table
-from silo.registration import Journal, Registration, unclear
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient

@@ -24,7 +24,7 @@ from silo.bom.paths import relative
 from silo.bom.report import base_of, shorten
 from silo.bom_sync import Outcome, Status
 from silo.cli import common
-from silo.registration import Registration
+from silo.registering.items import Registration
 
 _MARK = {
     Severity.ERROR: ("✗", "bold red"),

@@ -22,9 +22,9 @@ from silo.bom.findings import FindingCode
 from silo.bom.identity import meta_key, walk_entries
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.naming import Proposal, propose, propose_all
-from silo.declaring import modelled
 from silo.files import content_hash
-from silo.registration import component_key
+from silo.registering.items import component_key
+from silo.registering.modelled import modelled
 
 ITEM_TYPES = ("part", "assembly", "consumable", "tool")
 # Servers without a request for many are asked for each; beyond this many nobody reads them in a dialog.
@@ -175,7 +175,7 @@ def offer(
     own_file
         with what is modelled in the assembly's own file.
     begun
-        registrations that were interrupted (:meth:`silo.registration.Journal.pending`): the item that such a
+        registrations that were interrupted (:meth:`Journal.pending`): the item that such a
         one made is no look-alike of the component, it is its own.
     """
     from silo.bom_sync import resolve

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -15,16 +15,16 @@ from silo.bom.naming import Proposal, propose_all
 from silo.bom_sync import resolve
 from silo.fcstd import check_stampable, stamp
 from silo.open_in_freecad import OpenInFreecad, open_in_any
+from silo.registering.items import Ask, Registration, component_key, document_uid, unclear
+from silo.registering.journal import Journal
 from silo.registering.offer import Candidate, Control, Seen, State
 from silo.registering.orders import Order, carry_out
-from silo.registration import Journal, Registration, component_key, document_uid, unclear
 
 if TYPE_CHECKING:
     from silo.api.client import SiloClient
     from silo.vault.plan import Plan
     from silo.vault.reading import Reading
 
-Ask = Callable[[Proposal, Sequence[Mapping[str, Any]]], Mapping[str, Any] | None]
 OPEN = (
     "it is open in FreeCAD, and saving it there would undo the registration. Close it there, or register it "
     "from there (Silo, Register Parts), then run this again; --even-if-open registers it all the same"

@@ -9,17 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 from silo.bom.declare import Modelled
 from silo.bom.errors import SiloError
 from silo.bom.model import BomEntry
 from silo.bom.naming import Proposal, proposed_category
-from silo.declaring import declare
+from silo.registering.items import Registration, RegistrationApi, register, register_standard, unclear
+from silo.registering.journal import Journal
+from silo.registering.modelled import source_identity
 from silo.registering.offer import Candidate, Control, Similar
-from silo.registration import Journal, Registration, RegistrationApi, register, unclear
-from silo.standard_items import register_standard
 
 
 @dataclass(frozen=True)
@@ -120,15 +119,18 @@ class _Run:
     ask: Ask
 
     def one(self, order: Order) -> Registration:
-        candidate = order.candidate
+        candidate = replace(order.candidate, proposal=order.proposal)
         if candidate.entry.is_standard:
             return register_standard(order.proposal, self.api, schema=self.schema)
         if order.existing is not None:
-            return self._join(order, order.existing)
+            return self._join(candidate, order.existing.part_number, order.existing.item_id)
         if candidate.article is not None:
             return self._declare(order, candidate.article)
+        return self._register(order, candidate)
+
+    def _register(self, order: Order, candidate: Candidate) -> Registration:
         return register(
-            order.proposal,
+            candidate.proposal,
             self.api,
             self.journal,
             lambda _entry, identity: self.write(candidate, identity),
@@ -138,34 +140,37 @@ class _Run:
             ask=lambda proposal, found: self.ask(order, proposal, found),
         )
 
-    def _join(self, order: Order, item: Similar) -> Registration:
+    def _join(self, candidate: Candidate, number: str, item_id: str) -> Registration:
         try:
-            self.check(order.candidate)
-            self.write(order.candidate, item.item_id)
+            self.check(candidate)
+            self.write(candidate, item_id)
         except SiloError as error:
-            return Registration(order.proposal, error=error)
-        return Registration(order.proposal, part_number=item.part_number, item_id=item.item_id, found=True)
+            return Registration(candidate.proposal, error=error)
+        return Registration(candidate.proposal, part_number=number, item_id=item_id, found=True)
 
     def _declare(self, order: Order, article: Modelled) -> Registration:
-        """Declare what is modelled in the file; an error of one copy leaves the others as they are."""
+        """Give all objects of an article one identity: of the file it was imported from, else of a new item.
+
+        An error of one copy leaves the others as they are.
+        """
         done = []
         for one in article.apart() if order.apart else (article,):
             entry: BomEntry = replace(one.entry, silo_uuid=None)
             name = f"{order.name} {entry.object_name}" if order.apart else order.name
             proposal = replace(order.proposal, entry=entry, name=name)
             candidate = replace(order.candidate, article=one, proposal=proposal)
-            result = declare(
-                one,
-                proposal,
-                self.api,
-                self.journal,
-                schema=self.schema,
-                ask=lambda of, found: self.ask(order, of, found),
-                check=partial(self.check, candidate),
-                write=partial(self.write, candidate),
-            )
+            result = self._as_imported(candidate, one) or self._register(order, candidate)
             if result.error is not None:
                 return replace(result, proposal=order.proposal)
             done.append(result)
         numbers = ", ".join(str(result.part_number) for result in done)
         return replace(done[0], proposal=order.proposal, part_number=numbers)
+
+    def _as_imported(self, candidate: Candidate, article: Modelled) -> Registration | None:
+        """With the identity of the file that A2plus imported it from; None where Silo has no such item."""
+        try:
+            known = source_identity(article)
+            item = self.api.get_item_by_uuid(known) if known else None
+        except SiloError as error:
+            return Registration(candidate.proposal, error=error)
+        return None if item is None else self._join(candidate, str(item["part_number"]), str(item["id"]))

@@ -11,8 +11,8 @@ import pytest
 from desk import Office
 
 from silo.outbox.store import Store
+from silo.registering.journal import Journal
 from silo.registering.orders import Order
-from silo.registration import Journal
 from silo.workbench.commit.flow import CommitFlow
 from silo.workbench.pane.activity import Do
 from silo.workbench.register.flow import RegisterFlow

@@ -9,8 +9,8 @@ import pytest
 from desk import Document, Office
 
 from silo.bom.errors import ReadOnlyError, SiloError
+from silo.registering.journal import Journal
 from silo.registering.orders import Order
-from silo.registration import Journal
 from silo.workbench.commit.flow import CommitFlow
 from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone
 from silo.workbench.register.flow import RegisterFlow

@@ -12,9 +12,9 @@ from fcstd_writer import Doc, locals_
 from silo.bom.links import extract
 from silo.bom.roots import choose_assembly
 from silo.fcstd import Library, stamp, unstamp
+from silo.registering.journal import Journal
 from silo.registering.offer import Candidate, Seen, State, offer
 from silo.registering.orders import carry_out
-from silo.registration import Journal
 from silo.testing import FakeSilo
 from silo.workbench.register.rows import APART, NEW, EditedRow, choose, heading
 from silo.workbench.session.jobs import Control

@@ -9,9 +9,9 @@ from typing import Any
 
 from silo.api.activity import rules_text
 from silo.bom.errors import SiloError
+from silo.registering.items import Registration
 from silo.registering.offer import Offer
 from silo.registering.orders import Order
-from silo.registration import Registration
 from silo.workbench.gui import widgets
 from silo.workbench.gui.choice_cell import KEY, ChoiceDelegate
 from silo.workbench.gui.qt import QtCore, QtGui, QtWidgets

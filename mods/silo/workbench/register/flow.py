@@ -20,9 +20,10 @@ from typing import Any
 from silo.bom.errors import SiloError
 from silo.bom.identity import walk_entries
 from silo.bom.model import BomEntry, Extraction
+from silo.registering.items import Registration
+from silo.registering.journal import Journal
 from silo.registering.offer import Candidate, next_number, offer
 from silo.registering.orders import Order, carry_out
-from silo.registration import Journal, Registration
 from silo.workbench.commit.flow import CommitFlow
 from silo.workbench.commit.snapshot import Snapshot
 from silo.workbench.register.rows import EditedRow

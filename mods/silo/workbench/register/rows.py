@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+from silo.registering.items import Registration
 from silo.registering.offer import Candidate, Similar, State
 from silo.registering.orders import Order
-from silo.registration import Registration
 from silo.workbench.pane.activity import Tone
 from silo.workbench.words import counted, plain, translate
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from silo.bom.errors import SiloError
+from silo.registering.items import Registration
 from silo.registering.offer import Candidate, Offer, Seen
 from silo.registering.orders import Order
-from silo.registration import Registration
 from silo.workbench.commit.desk import Desk
 from silo.workbench.register.rows import EditedRow
 

@@ -13,7 +13,8 @@ from silo.bom.model import BomEntry, Extraction
 from silo.bom.naming import Proposal, crowded_files
 from silo.bom.walk.standard import standard_uuid
 from silo.bom_sync import resolve
-from silo.standard_items import Memory, by_description, find_items, register_standard
+from silo.registering.items import register_standard
+from silo.standard_items import Memory, by_description, find_items
 from silo.testing import FakeSilo
 
 SCREW = "ISO 4762 M4×16"

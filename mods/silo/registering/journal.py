@@ -8,7 +8,6 @@ must be found again then.
 
 from __future__ import annotations
 
-import json
 import sqlite3
 import time
 import uuid
@@ -64,7 +63,7 @@ class Journal:
     """The user's registrations. Safe to use from several threads and processes.
 
     path
-        the file; a ``.json`` journal of an older version beside it is taken over.
+        the file; by default in the user's data folder.
     """
 
     def __init__(
@@ -151,10 +150,7 @@ class Journal:
         with self._translated(), closing(self._connect(self.path, 20.0)) as db:
             db.execute("PRAGMA synchronous = FULL")
             db.execute("BEGIN IMMEDIATE")
-            if not db.execute("PRAGMA user_version").fetchone()[0]:
-                db.execute(_TABLE)
-                self._take_over(db)
-                db.execute("PRAGMA user_version = 1")
+            db.execute(_TABLE)
             yield db
             db.execute("COMMIT")
 
@@ -162,20 +158,6 @@ class Journal:
         private_folder(path.parent)
         private_file(path)  # before SQLite opens it
         return sqlite3.connect(path, timeout=timeout, isolation_level=None)
-
-    def _take_over(self, db: sqlite3.Connection) -> None:
-        old = self.path.with_suffix(".json")
-        try:
-            known = json.loads(old.read_text(encoding="utf-8"))
-        except FileNotFoundError:
-            return
-        except (OSError, ValueError) as error:
-            raise self._unusable(error, old) from error
-        for component, wanted in known.items() if isinstance(known, dict) else ():
-            db.execute(
-                "REPLACE INTO registrations (component, wanted, item_id, begun_at) VALUES (?, ?, ?, 0)",
-                (str(component), str(wanted), str(wanted)),
-            )
 
     @contextmanager
     def _translated(self) -> Iterator[None]:

@@ -1,23 +1,17 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Declare what is modelled in an assembly's own file a component, and take that back.
-
-:mod:`silo.bom.declare` finds what could be declared; this module reads and writes the files.
-"""
+"""What is modelled in an assembly's own file and can be declared a component, read from the file."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Sequence
 
 from silo.bom.declare import Modelled, modelled_in
 from silo.bom.errors import DocumentError, InputError, SiloError
 from silo.bom.identity import document_identity
-from silo.bom.naming import Proposal
 from silo.bom.roots import choose_assembly
 from silo.fcstd import Library
 from silo.fcstd.objects import FcstdObject
-from silo.registration import Ask, Journal, Registration, RegistrationApi, register
 
 
 def modelled(path: str, assembly: str | None = None) -> list[Modelled]:
@@ -58,43 +52,3 @@ def source_identity(article: Modelled) -> str | None:
             return document_identity(library.open(article.source))
     except SiloError:
         return None
-
-
-def declare(
-    article: Modelled,
-    proposal: Proposal,
-    api: RegistrationApi,
-    journal: Journal,
-    *,
-    schema: str,
-    ask: Ask,
-    check: Callable[[], None],
-    write: Callable[[str], None],
-) -> Registration:
-    """Give all objects of an article one identity: of the file it was imported from, else of a new item.
-
-    check
-        raises DocumentError where the file must not be written now.
-    write
-        writes an identity on all its objects.
-    """
-    try:
-        known = source_identity(article)
-        item = api.get_item_by_uuid(known) if known else None
-        if item is not None:
-            check()
-            write(str(item["id"]))
-            number = str(item["part_number"])
-            return Registration(proposal, part_number=number, item_id=str(item["id"]), found=True)
-    except SiloError as error:
-        return Registration(proposal, error=error)
-    proposal = replace(proposal, entry=replace(proposal.entry, silo_uuid=None), shares_file=True)
-    return register(
-        proposal,
-        api,
-        journal,
-        lambda _entry, identity: write(identity),
-        schema=schema,
-        check=lambda _entry: check(),
-        ask=ask,
-    )

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import multiprocessing
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -31,7 +30,8 @@ from silo.bom.errors import (
 from silo.bom.model import BomEntry
 from silo.bom.naming import propose
 from silo.fcstd import Library, stamp
-from silo.registration import REGISTRATION_PROPERTY, Journal, component_key, register
+from silo.registering.items import REGISTRATION_PROPERTY, component_key, register
+from silo.registering.journal import Journal
 
 ENTRY = BomEntry(doc_path="/v/bracket.FCStd", object_name="Body", document_label="Bracket")
 PROPOSAL = propose(ENTRY, {"A01": "Mechanical assembly", "M01": "Machined parts"})
@@ -169,25 +169,11 @@ def test_a_server_that_does_not_answer_leaves_only_the_intent(journal: Journal) 
 
 
 def test_a_damaged_journal_is_not_taken_for_an_empty_one(journal: Journal) -> None:
-    """It would otherwise make second items; neither the file itself nor one of an older version."""
+    """It would otherwise make second items."""
     journal.path.parent.mkdir(parents=True)
     journal.path.write_bytes(b"no database" * 100)
     with pytest.raises(InputError, match="cannot be read"):
         journal.pending()
-    journal.path.unlink()
-    journal.path.with_suffix(".json").write_text('{"half', encoding="utf-8")
-    for _ in range(2):
-        with pytest.raises(InputError, match=r"registrations\.json.*cannot be read"):
-            journal.pending()
-
-
-def test_the_journal_of_an_older_version_is_taken_over(journal: Journal) -> None:
-    """Its unfinished registrations are found again, once."""
-    journal.path.parent.mkdir(parents=True)
-    journal.path.with_suffix(".json").write_text(json.dumps({component_key(ENTRY): "u-1"}), encoding="utf-8")
-    assert journal.pending() == {component_key(ENTRY): "u-1"}
-    journal.done(component_key(ENTRY))
-    assert Journal(journal.path).pending() == {}
 
 
 # -- lost and odd answers --------------------------------------------------------------------------

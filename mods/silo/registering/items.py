@@ -28,16 +28,8 @@ from silo.bom.errors import (
 )
 from silo.bom.model import BomEntry
 from silo.bom.naming import Proposal
-from silo.registration_journal import Journal, Record
-
-__all__ = [
-    "REGISTRATION_PROPERTY",
-    "Journal",
-    "Registration",
-    "RegistrationApi",
-    "component_key",
-    "register",
-]
+from silo.registering.journal import Journal, Record
+from silo.standard_items import Memory, by_description, server_of
 
 # Servers that give UUIDs of their own still keep properties: this one finds an item made before a crash.
 REGISTRATION_PROPERTY = "registration_id"
@@ -282,3 +274,33 @@ def _time(value: Any) -> float | None:
     except ValueError:
         return None
     return (made if made.tzinfo else made.replace(tzinfo=UTC)).timestamp()
+
+
+def register_standard(
+    proposal: Proposal, api: RegistrationApi, *, schema: str, memory: Memory | None = None
+) -> Registration:
+    """Register a standard part: join the item that the server has, else make one. No file is written.
+
+    A repeat is harmless: the derived UUID is the key of the request.
+    """
+    entry = proposal.entry
+    uuid, designation = entry.silo_uuid or "", entry.standard or ""
+    memory = memory or Memory()
+    try:
+        item = api.get_item_by_uuid(uuid) or by_description(designation, api)
+        found = item is not None
+        if item is None:
+            item = api.create_item(
+                schema,
+                proposal.category,
+                designation,
+                item_type=proposal.item_type,
+                properties={"standard": designation},
+                idempotency_key=uuid,
+            )
+        item_id = str(item["id"])
+        if item_id.lower() != uuid.lower():
+            memory.remember(server_of(api), {uuid: item_id})
+    except SiloError as error:
+        return Registration(proposal, error=error)
+    return Registration(proposal, part_number=str(item["part_number"]), item_id=item_id, found=found)
