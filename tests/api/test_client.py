@@ -10,7 +10,6 @@ from uuid import uuid4
 import pytest
 
 from silo.api.client import SiloClient
-from silo.api.items import categories_of
 from silo.api.wire import MergeEntry, MergeRequest
 from silo.bom.errors import (
     InputError,
@@ -20,6 +19,7 @@ from silo.bom.errors import (
     ServerFaultError,
     UnreachableError,
 )
+from silo.bom.naming import categories_of
 
 UUIDS = [str(uuid4()) for _ in range(2000)]
 
@@ -107,6 +107,20 @@ def test_without_that_request_each_component_is_searched_for(
         (likes,) = client.find_look_alikes([("Lid", "")]).values()
         assert [(one.id, one.same_file) for one in likes] == [(UUIDS[0], False)]
     assert len(server.paths("POST")) == 1
+
+
+@pytest.mark.parametrize("written", ["{}", "sha256:{}"])
+def test_the_same_file_is_seen_however_the_server_writes_its_hash(
+    server: Any, client: SiloClient, answer: Any, written: str
+) -> None:
+    """In capitals, or with the kind of the hash before it; without that, a second item is made for it."""
+    digest = "ab" * 32
+    server.on("POST /api/items/look-alikes", route_missing(answer))
+    server.on("GET /api/items/search", [item(UUIDS[0], "Cover")])
+    revision = {"revision_number": 1, "file_checksum": written.format(digest.upper())}
+    server.on(f"GET /api/items/P-{UUIDS[0][:8]}/revisions", [revision])
+    (likes,) = client.find_look_alikes([("Lid", digest)]).values()
+    assert [(one.id, one.same_file) for one in likes] == [(UUIDS[0], True)]
 
 
 def test_the_boms_of_many_items_cost_one_request_or_one_each(

@@ -9,19 +9,20 @@ from typing import Any
 
 import pytest
 
-from silo.api.items import categories_of, rules_of
 from silo.bom.errors import ConfigError, InputError
 from silo.bom.model import BomEntry
 from silo.bom.naming import (
     Categories,
     Rule,
     assembly_categories,
+    categories_of,
     clean_name,
     crowded_files,
     display_name,
     propose,
     proposed_category,
     proposed_name,
+    rules_of,
 )
 from silo_server.schema.catalog import RULES, category_rules, describe, find_schema
 

@@ -16,7 +16,7 @@ from sqlalchemy import delete, insert, inspect, select, text
 from sqlalchemy.exc import IntegrityError
 
 from silo.bom.errors import ConfigError
-from silo_server.__main__ import main
+from silo.cli.main import main
 from silo_server.bootstrap import prepare
 from silo_server.db.engine import Database
 from silo_server.db.migrate import alembic_config, newest_revision, upgrade
@@ -257,7 +257,7 @@ def test_a_database_of_a_newer_version_is_one_sentence(
     """Which schema it has, which one this version knows, what to do; and the database stays as it is."""
     upgrade(released)
     upgrade(released, more=_revision_file(tmp_path, REBUILD))
-    assert main(["--port", "0", "--database", released.settings.database_url]) == 2
+    assert main(["serve", "--port", "0", "--database", released.settings.database_url]) == 2
     told = capsys.readouterr().err
     assert told.count("\n") == 1
     assert "schema 9001 of a newer silo-mod" in told

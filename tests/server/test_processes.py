@@ -12,7 +12,7 @@ import pytest
 from server_testing import Api, Databases, ServerProcess, wait_until
 
 from silo.bom.errors import ConfigError
-from silo_server.__main__ import main
+from silo.cli.main import main
 from silo_server.run import is_loopback, running_server, serve
 from silo_server.settings import Settings
 
@@ -150,9 +150,9 @@ def test_what_cannot_be_served_is_one_plain_sentence(
     url = f"sqlite:///{tmp_path / 'x.db'}"
     with running_server(url, token=TOKEN, files_dir=tmp_path) as running:
         port = running.base_url.rpartition(":")[2]
-        assert main(["--port", port, "--database", url]) == 2
+        assert main(["serve", "--port", port, "--database", url]) == 2
     assert "cannot listen" in capsys.readouterr().err
-    assert main(["--database", "sqlite://"]) == 2
+    assert main(["serve", "--database", "sqlite://"]) == 2
     assert "sqlite:///path" in capsys.readouterr().err
     with pytest.raises(ConfigError, match="workers"):
         serve(database_url=url, workers=0)

@@ -21,7 +21,7 @@ from silo.api.boms import BomCalls
 from silo.api.caller import Abilities, load_abilities, save_abilities
 from silo.api.events import SILENCE, HttpEventStream, open_stream
 from silo.api.files import Origin, Progress
-from silo.api.look_alikes import LookAlikeCalls
+from silo.api.items import ItemCalls
 from silo.api.policy import Retries
 from silo.api.sse import ServerEvent
 from silo.api.transport import Call, Cancel, Timeouts, Transport, stop_if
@@ -29,7 +29,7 @@ from silo.api.wire import MergeRequest, MergeResult, Revision, ServerState, User
 from silo.bom.errors import SiloError
 
 
-class SiloClient(LookAlikeCalls, BomCalls):
+class SiloClient(ItemCalls, BomCalls):
     """A Silo server.
 
     base_url

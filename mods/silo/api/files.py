@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any, BinaryIO, Self
 from urllib.parse import urljoin
 
-from silo.api.caller import LISTS
-from silo.api.items import ItemCalls
+from silo.api.caller import LISTS, Caller
 from silo.api.replies import error_of
+from silo.api.revisions import checksum_of
 from silo.api.transport import MAX_ERROR, Call, Cancel, Transport, as_json, stop_if
 from silo.api.wire import LinkedFile, Revision, Wire
 from silo.bom.errors import (
@@ -44,7 +44,7 @@ class Origin(Wire):
     links: list[LinkedFile] | None = None
 
 
-class FileCalls(ItemCalls):
+class FileCalls(Caller):
     """Revisions of items, and their files."""
 
     def revisions(self, part_number: str, /, *, newest: int | None = None, after: int = 0) -> list[Revision]:
@@ -69,32 +69,7 @@ class FileCalls(ItemCalls):
     def get_revision(self, part_number: str, number: int, /) -> Revision:
         """One revision, with the files that its file links to."""
         subject = f"revision {number} of {part_number}"
-        return self._get(subject, *_revision(part_number, number)).model(Revision)
-
-    def get_properties(self, part_number: str, /) -> dict[str, Any]:
-        """All properties of an item, from its newest revision where the item's own answer carries none.
-
-        Raises :class:`silo.bom.errors.ServerFaultError` where they cannot be read: no answer is not "none".
-        """
-        item = self.get_item(part_number)
-        if item.properties:
-            return dict(item.properties)
-        try:
-            newest = next(iter(self.revisions(part_number, newest=1)), None)
-        except RouteMissingError:
-            newest = None
-        if newest is None and ("properties" in item.model_fields_set or not item.current_revision):
-            return {}
-        number = newest.revision_number if newest is not None else item.current_revision
-        if newest is not None and "properties" in newest.model_fields_set:
-            return dict(newest.properties)
-        asked = self._get(f"revision {number} of {part_number}", *_revision(part_number, number)).mapping()
-        if "properties" not in asked or not isinstance(asked["properties"], dict | None):
-            raise ServerFaultError(
-                f"{self._address.host} does not show the properties of {part_number}; nothing was written: "
-                "it would replace properties that are not known here"
-            )
-        return dict(asked["properties"] or {})
+        return self._get(subject, "items", part_number, "revisions", str(number)).model(Revision)
 
     def upload_file(
         self,
@@ -135,8 +110,7 @@ class FileCalls(ItemCalls):
                     raise
                 about = {"comment": comment, **({"properties": dict(properties)} if properties else {})}
                 revision, sent = _in_two_steps(self._transport, call, path, name, about, on_progress)
-        stored = (revision.file_checksum or sent).lower().removeprefix("sha256:")
-        if stored != sent:
+        if (checksum_of(revision) or sent) != sent:
             # Sending it again by itself would make a revision each time.
             raise ConflictError(
                 f"{self._address.host} stored another content than was sent for {subject} "
@@ -174,10 +148,6 @@ class FileCalls(ItemCalls):
                 raise error_of(transport.reply(response, replace(call, max_bytes=MAX_ERROR, endless=False)))
             total = whole_number(response.headers.get("Content-Length", "")) or 0
             return _write(Path(path), transport.pieces(response, call), total, on_progress)
-
-
-def _revision(part_number: str, number: int) -> tuple[str, ...]:
-    return ("items", part_number, "revisions", str(number))
 
 
 def _upload_fields(

@@ -3,16 +3,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 from uuid import UUID
 
 from pydantic import Field
 
-from silo.api.caller import LISTS, Caller, Params, body
+from silo.api.caller import LISTS, Params, body
 from silo.api.failures import translated
+from silo.api.files import FileCalls
 from silo.api.replies import Reply, WebPageError
+from silo.api.revisions import checksum_of
 from silo.api.transport import Cancel
 from silo.api.wire import Answer, Item, Wire
 from silo.bom.errors import (
@@ -23,7 +24,8 @@ from silo.bom.errors import (
     ServerFaultError,
     SiloError,
 )
-from silo.bom.naming import Categories, Rule
+from silo.bom.naming import Categories, categories_of, name_key, rules_of, schema_names
+from silo.files import bare_checksum
 
 
 class UuidsBody(Wire):
@@ -76,7 +78,28 @@ class NumberAnswer(Answer):
     part_number: str
 
 
-class ItemCalls(Caller):
+class LookAlikesBody(Wire):
+    """``POST /api/items/look-alikes``: the name of each component, and the hash of its file ("": none)."""
+
+    wanted: list[dict[str, str]]
+
+
+class LookAlike(Answer):
+    """An item that a component may be already. A suggestion only."""
+
+    id: str
+    part_number: str
+    name: str = ""
+    same_file: bool = False
+
+
+class LookAlikesAnswer(Answer):
+    """For each component, in the order asked, what it may be: the items with its very file first."""
+
+    look_alikes: list[list[LookAlike]]
+
+
+class ItemCalls(FileCalls):
     """Finding and making items."""
 
     _is_silo: bool | None = None
@@ -208,6 +231,32 @@ class ItemCalls(Caller):
         with translated(reply.where):
             return Item.model_validate(said)
 
+    def get_properties(self, part_number: str, /) -> dict[str, Any]:
+        """All properties of an item, from its newest revision where the item's own answer carries none.
+
+        Raises :class:`silo.bom.errors.ServerFaultError` where they cannot be read: no answer is not "none".
+        """
+        item = self.get_item(part_number)
+        if item.properties:
+            return dict(item.properties)
+        try:
+            newest = next(iter(self.revisions(part_number, newest=1)), None)
+        except RouteMissingError:
+            newest = None
+        if newest is None and ("properties" in item.model_fields_set or not item.current_revision):
+            return {}
+        number = newest.revision_number if newest is not None else item.current_revision
+        if newest is not None and "properties" in newest.model_fields_set:
+            return dict(newest.properties)
+        subject = f"revision {number} of {part_number}"
+        asked = self._get(subject, "items", part_number, "revisions", str(number)).mapping()
+        if "properties" not in asked or not isinstance(asked["properties"], dict | None):
+            raise ServerFaultError(
+                f"{self._address.host} does not show the properties of {part_number}; nothing was written: "
+                "it would replace properties that are not known here"
+            )
+        return dict(asked["properties"] or {})
+
     def update_item(self, part_number: str, /, **changes: Any) -> Item:
         """Change fields of an item (those of :class:`ItemChanges`).
 
@@ -269,6 +318,42 @@ class ItemCalls(Caller):
         problem = schema.get("category_rules_problem")
         return Categories(categories_of(schema), rules_of(schema), str(problem or ""))
 
+    def find_look_alikes(
+        self, wanted: Iterable[tuple[str, str]], /, *, cancelled: Cancel | None = None
+    ) -> dict[tuple[str, str], list[LookAlike]]:
+        """The items that have a component's name or its file, by (name, SHA-256 of the file or "").
+
+        One request per 1000 where the server offers that, else searches for each.
+        """
+
+        def batch(some: Sequence[tuple[str, str]]) -> dict[tuple[str, str], list[LookAlike]]:
+            asked = LookAlikesBody(wanted=[{"name": name, "sha256": digest} for name, digest in some])
+            subject = f"items like {len(some)} components"
+            reply = self._ask(subject, "items", "look-alikes", body=asked, cancelled=cancelled)
+            answer = reply.model(LookAlikesAnswer).look_alikes
+            if len(answer) != len(some):
+                raise ServerFaultError(f"wanted {len(some)} lists of look-alikes, got {len(answer)}")
+            return dict(zip(some, answer, strict=True))
+
+        return self._many("look_alikes", wanted, batch, self._look_alikes, cancelled)
+
+    def _look_alikes(self, wanted: tuple[str, str]) -> list[LookAlike]:
+        name, digest = wanted
+        # A server that does not search by content finds nothing; what has the name is compared all the same.
+        with_file = self.search_items(digest, limit=4) if digest else []
+        found = []
+        for item in {one.id: one for one in (*with_file, *self.search_items(name, limit=8))}.values():
+            same_file = bool(digest) and digest in self._checksums(item)
+            if same_file or name_key(item.name) == name_key(name):
+                found.append(
+                    LookAlike(id=item.id, part_number=item.part_number, name=item.name, same_file=same_file)
+                )
+        return sorted(found, key=lambda one: not one.same_file)
+
+    def _checksums(self, item: Item) -> set[str]:
+        known = map(checksum_of, self.revisions(item.part_number))
+        return {bare_checksum(str(item.properties.get("file_sha256", ""))), *known}
+
 
 def _written(uuid: str) -> str:
     # CAD files hold identities in capitals, in braces, without dashes; the server answers with its own form.
@@ -284,63 +369,3 @@ def is_uuid(text: str | None) -> bool:
         return text is not None and str(UUID(text)) == text.lower()
     except ValueError:
         return False
-
-
-def categories_of(schema: Mapping[str, Any]) -> dict[str, str]:
-    """The categories of a schema: ``{"F01": "Screws and Bolts"}``, in the schema's own order.
-
-    Accepts ``categories`` or the ``category`` segment's ``values``, each as a mapping code → text or as a
-    list of objects or bare codes. An unknown form gives an empty mapping.
-    """
-    direct = schema.get("categories")
-    if direct:
-        return dict(_read(direct))
-    for segment in _segments(schema.get("segments")):
-        if segment.get("name") == "category":
-            return dict(_read(segment.get("values") or segment.get("options")))
-    return {}
-
-
-def schema_names(said: Any) -> list[str]:
-    """The names in a list of schemas: objects or bare names, bare or under ``schemas``, or by name."""
-    if isinstance(said, Mapping):
-        said = said.get("schemas", said.get("items", said.get("data", said)))
-    if isinstance(said, Mapping):
-        return [str(name) for name, body in said.items() if isinstance(body, Mapping)]
-    names = [body.get("name") if isinstance(body, Mapping) else body for body in said or ()]
-    return list(dict.fromkeys(name for name in names if isinstance(name, str) and name))
-
-
-def _segments(value: Any) -> Iterator[Mapping[str, Any]]:
-    if isinstance(value, Mapping):
-        yield from ({"name": name, **body} for name, body in value.items() if isinstance(body, Mapping))
-    elif isinstance(value, list):
-        yield from (body for body in value if isinstance(body, Mapping))
-
-
-def _read(values: Any) -> Iterator[tuple[str, str]]:
-    if isinstance(values, Mapping):
-        pairs = [(code, body) for code, body in values.items()]
-    elif isinstance(values, list):
-        pairs = [(body, body) if isinstance(body, str) else (None, body) for body in values]
-    else:
-        return
-    for code, text in pairs:
-        if isinstance(text, Mapping):
-            code = code or text.get("code") or text.get("value")
-            text = text.get("description") or text.get("name") or text.get("label") or ""
-        if code:
-            yield str(code), str(text) if text != code else ""
-
-
-def rules_of(schema: Mapping[str, Any]) -> tuple[Rule, ...]:
-    """The site's rules for categories (``category_rules``); a rule that cannot be read is left out.
-
-    They only propose, so that a server with other rules, or none, costs a question and no more.
-    """
-    found = []
-    raw = schema.get("category_rules")
-    for one in raw if isinstance(raw, list) else ():
-        with suppress(InputError):
-            found.append(Rule.read(one))
-    return tuple(found)

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 from urllib.parse import quote
 from xml.etree import ElementTree
 
-from silo.api.activity import activity_text
+from silo.activity import activity_text
 from silo.batch import source_document
 from silo.bom.errors import DocumentError, Exit, InputError, ServerFaultError
 from silo.bom.model import Extraction

@@ -183,7 +183,7 @@ def _offer(extraction: Extraction, client: SiloClient, schema: str, args: argpar
 
 def _tell_rules(categories: Mapping[str, str]) -> None:
     """A mistake in the site's rules costs proposals, no more; it is said on stderr."""
-    from silo.api.activity import rules_text
+    from silo.activity import rules_text
     from silo.cli.show import plain
 
     if problem := getattr(categories, "problem", ""):

@@ -7,13 +7,12 @@ import argparse
 import importlib.util
 import json
 import queue
-import signal
 import sys
 from contextlib import suppress
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
-from silo.api.activity import activity_text
+from silo.activity import activity_text
 from silo.bom.errors import AuthError, ConfigError, Exit, NotFoundError, RouteMissingError
 from silo.cli import common
 from silo.cli.common import Commands
@@ -74,7 +73,6 @@ def run_serve(args: argparse.Namespace) -> int:
         # Whoever reads the output of a pipe waits for the address, and the server never ends by itself.
         print(text, flush=True)
 
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     with suppress(KeyboardInterrupt):
         serve(
             args.host, args.port, args.database, workers=args.workers, reset_admin=args.reset_admin, tell=tell

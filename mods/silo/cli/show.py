@@ -14,7 +14,7 @@ from rich.table import Table
 from rich.text import Text
 from rich.tree import Tree
 
-from silo.api.activity import ActivityText
+from silo.activity import ActivityText
 from silo.api.merging import unusual
 from silo.bom.declare import Modelled
 from silo.bom.findings import Finding, Severity

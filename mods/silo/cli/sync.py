@@ -5,12 +5,11 @@ from __future__ import annotations
 
 import argparse
 import os
-import signal
 import sys
 import threading
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -92,7 +91,6 @@ def run(args: argparse.Namespace) -> int:
     summary = Summary(base)
     stop = threading.Event()
     with ExitStack() as stack:
-        stack.enter_context(_terminated())
         for folder in {os.path.realpath(folder): folder for folder in folders}.values():
             summary.notes += filter(None, [stack.enter_context(only_job(folder))])
         client = stack.enter_context(
@@ -115,24 +113,6 @@ def run(args: argparse.Namespace) -> int:
     for trouble in filter(None, (report.trouble for report in reports)):
         print(f"silo-mod: {trouble}", file=sys.stderr)
     return summary.exit_code or int(any(report.trouble for report in reports))
-
-
-@contextmanager
-def _terminated() -> Iterator[None]:
-    """SIGTERM, by which services are stopped, ends the run as Ctrl-C does: with its report."""
-
-    def stop(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    try:
-        before = signal.signal(signal.SIGTERM, stop)
-    except ValueError:  # not in the main thread; whoever runs us there stops us in another way
-        yield
-        return
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
 
 
 def _results(

@@ -18,8 +18,7 @@ from uuid import UUID, uuid4
 from silo.api.boms import LineBody
 from silo.api.caller import body
 from silo.api.files import Origin, Progress
-from silo.api.items import ItemBody, ItemChanges
-from silo.api.look_alikes import LookAlike
+from silo.api.items import ItemBody, ItemChanges, LookAlike
 from silo.api.merging import result_of
 from silo.api.sse import MERGE, STATE
 from silo.api.transport import Cancel, stop_if

@@ -29,7 +29,17 @@ class ServerProcess:
     def __init__(
         self, database_url: str, files_dir: Path, token: str, *, workers: int = 1, **settings: str
     ) -> None:
-        command = [sys.executable, "-P", "-m", "silo_server", "--port", "0", "--database", database_url]
+        command = [
+            sys.executable,
+            "-P",
+            "-m",
+            "silo.cli.main",
+            "serve",
+            "--port",
+            "0",
+            "--database",
+            database_url,
+        ]
         process = subprocess.Popen(
             [*command, "--workers", str(workers)],
             env={**os.environ, **_environ(files_dir, token, settings)},

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from silo.api.activity import counts_text, english
+from silo.activity import counts_text, english
 from silo.api.merging import NOT_ATOMIC
 from silo.api.sse import ServerEvent
 from silo.api.wire import MergeDiff, MergeWarning

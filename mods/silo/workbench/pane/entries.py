@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from datetime import datetime
 from typing import Any
 
-from silo.api.activity import Count, count_texts, headline, no_changes, unregistered_text
+from silo.activity import Count, count_texts, headline, no_changes, unregistered_text
 from silo.api.merging import unusual
 from silo.api.sse import MERGE, RESET, ServerEvent
 from silo.api.wire import MergeDiff, MergeEvent, MergeWarning

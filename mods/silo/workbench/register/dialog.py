@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from silo.api.activity import rules_text
+from silo.activity import rules_text
 from silo.bom.errors import SiloError
 from silo.registering.items import Registration
 from silo.registering.offer import Offer

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from silo.api.activity import activity_text, counts_text, unregistered_text
+from silo.activity import activity_text, counts_text, unregistered_text
 from silo.api.wire import MergeDiff, MergeResult
 
 LINE = {"part_number": "P", "quantity": 1}
