@@ -11,7 +11,6 @@ The file is TOML, readable by its owner only::
 
 from __future__ import annotations
 
-import difflib
 import json
 import logging
 import os
@@ -24,7 +23,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from silo.api.address import ServerAddress
-from silo.bom.errors import ConfigError, InputError
+from silo.bom.errors import ConfigError, InputError, did_you_mean
 from silo.bom.numbers import yes_or_no
 from silo.durable import replacing
 from silo.folders import config_folder
@@ -133,14 +132,14 @@ def checked_config(path: Path) -> dict[str, Any]:
     problems = []
     for name, value in config.items():
         if name != "server":
-            inside = "; it belongs below [server]" if name in _KEYS else _meant(name, ("server",), "[{}]")
+            inside = "; it belongs below [server]" if name in _KEYS else _meant(f"[{name}]", ("[server]",))
             what = f"unknown table [{name}]" if isinstance(value, dict) else f"unknown key {name}"
             problems.append(f"line {_line(path, name)}: {what}{inside}")
         elif not isinstance(value, dict):
             problems.append(f"line {_line(path, name)}: wanted a table [server], got {value!r}")
         else:
             problems += [
-                f"line {_line(path, key)}: unknown key {key} in [server]{_meant(key, _KEYS, '{}')}"
+                f"line {_line(path, key)}: unknown key {key} in [server]{_meant(key, _KEYS)}"
                 for key in value
                 if key not in _KEYS
             ]
@@ -149,9 +148,8 @@ def checked_config(path: Path) -> dict[str, Any]:
     return config
 
 
-def _meant(name: str, known: Sequence[str], form: str) -> str:
-    near = difflib.get_close_matches(name.lower(), known, 1)
-    return f"; did you mean {form.format(near[0])}?" if near else f" (known: {', '.join(known)})"
+def _meant(name: str, known: Sequence[str]) -> str:
+    return did_you_mean(name.lower(), known) or f" (known: {', '.join(known)})"
 
 
 def _line(path: Path, name: str) -> int:

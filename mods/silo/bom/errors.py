@@ -30,7 +30,8 @@ A message says what was wanted, what was got, where, and what to do.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import difflib
+from collections.abc import Iterable, Mapping, Sequence
 from enum import IntEnum
 from typing import Any, ClassVar
 
@@ -50,6 +51,12 @@ def exit_of(error: BaseException) -> Exit:
     if isinstance(error, KeyboardInterrupt | CancelledError):
         return Exit.CANCELLED
     return Exit.REMOTE if isinstance(error, RemoteError | ConflictError) else Exit.BAD_INPUT
+
+
+def did_you_mean(given: str, known: Iterable[str]) -> str:
+    """The end of a sentence about an unknown name: the known ones that look like it; "" where none does."""
+    near = difflib.get_close_matches(given, list(known), 2, 0.7)
+    return f"; did you mean {' or '.join(near)}?" if near else ""
 
 
 class SiloError(Exception):

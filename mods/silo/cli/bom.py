@@ -4,13 +4,12 @@
 from __future__ import annotations
 
 import argparse
-import difflib
 import os
 from collections.abc import Mapping
 from dataclasses import replace
 
 from silo.batch import ask_for_moved
-from silo.bom.errors import DocumentError, Exit, InputError, SiloError
+from silo.bom.errors import DocumentError, Exit, InputError, SiloError, did_you_mean
 from silo.bom.identity import walk_entries
 from silo.bom.model import BomEntry, Extraction
 from silo.bom.paths import relative
@@ -178,40 +177,29 @@ def run_where_used(args: argparse.Namespace) -> int:
             for used in answer.known.links:
                 users.setdefault(used, set()).add(top)
     if part not in users and not os.path.lexists(part):
-        known = {relative(one, base): one for one in (*tops, *users)}
-        near = difflib.get_close_matches(relative(part, base), known, 2, 0.75)
-        meant = f"; did you mean {' or '.join(near)}?" if near else "."
+        known = {relative(one, base) for one in (*tops, *users)}
+        meant = did_you_mean(relative(part, base), sorted(known)) or "."
         raise InputError(f"{args.part}: there is no such file, and none in {args.vault} links to one{meant}")
-    direct = sorted(users.get(part, ()))
     above = _above(part, users)
-    roots = sorted(top for top in above if not users.get(top))
+    found = {
+        "direct": users.get(part, ()),
+        "all": above,
+        "tops": [top for top in above if not users.get(top)],
+        "unreadable": unread,
+    }
+    said = {name: [relative(path, base) for path in sorted(paths)] for name, paths in found.items()}
     if args.json:
-        common.print_json(
-            {
-                "part": relative(part, base),
-                "direct": [relative(one, base) for one in direct],
-                "all": [relative(one, base) for one in sorted(above)],
-                "tops": [relative(one, base) for one in roots],
-                "unreadable": [relative(one, base) for one in unread],
-            }
-        )
+        common.print_json({"part": relative(part, base), **said})
         return Exit.UNDONE if unread else Exit.DONE
     from silo.cli import show
 
     out = show.console()
-    for one in direct:
-        out.print(show.plain(relative(one, base)), markup=False)
-    if not direct:
-        out.print(f"No file of {show.plain(args.vault)} links to it.", markup=False)
-    elif roots:
-        out.print(
-            f"Tops that a change touches: {', '.join(show.plain(relative(one, base)) for one in roots)}"
-        )
-    for one in unread:
-        out.print(
-            f"✗ {show.plain(relative(one, base))} could not be read, so its links are not known.",
-            markup=False,
-        )
+    lines = said["direct"] or [f"No file of {args.vault} links to it."]
+    if said["tops"]:
+        lines.append(f"Tops that a change touches: {', '.join(said['tops'])}")
+    lines += [f"✗ {path} could not be read, so its links are not known." for path in said["unreadable"]]
+    for line in lines:
+        out.print(show.plain(line), markup=False)
     return Exit.UNDONE if unread else Exit.DONE
 
 
