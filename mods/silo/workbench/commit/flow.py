@@ -180,37 +180,36 @@ class CommitFlow:
     def sync_only(self, doc: Any, *, by_fork: bool = False) -> None:
         """Sync the BOM of a document whose file is committed already: its parts were registered, or a
         question about them was answered. ``by_fork``: a fork's ``Origin_Commit`` did it, in its own way."""
-        from silo.files import sha256_of  # late: FreeCAD's start waits for this module
-
-        base, documents = self._desk.documents.base(doc), self._desk.documents
         try:
             taken = self.snapshot(doc)
-            if not (taken.identity and taken.is_assembly):
+            commit = self._commit_of(taken, new_key()) if taken.identity and taken.is_assembly else None
+            if commit is None:
                 return
-            edited = is_edited(documents, doc)
-            if not by_fork and (edited or base.replaced):
-                told = translate("Silo", "Its BOM was not synced: it is not as it was committed. Commit it.")
-                raise DocumentError(taken.path, told)
-            content = "" if by_fork else sha256_of(taken.path)
+            if not by_fork:
+                commit = self.made_from(commit, doc)
+                if not commit.sha256:
+                    told = translate(
+                        "Silo", "Its BOM was not synced: it is not as it was committed. Commit it."
+                    )
+                    raise DocumentError(taken.path, told)
         except SiloError as error:
             self._tell_error(str(doc.Label), str(error))
-            return
-        row = Row(doc, taken.path, taken.label, State.SAVED)
-        made = Taken(row, taken, new_key(), base=None if by_fork else base)
-        self._keep(made, "", with_file=False, content=content)
+        else:
+            # A BOM alone changes nothing about what the document was made from.
+            self._session.keep(commit, failed=lambda error: self._tell_error(taken.label, str(error)))
 
     def made_from(self, commit: Commit, doc: Any) -> Commit:
-        """A commit of a BOM as it is shown, with what its document was made from: it must not undo the BOM of
-        a colleague's newer file. ``doc``: None where the file is not open."""
+        """The commit of a BOM alone, with what its document was made from: it must not undo the BOM of a
+        colleague's newer file. ``doc``: None where the file is not open."""
         from silo.files import sha256_of  # late: FreeCAD's start waits for this module
 
         if doc is None:
             return replace(commit, sha256=sha256_of(commit.path))
         documents = self._desk.documents
         base = documents.base(doc)
-        as_saved = not documents.is_modified(doc) and not base.replaced
+        as_saved = not is_edited(documents, doc) and not base.replaced
         content = sha256_of(commit.path) if as_saved else ""
-        return replace(commit, origin=base.origin or UNKNOWN, sha256=content)
+        return replace(commit, origin=base.settle(self._session.outbox), sha256=content)
 
     def send(self, doc: Any, comment: str) -> None:
         """Send a document that has just been saved, as it is."""
@@ -244,33 +243,33 @@ class CommitFlow:
         else:
             self._keep(taken, comment)
 
-    def _keep(self, taken: Taken, comment: str, *, with_file: bool = True, content: str = "") -> None:
-        """``content``: the SHA-256 of a file that is committed already, so that only the BOM goes."""
+    def _keep(self, taken: Taken, comment: str) -> None:
         if taken.snapshot is None:
             return
-        if taken.row.is_top and with_file:
+        row, base = taken.row, taken.base
+        if row.is_top:
             self._asked_for.add(taken.key)
-        commit = commit_of(
-            taken.snapshot,
-            key=taken.key,
+        commit = self._commit_of(taken.snapshot, taken.key, comment, taken.held or Path(row.path))
+        if commit is None:
+            return
+        commit = replace(commit, stamp=taken.stamp)
+        if base is not None and not row.is_new:
+            commit = replace(commit, origin=base.origin or UNKNOWN)
+        if newer := row.on_top:
+            commit = replace(commit, on_top_of=seen(newer), comment=on_top(comment, newer))
+        self._session.keep(commit, failed=lambda error: self._tell_error(row.label, str(error)), base=base)
+
+    def _commit_of(
+        self, taken: Snapshot, key: str, comment: str = "", file: Path | None = None
+    ) -> Commit | None:
+        return commit_of(
+            taken,
+            key=key,
             comment=comment,
-            file=(taken.held or Path(taken.row.path)) if with_file else None,
+            file=file,
             sync_bom=self._preferences.flag("SyncBom"),
             allow_missing=self._preferences.text("MissingLinks") == ALLOW,
         )
-        if commit is None:
-            return
-        commit = replace(commit, stamp=taken.stamp, sha256=content)
-        base = taken.base
-        if base is not None and not taken.row.is_new:
-            commit = replace(commit, origin=base.origin or UNKNOWN)
-        if newer := taken.row.on_top:
-            said = on_top(comment, newer)
-            commit = replace(commit, on_top_of=seen(newer), comment=said)
-        label = taken.row.label
-        # What only a BOM was sent of is made from what it was made from before.
-        made = base if with_file else None
-        self._session.keep(commit, failed=lambda error: self._tell_error(label, str(error)), base=made)
 
     def _tell_error(self, label: str, text: str) -> None:
         self._session.add(
