@@ -138,6 +138,18 @@ def test_the_boms_of_many_items_cost_one_request_or_one_each(
     assert len(server.paths("POST")) == 2, "the missing route is asked for once only"
 
 
+def test_the_bom_of_another_item_is_no_answer(server: Any, client: SiloClient) -> None:
+    """From a proxy's cache, say: it would be compared with the wrong assembly."""
+    line = {"child_part_number": "C", "quantity": 2, "parent_part_number": "a01-0001"}
+    server.on("GET /api/items/A01-0001/bom", [line])
+    server.on("GET /api/items/A01-0002/bom", [line])
+    server.on("POST /api/items/boms", {"boms": {"A01-0001": [line], "A01-0002": [line]}})
+    assert len(client.get_bom("A01-0001")) == 1
+    for ask in (client.get_bom, lambda number: client.get_boms(["A01-0001", number])):
+        with pytest.raises(ServerFaultError, match="A01-0002: the server answered with that of a01-0001"):
+            ask("A01-0002")
+
+
 def test_one_malformed_identity_does_not_spoil_the_others(
     server: Any, client: SiloClient, answer: Any
 ) -> None:
@@ -326,7 +338,9 @@ def test_an_empty_list_may_be_null(server: Any, client: SiloClient) -> None:
         client.search_items("x"),
     ):
         assert empty == []
-    assert client.get_items_by_uuid([FOUND["id"]]) == {}
+    # For a batch it may be no answer at all, and "not registered" would be a lie.
+    server.on(f"GET /api/items/by-uuid/{FOUND['id']}", FOUND)
+    assert list(client.get_items_by_uuid([FOUND["id"]])) == [FOUND["id"]]
 
 
 @pytest.mark.parametrize("status", [403, 503, 404, 405, 429])

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from silo.api.revisions import download_revision
 from silo.api.wire import LinkedFile
-from silo.bom.errors import DocumentError, InputError, NotFoundError, ServerFaultError
+from silo.bom.errors import DocumentError, InputError, ServerFaultError
 from silo.bom.links import extract
 from silo.bom.model import Extraction
 from silo.bom.roots import choose_assembly
@@ -213,9 +213,9 @@ def test_what_is_not_in_silo_is_reported(project: Project, tmp_path: Path) -> No
     assert (lost.position, lost.path) == ("Arm.FCStd", "parts/Plate.FCStd")
     assert "has no file in Silo" in lost.reason
     assert len(pulled.files) == 3
-    with pytest.raises(NotFoundError, match="no file with the revision 9"):
+    with pytest.raises(InputError, match="no file with the revision 9"):
         project.pull(tmp_path / "into", revision=9)
-    with pytest.raises(NotFoundError, match="no file yet"):
+    with pytest.raises(InputError, match="no file yet"):
         project.pull(tmp_path / "into", "Plate")
 
 

@@ -19,6 +19,7 @@ from silo.bom.errors import (
     NewerRevisionError,
     NotFoundError,
     RouteMissingError,
+    ServerFaultError,
     VersionConflictError,
 )
 
@@ -59,7 +60,7 @@ class BomCalls(Caller):
     def get_bom(self, part_number: str, /) -> list[BomLine]:
         """The BOM lines directly below an item."""
         reply = self._get(f"the BOM of {part_number}", *_bom(part_number))
-        return reply.models(BomLine, *LISTS)
+        return _checked(part_number, reply.models(BomLine, *LISTS))
 
     def get_boms(
         self, part_numbers: Iterable[str], /, *, cancelled: Cancel | None = None
@@ -72,7 +73,8 @@ class BomCalls(Caller):
         def batch(some: Sequence[str]) -> dict[str, list[BomLine]]:
             asked = NumbersBody(part_numbers=list(some))
             subject = f"the BOMs of {len(some)} items"
-            return self._ask(subject, "items", "boms", body=asked, cancelled=cancelled).model(BomsAnswer).boms
+            boms = self._ask(subject, "items", "boms", body=asked, cancelled=cancelled).model(BomsAnswer).boms
+            return {number: _checked(number, lines) for number, lines in boms.items()}
 
         def single(part_number: str) -> list[BomLine] | None:
             try:
@@ -212,6 +214,16 @@ class BomCalls(Caller):
         return RouteMissingError(
             f"{host} knows {part_number} but not how to merge a BOM; it needs a newer Silo ({error})"
         )
+
+
+def _checked(part_number: str, lines: list[BomLine]) -> list[BomLine]:
+    """The lines; :class:`ServerFaultError` where they say that they are another item's."""
+    for line in lines:
+        if line.parent_part_number and line.parent_part_number.casefold() != part_number.strip().casefold():
+            raise ServerFaultError(
+                f"the BOM of {part_number}: the server answered with that of {line.parent_part_number}"
+            )
+    return lines
 
 
 def _bom(part_number: str) -> tuple[str, str, str]:

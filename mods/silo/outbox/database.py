@@ -26,6 +26,7 @@ VERSION = 5
 _REMEMBERED = 2 * 366 * 86400.0
 # A copy of a file that was replaced is kept for so long, or until a person deletes it.
 KEPT_ASIDE_DAYS = 90
+_NEWEST_DAYS = 3
 
 _TABLES = """
 CREATE TABLE entry (
@@ -246,10 +247,14 @@ class Origins(Database):
         return self.path.parent / "kept-aside"
 
     def forget_aside(self) -> None:
-        """Remove the copies of the days that are over :data:`KEPT_ASIDE_DAYS` ago; nothing else in there."""
+        """Remove the copies of the days that are over :data:`KEPT_ASIDE_DAYS` ago; nothing else in there.
+
+        The newest days that have copies stay: the clock may be months ahead.
+        """
         limit = self.clock() - KEPT_ASIDE_DAYS * 86400.0
         oldest = time.strftime("%Y-%m-%d", time.localtime(limit))
-        for folder in self._kept_aside.glob("[0-9][0-9][0-9][0-9]-[0-9][0-9]-[0-9][0-9]"):
+        days = sorted(self._kept_aside.glob("[0-9][0-9][0-9][0-9]-[0-9][0-9]-[0-9][0-9]"))
+        for folder in days[:-_NEWEST_DAYS]:
             with suppress(OSError):
                 if folder.name < oldest and folder.stat().st_mtime < limit and not folder.is_symlink():
                     shutil.rmtree(folder, ignore_errors=True)

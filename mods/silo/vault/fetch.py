@@ -104,7 +104,7 @@ class _Fetch:
         wanted = known if number is None else [one for one in known if one.revision_number == number]
         if not wanted:
             which = "no file yet" if number is None else f"no file with the revision {number}"
-            raise NotFoundError(f"{item.part_number} has {which} in Silo")
+            raise InputError(f"{item.part_number} has {which} in Silo")
         top = wanted[0]
         self._at = top.created_at
         name = posixpath.basename((top.file_path or top.file_name or "").replace("\\", "/"))
@@ -256,7 +256,7 @@ def fetched(
     revision
         of the top; its linked files are then those of its time. None: the newest of all.
 
-    Raises NotFoundError where the item has no such file, InputError for more than ``most`` files.
+    Raises InputError where the item has no such file, and for more than ``most`` files.
     """
     item = client.get_item(part_number)
     with scratch_folder("silo-pull-") as scratch:

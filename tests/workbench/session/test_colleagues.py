@@ -39,6 +39,15 @@ def test_a_colleagues_commit_during_our_own_is_shown_after_it() -> None:
     assert known.newer == {ITEM: newer(3)}
 
 
+def test_a_restored_server_gives_our_number_to_a_colleague() -> None:
+    """It counts anew, and says so."""
+    known = Colleagues()
+    known.arrived(ITEM, 5)
+    known.anew()
+    known.heard(ITEM, newer(4))
+    assert known.newer == {ITEM: newer(4)}
+
+
 STEPS = st.lists(st.sampled_from(["mine", "theirs", "run ends"]), max_size=12)
 
 

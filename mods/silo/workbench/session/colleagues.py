@@ -35,6 +35,10 @@ class Colleagues:
         """A commit of this item is on its way to the server."""
         self._going.add(identity.lower())
 
+    def anew(self) -> None:
+        """The server counts anew, after a restore: by what we know of its numbers, nothing is ours."""
+        self._mine.clear()
+
     def heard(self, identity: str, newer: Newer) -> None:
         """The server announced a commit."""
         if newer.revision <= self._mine.get(identity, 0):

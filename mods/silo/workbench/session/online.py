@@ -12,7 +12,7 @@ from typing import Any
 from silo.api.client import SiloClient
 from silo.api.config import resolve_server
 from silo.api.events import ConnectionState, EventListener
-from silo.api.sse import ServerEvent
+from silo.api.sse import RESET, ServerEvent
 from silo.bom.errors import ConfigError
 from silo.outbox.entry import Entry as Waiting
 from silo.outbox.report import Report, Sent
@@ -44,7 +44,7 @@ class Online:
         entry: Callable[[Entry], None],
         sent: Callable[[Sent, tuple[str, ...]], None],
         state: Callable[[str, str], None],
-        newer: Callable[[str, Newer], None] = lambda _identity, _newer: None,
+        newer: Callable[[str, Newer | None], None] = lambda _identity, _newer: None,
         make_client: Callable[[Server], Any] | None = None,
     ) -> None:
         self._make_client = make_client or _client
@@ -140,7 +140,9 @@ class Online:
     def _heard(self, event: ServerEvent, url: str) -> None:
         if event.id is not None:
             self._last_ids.set(url, event.id)
-        if (announced := entries.commit_of_event(event)) is not None:
+        if event.type == RESET:
+            self._newer("", None)
+        elif (announced := entries.commit_of_event(event)) is not None:
             self._newer(*announced)
         entry = entries.of_event(event, self.client.web_url)
         if entry is not None:

@@ -192,7 +192,10 @@ class Session:
             return {"unauthorized": "refused", "read_only": "read-only"}.get(error.code, "offline")
         return self.shown.connection
 
-    def _heard(self, identity: str, newer: Newer) -> None:
+    def _heard(self, identity: str, newer: Newer | None) -> None:
+        if newer is None:
+            self._colleagues.anew()
+            return
         self._colleagues.heard(identity, newer)
         self._show(newer=self._colleagues.newer)
 
