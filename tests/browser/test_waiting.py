@@ -49,7 +49,10 @@ def waits(api: Api, folder: str, *, conflict: bool = False, left_out: bool = Fal
 
 @pytest.mark.parametrize("script", [True, False])
 def test_what_waits_is_found_and_decided_for_many(api: Api, visit: Visit, script: bool) -> None:
-    """Counted per BOM, by folder; chosen ones are settled with a reason, the others and the quiet stay."""
+    """Counted per BOM, by folder; chosen ones are settled with a reason, the others and the quiet stay.
+
+    With a script, a BOM that a filter hides stays chosen, and is decided about with those that are shown.
+    """
     first, second = waits(api, "robot/arm"), waits(api, "robot", conflict=True, left_out=True)
     other = waits(api, "crane")
     quiet = api.items(2)
@@ -71,9 +74,18 @@ def test_what_waits_is_found_and_decided_for_many(api: Api, visit: Visit, script
     expect(page.locator("tbody th").first).to_have_text(second)
     for one in (first, second):
         page.get_by_label(f"Choose {one}").check()
+    if script:
+        for kind, chosen in (
+            ("conflicts", "2 chosen, 1 of them not shown"),
+            ("anything", "2 of 2 chosen"),
+            ("conflicts", "2 chosen, 1 of them not shown"),
+        ):
+            page.get_by_label("What waits").select_option(kind)
+            expect(page.locator("#count")).to_have_text(chosen)
     page.get_by_label("Reason").fill("spare parts")
     page.get_by_role("button", name="Keep as intentional").click()
     expect(page.locator(".notice")).to_contain_text("4 lines in 2 BOMs kept as intentional")
+    page.get_by_label("What waits").select_option("anything")
     assert sum(line["reason"] == "spare parts" for line in api.lines(first).values()) == 2
     expect(row(page, first)).to_have_count(0)
     assert "folder=robot" in page.url

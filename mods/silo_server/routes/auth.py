@@ -17,11 +17,11 @@ from silo_server.routes.context import (
     WRITE_ERRORS,
     Admin,
     PageFrom,
-    Server,
     ServerDep,
     Viewer,
     client_address,
     json_answer,
+    server_of,
 )
 from silo_server.routes.models import Body, Short, Text
 from silo_server.services.access import accounts, audit, credentials, logins
@@ -95,50 +95,50 @@ def log_in(server: ServerDep, request: Request, body: LoginBody) -> Response:
     """Begin a browser session: sets the cookie, answers with the CSRF secret for later requests."""
     session = logins.log_in(server.db, body.username, body.password, client_address(request))
     response = json_answer({"username": session.username, "csrf_token": session.csrf_token})
-    set_session_cookie(response, server, session, request)
+    set_session_cookie(response, request, session)
     return response
 
 
 @router.post("/auth/logout", status_code=204, responses=READ_ERRORS)
-def log_out(server: ServerDep, caller: Viewer) -> Response:
+def log_out(call: Viewer) -> Response:
     """End this browser session."""
-    logins.log_out(server.db, caller)
+    logins.log_out(call.server.db, call.actor)
     response = Response(status_code=204)
     response.delete_cookie(SESSION_COOKIE)
     return response
 
 
 @router.get("/auth/me", responses=READ_ERRORS)
-def who_am_i(caller: Viewer) -> dict[str, Any]:
+def who_am_i(call: Viewer) -> dict[str, Any]:
     """Who this token or session is."""
     return {
-        "username": caller.username,
-        "display_name": caller.display_name,
-        "role": caller.role.value,
-        "auth_source": caller.auth_source,
+        "username": call.actor.username,
+        "display_name": call.actor.display_name,
+        "role": call.actor.role.value,
+        "auth_source": call.actor.auth_source,
     }
 
 
 @router.put("/auth/password", status_code=204, responses={**LOGIN_ERRORS, **WRITE_ERRORS})
-def set_password(server: ServerDep, caller: Viewer, body: PasswordBody) -> Response:
+def set_password(call: Viewer, body: PasswordBody) -> Response:
     """Set the own password; ends all own sessions. Not with a token; asks for the old password."""
-    logins.set_own_password(server.db, caller, body.password, body.current_password)
+    logins.set_own_password(call.server.db, call.actor, body.password, body.current_password)
     return Response(status_code=204)
 
 
 @router.get("/auth/tokens", responses=READ_ERRORS)
-def list_tokens(server: ServerDep, caller: Viewer) -> list[dict[str, Any]]:
+def list_tokens(call: Viewer) -> list[dict[str, Any]]:
     """The own tokens; never their secrets."""
-    with server.db.read(caller) as tx:
-        return [_token(token) for token in credentials.list_tokens(tx, caller.own_id)]
+    with call.read() as tx:
+        return [_token(token) for token in credentials.list_tokens(tx, call.actor.own_id)]
 
 
 @router.post("/auth/tokens", status_code=201, responses=WRITE_ERRORS)
-def create_token(server: ServerDep, caller: Viewer, body: TokenBody) -> dict[str, Any]:
+def create_token(call: Viewer, body: TokenBody) -> dict[str, Any]:
     """Make a token. The secret is in this answer and never again."""
     forever = "expires_in_days" in body.model_fields_set and body.expires_in_days is None
     scope = max(body.scopes, key=list(Scope).index) if body.scopes else None
-    with server.db.write(caller, even_when_read_only=True) as tx:
+    with call.write(even_when_read_only=True) as tx:
         token, secret = credentials.create_own_token(
             tx, body.name, days=body.expires_in_days, forever=forever, scope=scope
         )
@@ -146,28 +146,26 @@ def create_token(server: ServerDep, caller: Viewer, body: TokenBody) -> dict[str
 
 
 @router.delete("/auth/tokens/{token_id}", status_code=204, responses=WRITE_ERRORS)
-def revoke_token(
-    server: ServerDep, caller: Viewer, token_id: Annotated[int, Path(ge=1, le=2**62)]
-) -> Response:
+def revoke_token(call: Viewer, token_id: Annotated[int, Path(ge=1, le=2**62)]) -> Response:
     """Revoke a token: one's own, or anybody's for an admin."""
-    credentials.check_may_change(caller)
-    owner = None if caller.role is Role.ADMIN else caller.own_id
-    with server.db.write(caller, even_when_read_only=True) as tx:
+    credentials.check_may_change(call.actor)
+    owner = None if call.actor.role is Role.ADMIN else call.actor.own_id
+    with call.write(even_when_read_only=True) as tx:
         credentials.revoke_token(tx, token_id, owner)
     return Response(status_code=204)
 
 
 @router.get("/users", responses=READ_ERRORS)
-def list_users(server: ServerDep, caller: Admin) -> list[dict[str, Any]]:
+def list_users(call: Admin) -> list[dict[str, Any]]:
     """All users."""
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         return [_user(user) for user in accounts.list_users(tx)]
 
 
 @router.post("/users", status_code=201, responses=WRITE_ERRORS)
-def create_user(server: ServerDep, caller: Admin, body: NewUserBody) -> dict[str, Any]:
+def create_user(call: Admin, body: NewUserBody) -> dict[str, Any]:
     """Make a user."""
-    with server.db.write(caller, even_when_read_only=True) as tx:
+    with call.write(even_when_read_only=True) as tx:
         user = accounts.create_user(
             tx, body.username, body.role, display_name=body.display_name, password=body.password
         )
@@ -175,48 +173,44 @@ def create_user(server: ServerDep, caller: Admin, body: NewUserBody) -> dict[str
 
 
 @router.put("/users/{username}", responses=WRITE_ERRORS)
-def change_user(server: ServerDep, caller: Admin, username: str, body: UserChangeBody) -> dict[str, Any]:
+def change_user(call: Admin, username: str, body: UserChangeBody) -> dict[str, Any]:
     """Change a user's role, name, password, or let nobody in under this name any more."""
-    with server.db.write(caller, even_when_read_only=True) as tx:
+    with call.write(even_when_read_only=True) as tx:
         user = accounts.change_user(tx, username, **body.model_dump())
         return _user(user)
 
 
 @router.post("/users/{username}/login-link", status_code=201, responses=WRITE_ERRORS)
-def create_login_link(server: ServerDep, caller: Admin, username: str) -> dict[str, Any]:
+def create_login_link(call: Admin, username: str) -> dict[str, Any]:
     """A link that lets this user in once; for a new colleague or a forgotten password."""
-    with server.db.write(caller, even_when_read_only=True) as tx:
+    with call.write(even_when_read_only=True) as tx:
         secret = logins.create_login_link(tx, username)
         audit.note(tx, "login_link.created", username)
         path = f"/login/link/{secret}"
-        public = server.settings.public_url
+        public = call.server.settings.public_url
         return {"path": path, "url": f"{public}{path}" if public else None}
 
 
 @router.get("/admin/audit", responses=READ_ERRORS)
 def list_audit(
-    server: ServerDep,
-    caller: Admin,
-    limit: Annotated[int, Query(ge=1, le=1000)] = 100,
-    before: PageFrom = None,
+    call: Admin, limit: Annotated[int, Query(ge=1, le=1000)] = 100, before: PageFrom = None
 ) -> list[dict[str, Any]]:
     """Who did what, newest first."""
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         entries = audit.list_entries(tx, limit, before)
     return [to_wire(entry) for entry in entries]
 
 
-def set_session_cookie(
-    response: Response, server: Server, session: logins.NewSession, request: Request
-) -> None:
+def set_session_cookie(response: Response, request: Request, session: logins.NewSession) -> None:
     """The session's cookie: not for scripts, not for other sites, and only over TLS where there is TLS."""
+    settings = server_of(request).settings
     response.set_cookie(
         SESSION_COOKIE,
         session.secret,
-        max_age=int(server.settings.session_seconds),
+        max_age=int(settings.session_seconds),
         httponly=True,
         samesite="lax",
-        secure=server.settings.secure_cookies or request.url.scheme == "https",
+        secure=settings.secure_cookies or request.url.scheme == "https",
     )
 
 

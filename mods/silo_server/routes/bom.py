@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import anyio.to_thread
 import pydantic_core
-from fastapi import APIRouter, Query, Request
+from fastapi import APIRouter, Query
 from starlette.responses import Response
 
 from silo.api.wire import MergeResult
@@ -19,10 +19,9 @@ from silo_server.routes import document
 from silo_server.routes.context import (
     READ_ERRORS,
     WRITE_ERRORS,
+    Call,
     Editor,
     ExpectedVersion,
-    Server,
-    ServerDep,
     Viewer,
     etag_of,
     json_answer,
@@ -53,7 +52,7 @@ from silo_server.services.bom.merge import MergeOutcome, merge_bom, preview_merg
 from silo_server.services.bom.merge_json import MergeOrder, read_merge_order
 from silo_server.services.bom.review import told_quantities
 from silo_server.services.items import get_by_numbers, get_item
-from silo_server.values import Actor, Item, LineState, to_wire
+from silo_server.values import Item, LineState, to_wire
 
 router = APIRouter(prefix="/api/items/{part_number}/bom", tags=["bom"])
 several = APIRouter(prefix="/api", tags=["bom"])
@@ -72,18 +71,18 @@ MERGE_BODY = {
 
 
 @router.get("", response_model=list[BomLineOut], responses=READ_ERRORS)
-def get_bom(server: ServerDep, caller: Viewer, part_number: str) -> Response:
+def get_bom(call: Viewer, part_number: str) -> Response:
     """The lines of one level. ``ETag`` is the BOM's version, for ``If-Match``."""
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         item = get_item(tx, part_number)
         rows = _lines_of(tx, [item])[item.id]
     return json_answer(rows, headers={"ETag": etag_of(item.bom_version)})
 
 
 @several.post("/items/boms", response_model=BomsOut, responses=READ_ERRORS)
-def get_boms(server: ServerDep, caller: Viewer, body: NumbersBody) -> Response:
+def get_boms(call: Viewer, body: NumbersBody) -> Response:
     """The lines of many items, one level each; items that are not known are absent. Reads only."""
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         found = get_by_numbers(tx, body.part_numbers)
         check_line_count(tx, [item.id for item in found.values()])
         rows = _lines_of(tx, list(found.values()))
@@ -109,96 +108,76 @@ def _lines_of(tx: Tx, parents: Sequence[Item]) -> dict[int, list[dict[str, Any]]
 
 
 @router.post("", status_code=201, response_model=LineOut, responses=WRITE_ERRORS)
-def add_line(
-    server: ServerDep, caller: Editor, part_number: str, body: NewLineBody, expected: ExpectedVersion
-) -> Response:
+def add_line(call: Editor, part_number: str, body: NewLineBody, expected: ExpectedVersion) -> Response:
     """Add a line by hand."""
     values = body.model_dump(exclude={"child_part_number"})
     state = LineState(**{**values, "reference_designators": tuple(body.reference_designators)})
-    with server.db.write(caller) as tx:
+    with call.write() as tx:
         edited = edits.add_line(tx, part_number, body.child_part_number, state, expected)
         return _edited(edited, 201)
 
 
 @router.put("/{child}", response_model=LineOut, responses=WRITE_ERRORS)
 def change_line(
-    server: ServerDep,
-    caller: Editor,
-    part_number: str,
-    child: str,
-    body: LineChangeBody,
-    expected: ExpectedVersion,
+    call: Editor, part_number: str, child: str, body: LineChangeBody, expected: ExpectedVersion
 ) -> Response:
     """Change the one line of a child; 409 where it has several.
 
     Another quantity on an assembly line makes it a manual override.
     """
-    return _change(server, caller, part_number, child, body, expected)
+    return _change(call, part_number, child, body, expected)
 
 
 @router.delete("/{child}", status_code=204, responses=WRITE_ERRORS)
-def remove_line(
-    server: ServerDep, caller: Editor, part_number: str, child: str, expected: ExpectedVersion
-) -> Response:
+def remove_line(call: Editor, part_number: str, child: str, expected: ExpectedVersion) -> Response:
     """Remove the one line of a child; 409 where it has several."""
-    return _remove(server, caller, part_number, child, expected)
+    return _remove(call, part_number, child, expected)
 
 
 @router.put("/lines/{line_id}", response_model=LineOut, responses=WRITE_ERRORS)
 def change_line_by_id(
-    server: ServerDep,
-    caller: Editor,
-    part_number: str,
-    line_id: str,
-    body: LineChangeBody,
-    expected: ExpectedVersion,
+    call: Editor, part_number: str, line_id: str, body: LineChangeBody, expected: ExpectedVersion
 ) -> Response:
     """Change the line with this id; for a child that has several lines (a component and an alternate)."""
-    return _change(server, caller, part_number, LineId(line_id), body, expected)
+    return _change(call, part_number, LineId(line_id), body, expected)
 
 
 @router.delete("/lines/{line_id}", status_code=204, responses=WRITE_ERRORS)
-def remove_line_by_id(
-    server: ServerDep, caller: Editor, part_number: str, line_id: str, expected: ExpectedVersion
-) -> Response:
+def remove_line_by_id(call: Editor, part_number: str, line_id: str, expected: ExpectedVersion) -> Response:
     """Remove the line with this id."""
-    return _remove(server, caller, part_number, LineId(line_id), expected)
+    return _remove(call, part_number, LineId(line_id), expected)
 
 
 @router.post("/merge", response_model=MergeResult, responses=WRITE_ERRORS, openapi_extra=MERGE_BODY)
-async def merge(
-    server: ServerDep, caller: Editor, part_number: str, request: Request, expected: ExpectedVersion
-) -> Response:
+async def merge(call: Editor, part_number: str, expected: ExpectedVersion) -> Response:
     """Merge an assembly's direct children (spec bom-sync §5).
 
     ``sync_id`` makes a repeat give the same answer, ``dry_run`` gives the answer without the change,
     ``If-Match`` refuses (412) where somebody was quicker.
     """
-    body = await json_body(request)
+    body = await json_body(call.request)
 
     def work() -> MergeOutcome:
-        order = read_merge_order(body, server.settings.max_merge_entries)
-        return _merge(server, caller, part_number, order, expected)
+        order = read_merge_order(body, call.server.settings.max_merge_entries)
+        return _merge(call, part_number, order, expected)
 
     outcome = await anyio.to_thread.run_sync(work)
     return raw_json(outcome.answer, headers={"ETag": etag_of(outcome.version)})
 
 
 @router.get("/expanded", response_model=list[ExpandedLineOut], responses=READ_ERRORS)
-def get_expanded(
-    server: ServerDep, caller: Viewer, part_number: str, depth: Depth = tree.MAX_DEPTH
-) -> Response:
+def get_expanded(call: Viewer, part_number: str, depth: Depth = tree.MAX_DEPTH) -> Response:
     """The tree as rows, parents before children; quantities per one parent, and in total."""
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         graph = tree.load_graph(tx, get_item(tx, part_number), None if depth == tree.MAX_DEPTH else depth)
-    rows = tree.expand(graph, depth, server.settings.max_expanded_rows)
+    rows = tree.expand(graph, depth, call.server.settings.max_expanded_rows)
     return raw_json(render_expanded(rows))
 
 
 @router.get("/flat", responses=READ_ERRORS)
-def get_flat(server: ServerDep, caller: Viewer, part_number: str) -> dict[str, Any]:
+def get_flat(call: Viewer, part_number: str) -> dict[str, Any]:
     """The leaf parts, quantities multiplied down the tree and summed; 409 where it never ends."""
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         graph = tree.load_graph(tx, get_item(tx, part_number))
         found = marks(tx, graph)
     return {
@@ -220,9 +199,9 @@ def get_flat(server: ServerDep, caller: Viewer, part_number: str) -> dict[str, A
 
 
 @router.get("/cost", responses=READ_ERRORS)
-def get_cost(server: ServerDep, caller: Viewer, part_number: str) -> dict[str, Any]:
+def get_cost(call: Viewer, part_number: str) -> dict[str, Any]:
     """Flat BOM × ``standard_cost``, per currency; ``missing`` names what has no cost."""
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         graph = tree.load_graph(tx, get_item(tx, part_number))
         cost = rollup.roll_up_cost(graph, rollup.parts_of(tx, graph))
     only = next(iter(cost.totals.values())) if len(cost.totals) == 1 else None
@@ -237,9 +216,9 @@ def get_cost(server: ServerDep, caller: Viewer, part_number: str) -> dict[str, A
 
 
 @router.get("/mass", responses=READ_ERRORS)
-def get_mass(server: ServerDep, caller: Viewer, part_number: str) -> dict[str, Any]:
+def get_mass(call: Viewer, part_number: str) -> dict[str, Any]:
     """The mass of one piece [kg] from its parts' ``mass_kg``; ``missing`` names what has none."""
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         graph = tree.load_graph(tx, get_item(tx, part_number))
         mass = rollup.roll_up_mass(graph, rollup.parts_of(tx, graph))
     return {
@@ -254,15 +233,14 @@ def get_mass(server: ServerDep, caller: Viewer, part_number: str) -> dict[str, A
 
 @router.get("/where-used", response_model=list[dict[str, Any]], responses=READ_ERRORS)
 def get_where_used(
-    server: ServerDep,
-    caller: Viewer,
+    call: Viewer,
     part_number: str,
     indirect: bool = False,
     limit: Annotated[int, Query(ge=1, le=1000)] = 1000,
     offset: Annotated[int, Query(ge=0, le=10_000_000)] = 0,
 ) -> Response:
     """The parents; with ``indirect`` theirs as well. ``X-Total-Count`` says how many there are in all."""
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         item = get_item(tx, part_number)
         found, total = tree.where_used(tx, item, indirect=indirect, limit=limit, offset=offset)
     rows = [
@@ -290,38 +268,29 @@ def line_changes(body: LineChangeBody) -> dict[str, Any]:
     return changes
 
 
-def _merge(
-    server: ServerDep, caller: Actor, part_number: str, order: MergeOrder, expected: int | None
-) -> MergeOutcome:
+def _merge(call: Call, part_number: str, order: MergeOrder, expected: int | None) -> MergeOutcome:
     if order.dry_run:
-        with server.db.read(caller) as tx:
+        with call.read() as tx:
             return preview_merge(tx, part_number, order, expected)
     try:
-        with server.db.write(caller) as tx:
+        with call.write() as tx:
             return merge_bom(tx, part_number, order, expected)
     except (RejectedError, CycleError) as error:
         # In a transaction of its own: that of the merge is undone.
-        with server.db.write(caller) as tx:
+        with call.write() as tx:
             remember_refusal(tx, get_item(tx, part_number, lock=True), str(error)[:4096])
         raise
 
 
 def _change(
-    server: Server,
-    caller: Actor,
-    part_number: str,
-    which: str | LineId,
-    body: LineChangeBody,
-    expected: int | None,
+    call: Call, part_number: str, which: str | LineId, body: LineChangeBody, expected: int | None
 ) -> Response:
-    with server.db.write(caller) as tx:
+    with call.write() as tx:
         return _edited(edits.change_line(tx, part_number, which, line_changes(body), expected), 200)
 
 
-def _remove(
-    server: Server, caller: Actor, part_number: str, which: str | LineId, expected: int | None
-) -> Response:
-    with server.db.write(caller) as tx:
+def _remove(call: Call, part_number: str, which: str | LineId, expected: int | None) -> Response:
+    with call.write() as tx:
         edited = edits.remove_line(tx, part_number, which, expected)
     return Response(status_code=204, headers={"ETag": etag_of(edited.version)})
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import secrets
 from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -19,7 +20,7 @@ from silo.api.wire import ErrorBody
 from silo.bom.errors import AuthError, ForbiddenError, RejectedError
 from silo.bom.numbers import whole_number
 from silo_server.background import Probe
-from silo_server.db.engine import Database
+from silo_server.db.engine import Database, Tx
 from silo_server.events.hub import Hub
 from silo_server.files import FileStore
 from silo_server.operation.requests import info_of
@@ -74,13 +75,30 @@ class FormSecretError(ForbiddenError):
     """The secret of a form is not that of the session: another site's form, or one of an earlier session."""
 
 
+@dataclass(frozen=True, slots=True)
+class Call:
+    """A request that was let in: from whom, and to which server."""
+
+    request: Request
+    server: Server
+    actor: Actor
+
+    def read(self) -> AbstractContextManager[Tx]:
+        """One consistent snapshot of the database, for this caller."""
+        return self.server.db.read(self.actor)
+
+    def write(self, *, even_when_read_only: bool = False) -> AbstractContextManager[Tx]:
+        """A transaction in this caller's name."""
+        return self.server.db.write(self.actor, even_when_read_only=even_when_read_only)
+
+
 class Guard:
     """A dependency that lets a caller of at least ``role`` in: Bearer token first, then session cookie."""
 
     def __init__(self, role: Role) -> None:
         self.role = role
 
-    async def __call__(self, request: Request) -> Actor:
+    async def __call__(self, request: Request) -> Call:
         actor = await anyio.to_thread.run_sync(find_actor, request)
         info_of(request.scope).user = actor.username if actor else None
         if actor is None:
@@ -91,12 +109,12 @@ class Guard:
             )
         if actor.auth_source == "session" and request.method not in SAFE_METHODS:
             await _check_csrf(request, actor)
-        return actor
+        return Call(request, server_of(request), actor)
 
 
-Viewer = Annotated[Actor, Depends(Guard(Role.VIEWER))]
-Editor = Annotated[Actor, Depends(Guard(Role.EDITOR))]
-Admin = Annotated[Actor, Depends(Guard(Role.ADMIN))]
+Viewer = Annotated[Call, Depends(Guard(Role.VIEWER))]
+Editor = Annotated[Call, Depends(Guard(Role.EDITOR))]
+Admin = Annotated[Call, Depends(Guard(Role.ADMIN))]
 
 
 def find_actor(request: Request) -> Actor | None:

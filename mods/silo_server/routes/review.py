@@ -21,7 +21,6 @@ from silo_server.routes.context import (
     Editor,
     ExpectedVersion,
     PageFrom,
-    ServerDep,
     Viewer,
     etag_of,
     json_answer,
@@ -70,9 +69,9 @@ class UndoBody(Body):
 
 
 @router.get("/review", responses=READ_ERRORS)
-def get_review(server: ServerDep, caller: Viewer, part_number: str) -> Response:
+def get_review(call: Viewer, part_number: str) -> Response:
     """What is open: unreferenced lines, conflicts with both values, and the last merge."""
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         found = service.review(tx, part_number)
     name = found.parent.part_number
     body = {
@@ -103,34 +102,28 @@ def get_review(server: ServerDep, caller: Viewer, part_number: str) -> Response:
         "BOM does not have; all of them are listed and nothing is changed"
     ),
 )
-def resolve(
-    server: ServerDep, caller: Editor, part_number: str, body: ResolveBody, expected: ExpectedVersion
-) -> Response:
+def resolve(call: Editor, part_number: str, body: ResolveBody, expected: ExpectedVersion) -> Response:
     """Decide on lines: ``remove``, ``keep`` (as intentional), ``take_cad``, ``keep_silo``."""
     decisions = [service.Decision(d.child_part_number, d.action, d.reason, d.line_id) for d in body.decisions]
-    with server.db.write(caller) as tx:
+    with call.write() as tx:
         change_id, version = service.resolve(tx, part_number, decisions, expected)
         return _changed(change_id, version)
 
 
 @router.get("/history", responses=READ_ERRORS)
 def list_history(
-    server: ServerDep,
-    caller: Viewer,
-    part_number: str,
-    limit: Annotated[int, Query(ge=1, le=500)] = 50,
-    before: PageFrom = None,
+    call: Viewer, part_number: str, limit: Annotated[int, Query(ge=1, le=500)] = 50, before: PageFrom = None
 ) -> list[dict[str, Any]]:
     """The changes, newest first: who, when, why, from which file."""
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         found = history.list_changes(tx, get_item(tx, part_number, include_archived=True), limit, before)
     return [change_to_wire(change) for change in found]
 
 
 @router.get("/history/{change_id}", responses=READ_ERRORS)
-def get_change(server: ServerDep, caller: Viewer, part_number: str, change_id: ChangeId) -> dict[str, Any]:
+def get_change(call: Viewer, part_number: str, change_id: ChangeId) -> dict[str, Any]:
     """One change with its lines before and after."""
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         item = get_item(tx, part_number, include_archived=True)
         change, lines = history.get_change(tx, item, change_id)
     rows = [
@@ -147,11 +140,9 @@ def get_change(server: ServerDep, caller: Viewer, part_number: str, change_id: C
 
 
 @router.get("/history/{change_id}/bom", responses=READ_ERRORS)
-def get_past_bom(
-    server: ServerDep, caller: Viewer, part_number: str, change_id: ChangeId
-) -> list[dict[str, Any]]:
+def get_past_bom(call: Viewer, part_number: str, change_id: ChangeId) -> list[dict[str, Any]]:
     """The BOM as this change left it (0 = before everything)."""
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         item = get_item(tx, part_number, include_archived=True)
         lines = history.state_at(tx, item, change_id)
     return [
@@ -170,14 +161,13 @@ Point = Annotated[str, Query(max_length=40), WithJsonSchema(document.POINT)]
 
 @router.get("/compare", responses=READ_ERRORS)
 def compare(
-    server: ServerDep,
-    caller: Viewer,
+    call: Viewer,
     part_number: str,
     from_point: Annotated[str, Query(alias="from", max_length=40), WithJsonSchema(document.POINT)] = "0",
     to: Point = "now",
 ) -> dict[str, Any]:
     """Two points of time side by side; each a change id, a time, or ``now``."""
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         item = get_item(tx, part_number, include_archived=True)
         first, second = find_point(tx, item, from_point), find_point(tx, item, to)
         rows = history.compare(history.state_at(tx, item, first), history.state_at(tx, item, second))
@@ -200,21 +190,17 @@ def compare(
 
 
 @router.post("/restore", responses=WRITE_ERRORS)
-def restore(
-    server: ServerDep, caller: Editor, part_number: str, body: RestoreBody, expected: ExpectedVersion
-) -> Response:
+def restore(call: Editor, part_number: str, body: RestoreBody, expected: ExpectedVersion) -> Response:
     """Bring an earlier state back, as a new change."""
-    with server.db.write(caller) as tx:
+    with call.write() as tx:
         change_id, version = history.restore(tx, part_number, body.change_id, body.reason, expected)
         return _changed(change_id, version)
 
 
 @router.post("/undo", responses=WRITE_ERRORS)
-def undo(
-    server: ServerDep, caller: Editor, part_number: str, body: UndoBody, expected: ExpectedVersion
-) -> Response:
+def undo(call: Editor, part_number: str, body: UndoBody, expected: ExpectedVersion) -> Response:
     """Take one change back, as a new change; 409 where its lines changed again since."""
-    with server.db.write(caller) as tx:
+    with call.write() as tx:
         change_id, version = history.undo(tx, part_number, body.change_id, expected)
         return _changed(change_id, version)
 

@@ -20,9 +20,8 @@ from silo_server.routes import document
 from silo_server.routes.context import (
     READ_ERRORS,
     WRITE_ERRORS,
+    Call,
     Editor,
-    Server,
-    ServerDep,
     Viewer,
     json_answer,
 )
@@ -30,7 +29,7 @@ from silo_server.routes.models import RevisionBody, RevisionOut
 from silo_server.services import items, revisions
 from silo_server.services.bom.merge_json import is_short_text, sha256_or_none
 from silo_server.services.revisions import Origin, revision_to_wire
-from silo_server.values import Actor, Item, Revision
+from silo_server.values import Item, Revision
 
 router = APIRouter(prefix="/api/items/{part_number}", tags=["revisions"])
 
@@ -81,8 +80,7 @@ UPLOAD = {
 
 @router.get("/revisions", response_model=list[RevisionOut], responses=READ_ERRORS)
 def list_revisions(
-    server: ServerDep,
-    caller: Viewer,
+    call: Viewer,
     part_number: str,
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
     before: Annotated[int | None, Query(ge=1, le=2**31 - 1)] = None,
@@ -92,7 +90,7 @@ def list_revisions(
 
     ``X-Total-Count`` says how many there are above ``after``.
     """
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         item = items.get_item(tx, part_number)
         found, total = revisions.list_revisions(tx, item, limit, before=before, after=after)
     told = [revision_to_wire(item.part_number, revision) for revision in found]
@@ -100,18 +98,18 @@ def list_revisions(
 
 
 @router.get("/revisions/{number}", response_model=RevisionOut, responses=READ_ERRORS)
-def get_revision(server: ServerDep, caller: Viewer, part_number: str, number: RevisionNumber) -> Response:
+def get_revision(call: Viewer, part_number: str, number: RevisionNumber) -> Response:
     """One revision, with the files that its file links to."""
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         item = items.get_item(tx, part_number)
         revision = revisions.get_revision(tx, item, number)
     return json_answer(revision_to_wire(item.part_number, revision, links=True))
 
 
 @router.post("/revisions", status_code=201, response_model=RevisionOut, responses=WRITE_ERRORS)
-def add_revision(server: ServerDep, caller: Editor, part_number: str, body: RevisionBody) -> Response:
+def add_revision(call: Editor, part_number: str, body: RevisionBody) -> Response:
     """A revision without a file: a new property snapshot."""
-    with server.db.write(caller) as tx:
+    with call.write() as tx:
         item = items.get_item(tx, part_number, lock=True)
         revision = revisions.add_revision(tx, item, comment=body.comment, properties=body.properties)
         return json_answer(revision_to_wire(item.part_number, revision, links=True), 201)
@@ -120,14 +118,14 @@ def add_revision(server: ServerDep, caller: Editor, part_number: str, body: Revi
 @router.post(
     "/file", status_code=201, response_model=RevisionOut, responses=WRITE_ERRORS, openapi_extra=UPLOAD
 )
-async def upload_file(server: ServerDep, caller: Editor, part_number: str, request: Request) -> Response:
+async def upload_file(call: Editor, part_number: str) -> Response:
     """Upload a file (form part ``file``, texts ``comment`` and ``properties``) as a new revision.
 
     ``Idempotency-Key`` makes a repeat give the revision that the first request made. With ``base_revision``
     a file is refused (409 ``newer_revision``, with that revision) where somebody committed one since.
     The form is read here and not by a parameter, so that nobody without a role fills the disk.
     """
-    async with request.form(max_files=1, max_fields=20, max_part_size=_MAX_FIELD) as form:
+    async with call.request.form(max_files=1, max_fields=20, max_part_size=_MAX_FIELD) as form:
         twice = [name for name in _FORM if len(form.getlist(name)) > 1]
         if twice:
             raise RejectedError(f"{', '.join(twice)}: wanted one part of this name, got several")
@@ -141,35 +139,31 @@ async def upload_file(server: ServerDep, caller: Editor, part_number: str, reque
         origin = Origin(
             _base_revision(form.get("base_revision")), _path(form.get("path")), _links(form.get("links"))
         )
-        key, text, digest = _idempotency_key(request), str(comment or ""), (sha256 or "").lower()
+        key, text, digest = _idempotency_key(call.request), str(comment or ""), (sha256 or "").lower()
 
         def answer(item: Item, revision: Revision) -> Response:
             return json_answer(revision_to_wire(item.part_number, revision, links=True), 201)
 
         def work() -> Response:
-            return store_file(
-                server, caller, part_number, file, text, answer, properties, key, digest, origin
-            )
+            return store_file(call, part_number, file, text, answer, properties, key, digest, origin)
 
         return await anyio.to_thread.run_sync(work)
 
 
 @router.get("/file", response_class=Response, responses={**READ_ERRORS, **BINARY})
-def download_newest(server: ServerDep, caller: Viewer, part_number: str, request: Request) -> Response:
+def download_newest(call: Viewer, part_number: str) -> Response:
     """The newest file."""
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         revision = revisions.newest_file(tx, items.get_item(tx, part_number))
-    return _download(server, revision, request)
+    return _download(call, revision)
 
 
 @router.get("/file/{number}", response_class=Response, responses={**READ_ERRORS, **BINARY})
-def download_revision(
-    server: ServerDep, caller: Viewer, part_number: str, number: RevisionNumber, request: Request
-) -> Response:
+def download_revision(call: Viewer, part_number: str, number: RevisionNumber) -> Response:
     """The file of one revision."""
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         revision = revisions.get_revision(tx, items.get_item(tx, part_number), number)
-    return _download(server, revision, request)
+    return _download(call, revision)
 
 
 @router.get(
@@ -177,22 +171,19 @@ def download_revision(
     response_class=Response,
     responses={**READ_ERRORS, 200: {"content": {"image/png": {}}, "description": "The picture"}},
 )
-def thumbnail(
-    server: ServerDep, caller: Viewer, part_number: str, key: Annotated[str, Query(max_length=64)] = ""
-) -> Response:
+def thumbnail(call: Viewer, part_number: str, key: Annotated[str, Query(max_length=64)] = "") -> Response:
     """The picture that came with the newest file that has one. One asked for by its ``key`` may be kept."""
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         item = items.get_item(tx, part_number)
     if not item.thumbnail_key:
         raise NotFoundError(f"item {item.part_number} has no thumbnail")
-    path = server.files.path_of(item.thumbnail_key)
+    path = call.server.files.path_of(item.thumbnail_key)
     kept = "max-age=31536000, immutable" if key and item.thumbnail_key.startswith(key) else "max-age=300"
     return FileResponse(path, media_type="image/png", headers={"Cache-Control": f"private, {kept}"})
 
 
 def store_file(
-    server: Server,
-    caller: Actor,
+    call: Call,
     part_number: str,
     file: UploadFile,
     comment: str,
@@ -203,14 +194,14 @@ def store_file(
     origin: Origin | None = None,
 ) -> Response:
     """An uploaded file as a new revision, for the API and the pages; ``answer`` is made before the commit."""
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         items.get_item(tx, part_number)  # before anything is written to the disk
-    stored = server.files.keep(file.filename or "file", file.file)
+    stored = call.server.files.keep(file.filename or "file", file.file)
     if sha256 and stored.checksum != sha256:
         raise RejectedError(
             f"sha256: the file arrived as {stored.checksum}, and {sha256} was sent; no revision was made"
         )
-    with server.db.write(caller) as tx:
+    with call.write() as tx:
         item = items.get_item(tx, part_number, lock=True)
         merged = None if properties is None else {**item.properties, **properties}
         revision = revisions.add_revision(
@@ -275,15 +266,15 @@ def _properties(raw: str | None) -> dict[str, Any] | None:
     return value
 
 
-def _download(server: Server, revision: Revision, request: Request) -> Response:
+def _download(call: Call, revision: Revision) -> Response:
     if revision.file_checksum is None or revision.file_name is None:
         raise NotFoundError(f"revision {revision.revision_number} has no file")
     etag = f'"{revision.file_checksum}"'
     headers = {**DOWNLOAD_HEADERS, "ETag": etag}
-    if request.headers.get("if-none-match") == etag:
+    if call.request.headers.get("if-none-match") == etag:
         return Response(status_code=304, headers=headers)
     return FileResponse(
-        server.files.path_of(revision.file_checksum),
+        call.server.files.path_of(revision.file_checksum),
         media_type="application/octet-stream",
         filename=revision.file_name,
         content_disposition_type="attachment",

@@ -7,7 +7,7 @@ import re
 from dataclasses import asdict
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Query, Request
+from fastapi import APIRouter, Query
 from pydantic import BaseModel
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.responses import Response
@@ -79,9 +79,9 @@ async def ready(server: ServerDep) -> Response:
     response_class=Response,
     responses={**READ_ERRORS, 200: {"content": {"text/plain": {}}, "description": "The numbers"}},
 )
-def metrics(request: Request, server: ServerDep, caller: Viewer) -> Response:
+def metrics(call: Viewer) -> Response:
     """For Prometheus, with a viewer's token."""
-    rendered = request.app.state.metrics.render(server.db, server.hub, server.files)
+    rendered = call.request.app.state.metrics.render(call.server.db, call.server.hub, call.server.files)
     return Response(rendered, headers={"Content-Type": CONTENT_TYPE})
 
 
@@ -91,9 +91,7 @@ def metrics(request: Request, server: ServerDep, caller: Viewer) -> Response:
     responses={**READ_ERRORS, 200: {"content": {"text/event-stream": {}}, "description": "The events"}},
 )
 async def stream_events(
-    request: Request,
-    server: ServerDep,
-    caller: Viewer,
+    call: Viewer,
     item: Annotated[list[str] | None, Query(max_length=100)] = None,
     last_event_id: Annotated[str | None, Query(max_length=40)] = None,
 ) -> Response:
@@ -102,42 +100,42 @@ async def stream_events(
     ``item`` (part numbers or UUIDs, repeatable) lets only their events through. ``reset`` says: you were away
     for longer than the log goes back, read everything again.
     """
-    last = _event_id(request.headers.get("last-event-id") or last_event_id)
+    last = _event_id(call.request.headers.get("last-event-id") or last_event_id)
 
     def still_allowed() -> bool:
         try:
-            return find_actor(request) is not None
+            return find_actor(call.request) is not None
         except SQLAlchemyError:
             return True  # the database being away is no reason to send everybody away
 
-    return EventStream(server.hub, last, item or (), still_allowed)
+    return EventStream(call.server.hub, last, item or (), still_allowed)
 
 
 @router.get("/api/modules", responses=READ_ERRORS)
-async def modules(caller: Viewer) -> dict[str, Any]:
+async def modules(call: Viewer) -> dict[str, Any]:
     """What this server can do."""
     return {"modules": {name: {"enabled": True} for name in MODULES}}
 
 
 @router.get("/api/admin/mode", responses=READ_ERRORS)
-def get_mode(server: ServerDep, caller: Admin) -> dict[str, Any]:
+def get_mode(call: Admin) -> dict[str, Any]:
     """The mode: ``normal`` or ``read-only``."""
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         return {"mode": mode_of(tx)}
 
 
 @router.get("/api/admin/housekeeping", responses=READ_ERRORS)
-def get_housekeeping(server: ServerDep, caller: Admin) -> dict[str, Any]:
+def get_housekeeping(call: Admin) -> dict[str, Any]:
     """When old rows and files were last deleted, how many of what, and what went wrong; null before that."""
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         run = last_run(tx)
     return {"last_run": asdict(run) if run else None}
 
 
 @router.put("/api/admin/mode", responses=READ_ERRORS)
-def set_mode(server: ServerDep, caller: Admin, body: ModeBody) -> dict[str, Any]:
+def set_mode(call: Admin, body: ModeBody) -> dict[str, Any]:
     """Take changes, or take none (503) until set otherwise; all processes follow at once."""
-    with server.db.write(caller, even_when_read_only=True) as tx:
+    with call.write(even_when_read_only=True) as tx:
         return {"mode": events.set_mode(tx, body.mode)}
 
 

@@ -21,7 +21,6 @@ from silo_server.routes.context import (
     WRITE_ERRORS,
     Editor,
     ExpectedVersion,
-    ServerDep,
     Viewer,
     etag_of,
     json_answer,
@@ -67,18 +66,13 @@ Pieces = Annotated[int, Query(ge=1, le=1_000_000)]
 
 @router.get("/export.csv", response_class=Response, responses=_content("text/csv"))
 def export_csv(
-    server: ServerDep,
-    caller: Viewer,
-    part_number: str,
-    view: View = View.SINGLE,
-    pieces: Pieces = 1,
-    semicolons: bool = False,
+    call: Viewer, part_number: str, view: View = View.SINGLE, pieces: Pieces = 1, semicolons: bool = False
 ) -> Response:
     """The BOM as CSV (RFC 4180, UTF-8); cells that would run as formulas are made text.
 
     ``pieces``: totals for so many of it. ``semicolons``: for an Excel that expects 1,5 instead of 1.5.
     """
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         made = exports.export(tx, part_number, view, pieces)
     out = _spool()
     exports.to_csv(made, out, semicolons=semicolons)
@@ -86,11 +80,9 @@ def export_csv(
 
 
 @router.get("/export.xlsx", response_class=Response, responses=_content(XLSX))
-def export_xlsx(
-    server: ServerDep, caller: Viewer, part_number: str, view: View = View.SINGLE, pieces: Pieces = 1
-) -> Response:
+def export_xlsx(call: Viewer, part_number: str, view: View = View.SINGLE, pieces: Pieces = 1) -> Response:
     """The BOM as a workbook."""
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         made = exports.export(tx, part_number, view, pieces)
     out = _spool()
     exports.to_xlsx(made, out)
@@ -98,37 +90,30 @@ def export_xlsx(
 
 
 @router.get("/export.json", responses=READ_ERRORS)
-def export_json(
-    server: ServerDep, caller: Viewer, part_number: str, view: View = View.SINGLE, pieces: Pieces = 1
-) -> Response:
+def export_json(call: Viewer, part_number: str, view: View = View.SINGLE, pieces: Pieces = 1) -> Response:
     """The BOM as JSON."""
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         made = exports.export(tx, part_number, view, pieces)
     return json_answer(exports.to_json(made))
 
 
 @router.post("/import", responses=WRITE_ERRORS, openapi_extra=IMPORT_BODY)
 async def import_csv(
-    server: ServerDep,
-    caller: Editor,
-    part_number: str,
-    request: Request,
-    expected: ExpectedVersion,
-    dry_run: Annotated[bool, Query()] = False,
+    call: Editor, part_number: str, expected: ExpectedVersion, dry_run: Annotated[bool, Query()] = False
 ) -> Response:
     """Import a CSV (as the body, or as the form part ``file``).
 
     ``dry_run`` says row by row what would happen; without it everything is imported, or, where a row is
     wrong, nothing (400 with all problems).
     """
-    data, name = await _uploaded(request)
+    data, name = await _uploaded(call.request)
 
     def work() -> Response:
-        records = imports.read_csv(data, server.settings.max_merge_entries)
+        records = imports.read_csv(data, call.server.settings.max_merge_entries)
         if dry_run:
-            with server.db.read(caller) as tx:
+            with call.read() as tx:
                 return json_answer(plan_to_wire(imports.plan_import(tx, part_number, records), dry_run))
-        with server.db.write(caller) as tx:
+        with call.write() as tx:
             plan, _, version = imports.apply_import(tx, part_number, records, name, expected)
             return json_answer(plan_to_wire(plan, dry_run), headers={"ETag": etag_of(version)})
 

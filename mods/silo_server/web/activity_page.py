@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Query, Request
+from fastapi import APIRouter, Query
 from starlette.responses import Response
 
-from silo_server.routes.context import PageFrom, ServerDep
+from silo_server.routes.context import PageFrom
 from silo_server.services import events
 from silo_server.services.events import EventQuery, LoggedEvent
 from silo_server.services.items import get_by_uuids
@@ -51,9 +51,7 @@ class Entry:
 
 @router.get("/activity")
 def activity_page(
-    request: Request,
-    server: ServerDep,
-    caller: Reader,
+    call: Reader,
     before: PageFrom = None,
     after: PageFrom = None,
     kind: Annotated[str, Query(max_length=40)] = "",
@@ -66,7 +64,7 @@ def activity_page(
     ``before`` and ``after`` page through it; ``newer_than`` is for the page's script, which knows the rest.
     """
     asked = EventQuery(KINDS.get(kind, ()), user.strip(), item.strip())
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         if newer_than is None:
             part = part_of(partial(events.newest, tx, asked), MOST, before, after)
         else:
@@ -80,9 +78,8 @@ def activity_page(
     entries = [entry_of(event, items.get(event.item_uuid or "")) for event in part.rows]
     address = Address("/activity", {"kind": kind if kind in KINDS else "", "user": user, "item": item})
     return page(
-        request,
+        call,
         "activity.html",
-        caller,
         entries=entries,
         part=part,
         address=address,

@@ -5,14 +5,13 @@ from __future__ import annotations
 
 from functools import partial
 
-from fastapi import APIRouter, Request
+from fastapi import APIRouter
 from starlette.responses import Response
 
 from silo.bom.errors import RejectedError, VersionConflictError
-from silo_server.routes.context import PageFrom, Server, ServerDep
+from silo_server.routes.context import Call, PageFrom
 from silo_server.services.bom import history
 from silo_server.services.items import get_item
-from silo_server.values import Actor
 from silo_server.web.forms import Form, back, text, whole
 from silo_server.web.login_page import Reader, Writer
 from silo_server.web.merge_page import bom_path
@@ -29,16 +28,9 @@ KNOWN = 500
 
 
 @router.get("/items/{part_number}/history")
-def history_page(
-    request: Request,
-    server: ServerDep,
-    caller: Reader,
-    part_number: str,
-    before: PageFrom = None,
-    after: PageFrom = None,
-) -> Response:
+def history_page(call: Reader, part_number: str, before: PageFrom = None, after: PageFrom = None) -> Response:
     """All changes with their lines, newest first; ``before`` and ``after`` are the changes to page from."""
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         item = get_item(tx, part_number, include_archived=True)
         part = part_of(partial(history.list_changes, tx, item), PAGE_SIZE, before, after)
         lines = history.lines_of_changes(tx, [change.id for change in part.rows], TOLD_LINES)
@@ -47,9 +39,8 @@ def history_page(
         change.id: sentences(lines.get(change.id, []), TOLD_LINES, change.line_count) for change in part.rows
     }
     return page(
-        request,
+        call,
         "history.html",
-        caller,
         item=item,
         changes=part.rows,
         told=told,
@@ -60,22 +51,14 @@ def history_page(
 
 @router.get("/items/{part_number}/compare")
 def compare_page(
-    request: Request,
-    server: ServerDep,
-    caller: Reader,
-    part_number: str,
-    old: PageFrom = None,
-    new: PageFrom = None,
-    all: bool = False,
+    call: Reader, part_number: str, old: PageFrom = None, new: PageFrom = None, all: bool = False
 ) -> Response:
     """Two points of time, line by line; without ``old`` what the newest change did."""
-    return _compare(request, server, caller, part_number, (old, new), show_all=all)
+    return _compare(call, part_number, (old, new), show_all=all)
 
 
 def _compare(
-    request: Request,
-    server: Server,
-    caller: Actor,
+    call: Call,
     part_number: str,
     wanted: tuple[int | None, int | None],
     *,
@@ -85,7 +68,7 @@ def _compare(
     status: int = 200,
 ) -> Response:
     old, new = wanted
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         item = get_item(tx, part_number, include_archived=True)
         known = history.list_changes(tx, item, KNOWN)
         asked = {point for point in (old, new) if point} - {change.id for change in known}
@@ -103,9 +86,8 @@ def _compare(
         if show_all or row.status != "unchanged"
     ]
     return page(
-        request,
+        call,
         "compare.html",
-        caller,
         status=status,
         item=item,
         rows=shown,
@@ -125,13 +107,13 @@ STATUSES = ("added", "removed", "changed", "unchanged")
 
 
 @router.post("/items/{part_number}/restore")
-def restore(request: Request, server: ServerDep, caller: Writer, part_number: str, form: Form) -> Response:
+def restore(call: Writer, part_number: str, form: Form) -> Response:
     """Make the BOM again what it was, where nobody changed it since the page was shown; a new change."""
     change_id, reason = whole(form, "change_id"), text(form, "reason")
     if change_id is None:
         raise RejectedError("change_id: wanted the number of a change, got none; load the page again")
     try:
-        with server.db.write(caller) as tx:
+        with call.write() as tx:
             item = get_item(tx, part_number)
             was = len(history.state_at(tx, item, change_id))
             expected = whole(form, "version")
@@ -142,8 +124,6 @@ def restore(request: Request, server: ServerDep, caller: Writer, part_number: st
             "restore again if that, too, should be as it was."
         )
         points = (change_id, None)
-        return _compare(
-            request, server, caller, part_number, points, problem=problem, reason=reason, status=412
-        )
+        return _compare(call, part_number, points, problem=problem, reason=reason, status=412)
     said = f"Restored: {plural(was, 'line', 'lines')} as of change {change_id}."
     return back(bom_path(part_number), said, undo=made)

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from fastapi import APIRouter, Request
+from fastapi import APIRouter
 from starlette.datastructures import FormData, UploadFile
 from starlette.responses import Response
 
@@ -22,11 +22,10 @@ from silo.bom.errors import RejectedError, SiloError, VersionConflictError
 from silo.bom.headers import Role
 from silo.bom.numbers import Mark
 from silo_server.errors import TooLargeError
-from silo_server.routes.context import Server, ServerDep
+from silo_server.routes.context import Call
 from silo_server.services.bom import imports
 from silo_server.services.bom.imports import Layout
 from silo_server.services.items import get_item
-from silo_server.values import Actor
 from silo_server.web.forms import Form, back, text, whole
 from silo_server.web.login_page import Writer
 from silo_server.web.merge_page import bom_path
@@ -52,39 +51,39 @@ class Upload:
 
 
 @router.get("/items/{part_number}/import")
-def import_page(request: Request, server: ServerDep, caller: Writer, part_number: str) -> Response:
+def import_page(call: Writer, part_number: str) -> Response:
     """Choose a file."""
-    return _show(request, server, caller, part_number, None)
+    return _show(call, part_number, None)
 
 
 @router.post("/items/{part_number}/import/check")
-def check(request: Request, server: ServerDep, caller: Writer, part_number: str, form: Form) -> Response:
+def check(call: Writer, part_number: str, form: Form) -> Response:
     """Say what the file would do; nothing is written. The same file again, with other columns, comes back."""
     upload, layout = None, None
     try:
         upload = _carried(form) if "packed" in form else _uploaded(form)
         layout = layout_of(form)
-        return _show(request, server, caller, part_number, upload, layout)
+        return _show(call, part_number, upload, layout)
     except (RejectedError, TooLargeError) as error:
         shown = replace(Problem.of(error), upload=upload, layout=layout)
-        return _show(request, server, caller, part_number, None, problem=shown)
+        return _show(call, part_number, None, problem=shown)
 
 
 @router.post("/items/{part_number}/import")
-def apply(request: Request, server: ServerDep, caller: Writer, part_number: str, form: Form) -> Response:
+def apply(call: Writer, part_number: str, form: Form) -> Response:
     """Write it; where the BOM changed since the check, check again instead."""
     upload, layout = _carried(form), layout_of(form)
     try:
-        records = imports.read_csv(upload.data, server.settings.max_merge_entries, layout)
-        with server.db.write(caller) as tx:
+        records = imports.read_csv(upload.data, call.server.settings.max_merge_entries, layout)
+        with call.write() as tx:
             plan, change, _ = imports.apply_import(
                 tx, part_number, records, upload.name, whole(form, "version")
             )
     except VersionConflictError:
         problem = Problem("The BOM was changed by somebody else since the file was checked; look again.", 412)
-        return _show(request, server, caller, part_number, upload, layout, problem)
+        return _show(call, part_number, upload, layout, problem)
     except SiloError as error:
-        return _show(request, server, caller, part_number, upload, layout, Problem.of(error))
+        return _show(call, part_number, upload, layout, Problem.of(error))
     said = f"Imported {isolate(upload.name)}: {plan.count('add')} added, {plan.count('change')} changed."
     return back(bom_path(part_number), said, undo=change)
 
@@ -119,16 +118,14 @@ def layout_of(form: FormData) -> Layout | None:
 
 
 def _show(
-    request: Request,
-    server: Server,
-    caller: Actor,
+    call: Call,
     part_number: str,
     upload: Upload | None,
     layout: Layout | None = None,
     problem: Problem = Problem(),
 ) -> Response:
-    records = imports.read_csv(upload.data, server.settings.max_merge_entries, layout) if upload else ()
-    with server.db.read(caller) as tx:
+    records = imports.read_csv(upload.data, call.server.settings.max_merge_entries, layout) if upload else ()
+    with call.read() as tx:
         item = get_item(tx, part_number)
         plan = imports.plan_import(tx, part_number, records) if upload else None
     rows = plan.rows if plan else ()
@@ -137,9 +134,8 @@ def _show(
     order = {"error": 0, "add": 1, "change": 1, "skip": 2, "same": 2}
     file = upload or problem.upload
     return page(
-        request,
+        call,
         "import.html",
-        caller,
         status=problem.status,
         item=item,
         upload=upload,

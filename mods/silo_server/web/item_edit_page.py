@@ -13,21 +13,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from fastapi import APIRouter, Request
+from fastapi import APIRouter
 from starlette.datastructures import FormData, UploadFile
 from starlette.responses import Response
 
 from silo.bom.errors import RejectedError, SiloError
 from silo.bom.numbers import plain, read_number
 from silo_server.db.engine import Tx
-from silo_server.routes.context import Server, ServerDep
+from silo_server.routes.context import Call
 from silo_server.routes.revisions import store_file
 from silo_server.schema.catalog import ITEM_TYPES, SOURCING_TYPES, Category, find_schema
 from silo_server.services import items as service
 from silo_server.services.bom.tree import where_used
 from silo_server.services.items import ItemChange, NewItem, get_item
 from silo_server.services.revisions import Origin
-from silo_server.values import Actor, Item, Revision
+from silo_server.values import Item, Revision
 from silo_server.web.forms import Form, back, compared, same_text, text, whole
 from silo_server.web.login_page import Writer
 from silo_server.web.render import isolate, page, segment
@@ -61,15 +61,15 @@ class Shown:
 
 
 @router.get("/items/new")
-def new_page(request: Request, caller: Writer, category: str = "") -> Response:
+def new_page(call: Writer, category: str = "") -> Response:
     """An empty form."""
     typed = {"category": category, "id": str(uuid.uuid4())}
     typed |= {f"p.{one.name}": one.default for one in find_schema(None).fields if one.default}
-    return _page(request, caller, None, Shown(typed))
+    return _page(call, None, Shown(typed))
 
 
 @router.post("/items/new")
-def make(request: Request, server: ServerDep, caller: Writer, form: Form) -> Response:
+def make(call: Writer, form: Form) -> Response:
     """Make an item; the form's ``id`` makes a form that is sent twice one item."""
     typed = _typed(form) | {"id": text(form, "id")}
     try:
@@ -94,30 +94,30 @@ def make(request: Request, server: ServerDep, caller: Writer, form: Form) -> Res
             long_description=typed["long_description"] or None,
             properties=properties,
         )
-        with server.db.write(caller) as tx:
+        with call.write() as tx:
             item, made = service.create_item(tx, new)
     except SiloError as error:
-        return _page(request, caller, None, Shown(typed, {}, _problems(error), {}, error.status_hint))
+        return _page(call, None, Shown(typed, {}, _problems(error), {}, error.status_hint))
     said = f"{isolate(item.part_number)} made." if made else f"{isolate(item.part_number)} was made already."
     return back(f"/items/{segment(item.part_number)}", said)
 
 
 @router.get("/items/{part_number}/edit")
-def edit_page(request: Request, server: ServerDep, caller: Writer, part_number: str) -> Response:
+def edit_page(call: Writer, part_number: str) -> Response:
     """The form with what the item is."""
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         item = get_item(tx, part_number)
         uses = where_used(tx, item, limit=1)[1]
     now = texts_of(item)
-    return _page(request, caller, item, Shown(now, now), uses)
+    return _page(call, item, Shown(now, now), uses)
 
 
 @router.post("/items/{part_number}/edit")
-def change(request: Request, server: ServerDep, caller: Writer, part_number: str, form: Form) -> Response:
+def change(call: Writer, part_number: str, form: Form) -> Response:
     """Change what the person changed in the form."""
     typed, was = _typed(form), _typed(form, "was.")
     try:
-        with server.db.write(caller) as tx:
+        with call.write() as tx:
             item = get_item(tx, part_number, lock=True)
             now = texts_of(item)
             empty = dict.fromkeys([*now, *was, *typed], "")
@@ -125,16 +125,14 @@ def change(request: Request, server: ServerDep, caller: Writer, part_number: str
             clashes = {name: now.get(name, "") for name in edit.clashes}
             after = item if clashes else _change(tx, item, typed, set(edit.mine), text(form, "comment"))
     except SiloError as error:
-        return _again(
-            request, server, caller, part_number, Shown(typed, was, _problems(error), {}, error.status_hint)
-        )
+        return _again(call, part_number, Shown(typed, was, _problems(error), {}, error.status_hint))
     if clashes:
         # What others changed and this person did not is taken over; the rest is asked about.
         merged = {**now, **{name: typed.get(name, "") for name in [*edit.mine, *clashes]}}
         problem = (
             f"{isolate(item.updated_by)} changed this item while you were editing, so nothing was saved yet."
         )
-        return _again(request, server, caller, part_number, Shown(merged, now, [problem], clashes, 412))
+        return _again(call, part_number, Shown(merged, now, [problem], clashes, 412))
     said = (
         f"{isolate(after.part_number)} changed."
         if after.version != item.version
@@ -144,7 +142,7 @@ def change(request: Request, server: ServerDep, caller: Writer, part_number: str
 
 
 @router.post("/items/{part_number}/file")
-def upload(request: Request, server: ServerDep, caller: Writer, part_number: str, form: Form) -> Response:
+def upload(call: Writer, part_number: str, form: Form) -> Response:
     """A file as a new revision."""
     file = form.get("file")
     path = f"/items/{segment(part_number)}"
@@ -157,13 +155,13 @@ def upload(request: Request, server: ServerDep, caller: Writer, part_number: str
 
     comment, key = text(form, "comment", LONGEST), text(form, "key", 128) or None
     origin = Origin(whole(form, "base_revision"))
-    return store_file(server, caller, part_number, file, comment, answer, key=key, origin=origin)
+    return store_file(call, part_number, file, comment, answer, key=key, origin=origin)
 
 
 @router.post("/items/{part_number}/archive")
-def archive(server: ServerDep, caller: Writer, part_number: str, form: Form) -> Response:
+def archive(call: Writer, part_number: str, form: Form) -> Response:
     """Put an item into the archive."""
-    with server.db.write(caller) as tx:
+    with call.write() as tx:
         service.archive_item(tx, part_number, whole(form, "version"))
     path = f"/items/{segment(part_number)}"
     return back(
@@ -172,9 +170,9 @@ def archive(server: ServerDep, caller: Writer, part_number: str, form: Form) -> 
 
 
 @router.post("/items/{part_number}/unarchive")
-def unarchive(server: ServerDep, caller: Writer, part_number: str, form: Form) -> Response:
+def unarchive(call: Writer, part_number: str, form: Form) -> Response:
     """Bring an item back."""
-    with server.db.write(caller) as tx:
+    with call.write() as tx:
         item = service.unarchive_item(tx, part_number)
     return back(f"/items/{segment(item.part_number)}", f"{isolate(item.part_number)} is back.")
 
@@ -289,14 +287,14 @@ def _is_plain(value: Any) -> bool:
     return isinstance(value, bool | int | float) or (isinstance(value, str) and len(value) <= LONGEST)
 
 
-def _again(request: Request, server: Server, caller: Actor, part_number: str, shown: Shown) -> Response:
-    with server.db.read(caller) as tx:
+def _again(call: Call, part_number: str, shown: Shown) -> Response:
+    with call.read() as tx:
         item = get_item(tx, part_number)
         uses = where_used(tx, item, limit=1)[1]
-    return _page(request, caller, item, shown, uses)
+    return _page(call, item, shown, uses)
 
 
-def _page(request: Request, caller: Actor, item: Item | None, shown: Shown, uses: int = 0) -> Response:
+def _page(call: Call, item: Item | None, shown: Shown, uses: int = 0) -> Response:
     schema = find_schema(item.schema if item else None)
     fields = [(one, shown.typed.get(f"p.{one.name}", "")) for one in schema.fields]
     others = {name[2:]: value for name, value in shown.typed.items() if name.startswith("o.")}
@@ -306,9 +304,8 @@ def _page(request: Request, caller: Actor, item: Item | None, shown: Shown, uses
         groups.setdefault(schema.domains[one.domain], []).append(one)
     labels = LABELS | {f"p.{one.name}": one.title for one in schema.fields}
     return page(
-        request,
+        call,
         "item_edit.html",
-        caller,
         status=shown.status,
         item=item,
         shown=shown,

@@ -7,13 +7,12 @@ import secrets
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, Query, Request
+from fastapi import APIRouter, Depends, Query
 from starlette.responses import Response
 
 from silo.bom.errors import ConflictError
 from silo_server.db.engine import Tx
 from silo_server.errors import TooLargeError
-from silo_server.routes.context import ServerDep
 from silo_server.schema.catalog import ITEM_TYPES, find_schema
 from silo_server.services import revisions
 from silo_server.services.bom import rollup, tree
@@ -76,9 +75,7 @@ Asked = Annotated[Look, Depends()]
 
 @router.get("/items/{part_number}")
 def item_page(
-    request: Request,
-    server: ServerDep,
-    caller: Reader,
+    call: Reader,
     part_number: str,
     look: Asked,
     used_from: Annotated[int, Query(ge=0, le=10_000_000)] = 0,
@@ -88,15 +85,14 @@ def item_page(
 
     ``used_from`` pages through where it is used, ``revisions_before`` through its revisions.
     """
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         item = get_item(tx, part_number, include_archived=True)
         shown = structure_of(tx, item, look)
         history, revision_count = revisions.list_revisions(tx, item, before=revisions_before)
         used, uses = tree.where_used(tx, item, indirect=True, limit=MOST_USES, offset=used_from)
     return page(
-        request,
+        call,
         "item.html",
-        caller,
         item=item,
         look=look,
         at=look.address(f"/items/{segment(item.part_number)}"),
@@ -114,17 +110,15 @@ def item_page(
 
 
 @router.get("/items/{part_number}/print")
-def print_page(
-    request: Request, server: ServerDep, caller: Reader, part_number: str, look: Asked
-) -> Response:
+def print_page(call: Reader, part_number: str, look: Asked) -> Response:
     """The BOM for paper: all rows of the view on one page, with what a reader must know on top."""
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         item = get_item(tx, part_number, include_archived=True)
         shown = structure_of(tx, item, look, MOST_PRINTED)
         now = tx.stamp
     path = f"/items/{segment(item.part_number)}"
     values = {"item": item, "look": look, "at": look.address(path), "now": now, **shown}
-    return page(request, "print.html", caller, **values)
+    return page(call, "print.html", **values)
 
 
 def structure_of(tx: Tx, item: Item, look: Look, size: int = PAGE_ROWS) -> dict[str, Any]:
@@ -168,9 +162,7 @@ PAGE_SIZE = 100
 @router.get("/")
 @router.get("/items")
 def items_page(
-    request: Request,
-    server: ServerDep,
-    caller: Reader,
+    call: Reader,
     q: Annotated[str, Query(max_length=200)] = "",
     type: Annotated[str, Query(max_length=20)] = "",
     category: Annotated[str, Query(max_length=32)] = "",
@@ -188,14 +180,13 @@ def items_page(
         offset=(number - 1) * PAGE_SIZE,
         sort=sort,
     )
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         found, total = list_items(tx, query)
         used = tree.use_counts(tx, [item.id for item in found])
     asked = {"q": q, "type": type, "category": category, "archived": "1" if archived else "", "sort": sort}
     return page(
-        request,
+        call,
         "items.html",
-        caller,
         at=Address("/items", {name: value for name, value in asked.items() if value}),
         table=Page(found, total, total, number, PAGE_SIZE),
         used=used,

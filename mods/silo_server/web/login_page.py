@@ -17,6 +17,7 @@ from silo_server.routes.context import (
     FORM_TYPES,
     SAFE_METHODS,
     SESSION_COOKIE,
+    Call,
     FormSecretError,
     Guard,
     ServerDep,
@@ -39,7 +40,7 @@ from silo_server.web.forms import (
     text,
     unpacked,
 )
-from silo_server.web.render import page
+from silo_server.web.render import page_for
 
 router = APIRouter(include_in_schema=False)
 
@@ -63,7 +64,7 @@ class OldFormError(Exception):
 class PageGuard(Guard):
     """As :class:`Guard`, for people: what they typed is kept over a login."""
 
-    async def __call__(self, request: Request) -> Actor:
+    async def __call__(self, request: Request) -> Call:
         try:
             return await super().__call__(request)
         except FormSecretError:
@@ -89,9 +90,9 @@ async def _kept(request: Request) -> Kept | None:
     return kept_form(request.url.path, await form_of(request))
 
 
-Reader = Annotated[Actor, Depends(PageGuard(Role.VIEWER))]
-Writer = Annotated[Actor, Depends(PageGuard(Role.EDITOR))]
-Administrator = Annotated[Actor, Depends(PageGuard(Role.ADMIN))]
+Reader = Annotated[Call, Depends(PageGuard(Role.VIEWER))]
+Writer = Annotated[Call, Depends(PageGuard(Role.EDITOR))]
+Administrator = Annotated[Call, Depends(PageGuard(Role.ADMIN))]
 
 
 def own_form(request: Request) -> None:
@@ -117,7 +118,7 @@ def _login_page(
     request: Request, target: str, problem: str = "", status: int = 200, kept: Kept | None = None
 ) -> Response:
     values = {"target": target, "problem": problem, "kept": kept}
-    return page(request, "login.html", None, status=status, **values)
+    return page_for(request, None, "login.html", status=status, **values)
 
 
 async def to_login(request: Request, error: Exception) -> Response:
@@ -132,7 +133,9 @@ async def send_again(request: Request, error: Exception) -> Response:
     """Ask whether a form of an earlier session is to be sent."""
     assert isinstance(error, OldFormError)
     actor, kept = error.actor, error.kept
-    return await anyio.to_thread.run_sync(lambda: page(request, "again.html", actor, status=403, kept=kept))
+    return await anyio.to_thread.run_sync(
+        lambda: page_for(request, actor, "again.html", status=403, kept=kept)
+    )
 
 
 START = "/"
@@ -158,7 +161,7 @@ def log_in(request: Request, server: ServerDep, form: Form) -> Response:
         actor = find_actor(request)
         if actor is None:
             return _login_page(request, target, "You are not logged in yet in this browser.", 401, kept)
-        return page(request, "again.html", actor, kept=kept) if kept else back(target)
+        return page_for(request, actor, "again.html", kept=kept) if kept else back(target)
     try:
         session = logins.log_in(
             server.db, text(form, "username", 200), password_of(form, "password"), client_address(request)
@@ -166,17 +169,17 @@ def log_in(request: Request, server: ServerDep, form: Form) -> Response:
     except (AuthError, TooManyAttemptsError) as error:
         return _login_page(request, target, str(error), error.status_hint, kept)
     if kept is None:
-        return _with_session(request, server, session, target)
+        return _with_session(request, session, target)
     actor = logins.actor_by_session(server.db, session.secret, client_address(request))
-    shown = page(request, "again.html", actor, kept=kept)
-    set_session_cookie(shown, server, session, request)
+    shown = page_for(request, actor, "again.html", kept=kept)
+    set_session_cookie(shown, request, session)
     return shown
 
 
 @router.get("/login/link/{secret}")
 def login_link(request: Request, secret: str, next: Next = START) -> Response:
     """Ask whether to use the link up: what only looks at links (mail scanners, previews) must not do that."""
-    return page(request, "login_link.html", None, secret=secret, target=local_path(next))
+    return page_for(request, None, "login_link.html", secret=secret, target=local_path(next))
 
 
 @router.post("/login/link/{secret}", dependencies=[Depends(own_form)])
@@ -189,19 +192,19 @@ def use_link(request: Request, server: ServerDep, secret: str, form: Form) -> Re
         if find_actor(request) is not None:
             return back(target)
         return _login_page(request, target, str(error), 401)
-    return _with_session(request, server, session, target)
+    return _with_session(request, session, target)
 
 
 @router.post("/logout")
-def log_out(server: ServerDep, caller: Reader) -> Response:
+def log_out(call: Reader) -> Response:
     """End the session."""
-    logins.log_out(server.db, caller)
+    logins.log_out(call.server.db, call.actor)
     response = RedirectResponse("/login", 303)
     response.delete_cookie(SESSION_COOKIE)
     return response
 
 
-def _with_session(request: Request, server: ServerDep, session: logins.NewSession, target: str) -> Response:
+def _with_session(request: Request, session: logins.NewSession, target: str) -> Response:
     response = back(target)
-    set_session_cookie(response, server, session, request)
+    set_session_cookie(response, request, session)
     return response

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import Annotated, Any
 from urllib.parse import parse_qsl, urlencode
 
-from fastapi import APIRouter, Query, Request
+from fastapi import APIRouter, Query
 from starlette.datastructures import FormData
 from starlette.responses import Response
 
@@ -18,7 +18,7 @@ from silo.bom.errors import ConflictError, NotFoundError, RejectedError, SiloErr
 from silo.bom.numbers import whole_number
 from silo_server.db.engine import Tx
 from silo_server.errors import DuplicateError, LinesChangedError
-from silo_server.routes.context import Server, ServerDep
+from silo_server.routes.context import Call
 from silo_server.services import events
 from silo_server.services.bom import edits, history
 from silo_server.services.bom import review as service
@@ -26,7 +26,7 @@ from silo_server.services.bom.last_sync import in_sentences, last_sync
 from silo_server.services.bom.lines import LineId, component_of, line_of, lines_of, mark_of
 from silo_server.services.bom.review import Decision
 from silo_server.services.items import get_item
-from silo_server.values import Actor, Line, LineState
+from silo_server.values import Line, LineState
 from silo_server.web import line_form
 from silo_server.web.forms import AmbiguousError, Form, back, text, texts, whole
 from silo_server.web.line_form import LineForm
@@ -86,22 +86,16 @@ def bom_path(part_number: str) -> str:
 
 
 @router.get("/items/{part_number}/bom")
-def merge_page(
-    request: Request,
-    server: ServerDep,
-    caller: Reader,
-    part_number: str,
-    edit: Annotated[str, Query(max_length=64)] = "",
-) -> Response:
+def merge_page(call: Reader, part_number: str, edit: Annotated[str, Query(max_length=64)] = "") -> Response:
     """Unreferenced lines, conflicts, the last sync in plain words, and the lines; ``edit`` opens one.
 
     ``q``, ``show``, ``sort`` and ``page`` say which lines the table has (:func:`table_of`).
     """
-    return _show(request, server, caller, part_number, Asked(edit=edit, view=view_of(request.url.query)))
+    return _show(call, part_number, Asked(edit=edit, view=view_of(call.request.url.query)))
 
 
 @router.post("/items/{part_number}/bom/decide")
-def decide(request: Request, server: ServerDep, caller: Writer, part_number: str, form: Form) -> Response:
+def decide(call: Writer, part_number: str, form: Form) -> Response:
     """Carry a decision out, for one line or for all chosen ones, if they are as the person saw them."""
     chosen = [value.partition(" ")[0] for value in texts(form, "chosen")]
     reasons = {chosen[0] if chosen and "bulk" not in form else "": str(form.get("reason", ""))}
@@ -125,11 +119,11 @@ def decide(request: Request, server: ServerDep, caller: Writer, part_number: str
             raise Refused(replace(asked, problem=problem, story=told, chosen=left), 412) from None
         return _done(decisions), change
 
-    return _do(request, server, caller, part_number, form, work, asked)
+    return _do(call, part_number, form, work, asked)
 
 
 @router.post("/items/{part_number}/bom/undo")
-def undo(request: Request, server: ServerDep, caller: Writer, part_number: str, form: Form) -> Response:
+def undo(call: Writer, part_number: str, form: Form) -> Response:
     """Take a change back, as a new change."""
 
     def work(tx: Tx) -> tuple[str, int]:
@@ -138,11 +132,11 @@ def undo(request: Request, server: ServerDep, caller: Writer, part_number: str, 
             raise RejectedError("change_id: wanted the number of a change, got none; load the page again")
         return "Undone.", history.undo(tx, part_number, change_id, None)[0]
 
-    return _do(request, server, caller, part_number, form, work)
+    return _do(call, part_number, form, work)
 
 
 @router.post("/items/{part_number}/bom/lines")
-def add_line(request: Request, server: ServerDep, caller: Writer, part_number: str, form: Form) -> Response:
+def add_line(call: Writer, part_number: str, form: Form) -> Response:
     """Add a manual line. Where the part has one already, that one is opened with what was typed."""
     sent = line_form.read(form)
     child = text(form, "child")
@@ -163,13 +157,11 @@ def add_line(request: Request, server: ServerDep, caller: Writer, part_number: s
             raise Refused(replace(asked, problem=problem, edit=line.id, typed=typed)) from None
         return f"{isolate(added.child_part_number)} added.", added.change_id
 
-    return _do(request, server, caller, part_number, form, work, asked)
+    return _do(call, part_number, form, work, asked)
 
 
 @router.post("/items/{part_number}/bom/lines/{line_id}")
-def change_line(
-    request: Request, server: ServerDep, caller: Writer, part_number: str, line_id: str, form: Form
-) -> Response:
+def change_line(call: Writer, part_number: str, line_id: str, form: Form) -> Response:
     """Change what the person changed in the form of a line; what two people changed is asked about."""
 
     def change(tx: Tx, line: Line, sent: LineForm, asked: Asked, told: list[str]) -> tuple[str, int]:
@@ -189,13 +181,11 @@ def change_line(
             return f"Nothing was different, so nothing was changed.{also}", 0
         return f"{isolate(edited.child_part_number)} changed.{also}", edited.change_id
 
-    return _do_line(request, server, caller, part_number, line_id, form, change)
+    return _do_line(call, part_number, line_id, form, change)
 
 
 @router.post("/items/{part_number}/bom/lines/{line_id}/remove")
-def remove_line(
-    request: Request, server: ServerDep, caller: Writer, part_number: str, line_id: str, form: Form
-) -> Response:
+def remove_line(call: Writer, part_number: str, line_id: str, form: Form) -> Response:
     """Take a line out of the BOM, if it is as the person saw it."""
 
     def remove(tx: Tx, line: Line, sent: LineForm, asked: Asked, told: list[str]) -> tuple[str, int]:
@@ -207,13 +197,11 @@ def remove_line(
             raise Refused(replace(asked, problem=problem, story=told), 412) from None
         return f"{isolate(edited.child_part_number)} removed.", edited.change_id
 
-    return _do_line(request, server, caller, part_number, line_id, form, remove)
+    return _do_line(call, part_number, line_id, form, remove)
 
 
 def _do_line(
-    request: Request,
-    server: Server,
-    caller: Actor,
+    call: Call,
     part_number: str,
     line_id: str,
     form: FormData,
@@ -239,7 +227,7 @@ def _do_line(
             raise Refused(replace(asked, problem=problem, story=told, edit="", typed=typed), 404) from None
         return act(tx, line, sent, asked, told)
 
-    return _do(request, server, caller, part_number, form, work, asked)
+    return _do(call, part_number, form, work, asked)
 
 
 def view_of(query: str) -> str:
@@ -248,9 +236,7 @@ def view_of(query: str) -> str:
 
 
 def _do(
-    request: Request,
-    server: Server,
-    caller: Actor,
+    call: Call,
     part_number: str,
     form: FormData,
     work: Callable[[Tx], tuple[str, int]],
@@ -260,22 +246,20 @@ def _do(
     view = view_of(text(form, "view", 1000))
     given = replace(asked or Asked(), view=view)
     try:
-        with server.db.write(caller) as tx:
+        with call.write() as tx:
             notice, change_id = work(tx)
     except Refused as refused:
         shown = replace(refused.asked, view=view)
-        return _show(request, server, caller, part_number, shown, refused.status)
+        return _show(call, part_number, shown, refused.status)
     except SiloError as error:
         readings = error.readings if isinstance(error, AmbiguousError) else ()
         shown = replace(given, problem=_sentence(error), readings=readings)
-        return _show(request, server, caller, part_number, shown, error.status_hint)
+        return _show(call, part_number, shown, error.status_hint)
     return back(bom_path(part_number) + (f"?{view}" if view else ""), notice, undo=change_id)
 
 
-def _show(
-    request: Request, server: Server, caller: Actor, part_number: str, asked: Asked, status: int = 200
-) -> Response:
-    with server.db.read(caller) as tx:
+def _show(call: Call, part_number: str, asked: Asked, status: int = 200) -> Response:
+    with call.read() as tx:
         item = get_item(tx, part_number)
         found = service.review(tx, item.part_number)
         lines = lines_of(tx, item)
@@ -293,9 +277,8 @@ def _show(
     now = line_form.shown(editing.state) if editing else {}
     table, table_at = table_of(lines, bom_path(item.part_number), asked.view)
     return page(
-        request,
+        call,
         "merge.html",
-        caller,
         status=status,
         item=item,
         total=len(lines),

@@ -34,7 +34,7 @@ from silo_server.web import (
     waiting_page,
 )
 from silo_server.web.login_page import LoginNeededError, OldFormError, send_again, to_login
-from silo_server.web.render import page, sentence
+from silo_server.web.render import page_for, sentence
 
 ROUTERS = (
     login_page.router,
@@ -106,10 +106,10 @@ async def error_page(request: Request, plain: Response) -> Response:
     kept = getattr(request.state, "kept", None)
 
     def draw() -> Response:
-        return page(
+        return page_for(
             request,
-            "error.html",
             _actor(request),
+            "error.html",
             status=plain.status_code,
             title=TITLES.get(plain.status_code, "The server made a mistake"),
             message=_sentence(plain.status_code, told["message"], request),

@@ -18,7 +18,7 @@ from starlette.responses import HTMLResponse, Response
 from silo.bom.numbers import as_decimal, whole_number
 from silo_server.clock import wire
 from silo_server.db.engine import mode_of
-from silo_server.routes.context import masked, server_of
+from silo_server.routes.context import Call, masked, server_of
 from silo_server.services.bom.review import waiting_count
 from silo_server.values import Actor, Role
 
@@ -171,8 +171,13 @@ def _state(request: Request) -> tuple[bool, int]:
         return False, 0
 
 
-def page(
-    request: Request, template: str, actor: Actor | None, *, status: int = 200, **values: Any
+def page(call: Call, template: str, *, status: int = 200, **values: Any) -> Response:
+    """A page for somebody who is logged in; see :func:`page_for`."""
+    return page_for(call.request, call.actor, template, status=status, **values)
+
+
+def page_for(
+    request: Request, actor: Actor | None, template: str, *, status: int = 200, **values: Any
 ) -> Response:
     """A page. ``actor`` None: nobody is logged in. A notice that waits in its cookie is shown once.
 

@@ -7,13 +7,12 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Query, Request
+from fastapi import APIRouter, Query
 from starlette.responses import Response
 
 from silo.bom.errors import SiloError, VersionConflictError
-from silo_server.routes.context import Server, ServerDep
+from silo_server.routes.context import Call
 from silo_server.services.bom.review import Waiting, decide_all, waiting
-from silo_server.values import Actor
 from silo_server.web.forms import Form, back, text, texts
 from silo_server.web.line_form import DONE, decision_of
 from silo_server.web.login_page import Reader, Writer
@@ -44,9 +43,7 @@ MOST_TOLD = 20
 
 @router.get("/waiting")
 def waiting_page(
-    request: Request,
-    server: ServerDep,
-    caller: Reader,
+    call: Reader,
     q: Annotated[str, Query(max_length=200)] = "",
     folder: Annotated[str, Query(max_length=1024)] = "",
     kind: Annotated[str, Query(max_length=20)] = "",
@@ -55,11 +52,11 @@ def waiting_page(
 ) -> Response:
     """The table; ``folder`` is a project's folder or one in it."""
     view = {"q": q, "folder": folder, "kind": kind, "sort": sort, "page": str(number) if number > 1 else ""}
-    return _show(request, server, caller, {name: value for name, value in view.items() if value})
+    return _show(call, {name: value for name, value in view.items() if value})
 
 
 @router.post("/waiting/decide")
-def decide(request: Request, server: ServerDep, caller: Writer, form: Form) -> Response:
+def decide(call: Writer, form: Form) -> Response:
     """One decision about all chosen BOMs. Each is a change of its own; what was not done is named."""
     action, reason = decision_of(form)
     lines = boms = 0
@@ -70,7 +67,7 @@ def decide(request: Request, server: ServerDep, caller: Writer, form: Form) -> R
             problems.append(f"{isolate(value[:80])}: this is no BOM of the table; load the page again")
             continue
         try:
-            with server.db.write(caller) as tx:
+            with call.write() as tx:
                 count = decide_all(tx, part_number, action, reason, seen)
             lines, boms = lines + count, boms + bool(count)
         except VersionConflictError:
@@ -83,21 +80,19 @@ def decide(request: Request, server: ServerDep, caller: Writer, form: Form) -> R
         said = "Nothing of this kind was open in what was chosen, so nothing was changed."
     view = dict(Address("/waiting", {n: text(form, n, 1024) for n in ("q", "folder", "kind", "sort")}).but())
     if problems:
-        return _show(request, server, caller, view, said, problems, text(form, "reason"), 409)
+        return _show(call, view, said, problems, text(form, "reason"), 409)
     return back(Address("/waiting", view).url(), said)
 
 
 def _show(
-    request: Request,
-    server: Server,
-    caller: Actor,
+    call: Call,
     view: Mapping[str, str],
     said: str = "",
     problems: list[str] | None = None,
     reason: str = "",
     status: int = 200,
 ) -> Response:
-    with server.db.read(caller) as tx:
+    with call.read() as tx:
         rows = waiting(tx)
     folders = Counter(part for row in rows for part in _folders(row.last.folder))
     test, kind, folder = fits(view.get("q", "")), KINDS.get(view.get("kind", "")), view.get("folder", "")
@@ -110,9 +105,8 @@ def _show(
     ]
     table = page_of(arranged(found, view.get("sort", ""), _SORTS), len(rows), int(view.get("page", "1")))
     return page(
-        request,
+        call,
         "waiting.html",
-        caller,
         status=status,
         at=Address("/waiting", view),
         table=table,

@@ -1,25 +1,49 @@
 // SPDX-License-Identifier: LGPL-2.1-or-later
-// "Choose all" for the boxes of a bulk decision, and how many are chosen.
+// The boxes of a bulk decision: "choose all", how many are chosen, and those that a filter hides stay chosen.
 
 const all = document.getElementById("all");
 const told = document.getElementById("count");
-const boxes = () => [...document.querySelectorAll('input[name="chosen"][form="bulk"]')];
+const form = document.getElementById("bulk");
+const boxes = () => [...document.querySelectorAll('input[type="checkbox"][name="chosen"][form="bulk"]')];
+const chosen = new Set();
+// A value is "mark number": what was seen, and of what.
+const number = (value) => value.slice(value.indexOf(" ") + 1);
 
 function recount() {
   const found = boxes();
-  const chosen = found.filter((box) => box.checked).length;
-  all.checked = chosen > 0 && chosen === found.length;
-  all.indeterminate = chosen > 0 && chosen < found.length;
-  told.textContent = chosen ? `${chosen} of ${found.length} chosen` : "";
+  for (const box of found) box.checked ? chosen.add(box.value) : chosen.delete(box.value);
+  const shown = new Set(found.map((box) => box.value));
+  const hidden = [...chosen].filter((value) => !shown.has(value));
+  const here = chosen.size - hidden.length;
+  all.checked = here > 0 && here === found.length;
+  all.indeterminate = chosen.size > 0 && !all.checked;
+  const rest = hidden.length ? `${chosen.size} chosen, ${hidden.length} of them not shown` : "";
+  told.textContent = rest || (here ? `${here} of ${found.length} chosen` : "");
+  for (const input of form.querySelectorAll("input[type=hidden][name=chosen]")) input.remove();
+  for (const value of hidden) {
+    const input = document.createElement("input");
+    Object.assign(input, { type: "hidden", name: "chosen", value });
+    form.append(input);
+  }
 }
 
 if (all) {
   all.closest("label").hidden = false;
   all.addEventListener("change", () => {
     for (const box of boxes()) box.checked = all.checked;
+    if (!all.checked) chosen.clear();
     recount();
   });
   document.addEventListener("change", (event) => event.target.name === "chosen" && recount());
-  document.addEventListener("shown", recount); // another view of the table has other boxes
+  // Another view of the table has other boxes. What changed meanwhile has another mark, and has to be chosen anew.
+  document.addEventListener("shown", () => {
+    const now = new Map(boxes().map((box) => [number(box.value), box]));
+    for (const value of [...chosen]) {
+      const box = now.get(number(value));
+      if (box?.value === value) box.checked = true;
+      else if (box) chosen.delete(value);
+    }
+    recount();
+  });
   recount();
 }
