@@ -2,8 +2,7 @@
 """JSON that users give us (properties, a line's metadata): what is let in, how it is stored, how it is read.
 
 One guard (:func:`json_problem`) stands on every way in. What it accepts, :func:`dumps` and
-``routes.context.json_answer`` can always write. :func:`loads` reads values that were stored before there was
-a guard: what could not be sent to anybody becomes text, so that the item can be read and mended.
+``routes.context.json_answer`` can always write.
 """
 
 from __future__ import annotations
@@ -29,20 +28,6 @@ _DIGITS = 309
 def dumps(value: Any) -> str:
     """Compact JSON text, as stored and sent."""
     return json.dumps(value, separators=(",", ":"), ensure_ascii=False)
-
-
-def loads(stored: str, deepest: int = MAX_DEPTH) -> Any:
-    """The value of JSON text from the database, always one that can be sent on.
-
-    NaN and Infinity, numbers that are too long, and what lies deeper than ``deepest`` come as text.
-    """
-    if not _suspicious(stored):
-        return json.loads(stored)
-    try:
-        value = json.loads(stored, parse_constant=str, parse_float=_float, parse_int=_whole)
-        return _cut(value, deepest)
-    except (ValueError, RecursionError):
-        return {"unreadable": stored[:1000]}
 
 
 def json_problem(value: Any) -> str | None:
@@ -103,35 +88,3 @@ def _scalar_problem(value: Any) -> str | None:
 def is_text(text: str) -> bool:
     """True for a text that both databases can keep: no NUL, no half of a surrogate pair."""
     return "\x00" not in text and (text.isascii() or not any("\ud800" <= c <= "\udfff" for c in text))
-
-
-def _suspicious(stored: str) -> bool:
-    # Cheap, and true for every text that is not plainly fine: this is asked for each row that is read.
-    return (
-        stored.count("{") + stored.count("[") > MAX_DEPTH
-        or "NaN" in stored
-        or "Infinity" in stored
-        or len(stored) > 4000  # room for a whole number that Python refuses to read
-    )
-
-
-def _float(text: str) -> float | str:
-    value = float(text)
-    return value if math.isfinite(value) else text
-
-
-def _whole(text: str) -> int | str:
-    return int(text) if len(text.lstrip("-")) <= _DIGITS else text
-
-
-def _cut(value: Any, levels: int) -> Any:
-    if levels < 1 and isinstance(value, dict | list):
-        try:
-            return dumps(value)
-        except RecursionError:
-            return "…"
-    if isinstance(value, dict):
-        return {key: _cut(below, levels - 1) for key, below in value.items()}
-    if isinstance(value, list):
-        return [_cut(below, levels - 1) for below in value]
-    return value

@@ -14,9 +14,6 @@ from urllib.parse import quote, urlencode
 import pytest
 from server_testing import Api, bom, form_body
 
-from silo_server.run import RunningServer
-from silo_server.services.items import get_item
-
 DEPTHS = [33, 260, 900, 20_000]
 
 
@@ -94,36 +91,6 @@ def test_what_is_let_in_is_served_as_it_was_sent(api: Api, way: str) -> None:
         assert told == value
     for rest in ("expanded", "flat", "history", "export.json"):
         assert api.get(bom(parent, rest))
-
-
-def test_a_value_that_was_stored_before_the_guard_can_be_read_and_mended(
-    api: Api, server: RunningServer
-) -> None:
-    """A database of an older version may hold what is refused now: it is served as text, and replaced."""
-    from sqlalchemy import update
-
-    from silo_server.db.tables import bom_lines, items
-
-    parent, child = api.items(2)
-    api.good("POST", bom(parent), {"child_part_number": child})
-    db = server.app.state.server.db
-    for poison in (nested(300), nested(990), '{"m": NaN, "n": Infinity}', '{"m": ' + "9" * 5000 + "}"):
-        with db.write() as tx:
-            item = get_item(tx, parent)
-            tx.conn.execute(update(items).where(items.c.id == item.id).values(properties=poison))
-            tx.conn.execute(update(bom_lines).where(bom_lines.c.parent_id == item.id).values(metadata=poison))
-        shown = api.get(f"/api/items/{parent}")["properties"]
-        json.dumps(shown, allow_nan=False)
-        assert shown
-        assert api.get(bom(parent))[0]["metadata"] == shown
-        for path in ("/api/items?search=" + parent, bom(parent, "expanded"), bom(parent, "export.csv")):
-            assert api.call("GET", path).status == 200
-        page = api.call("GET", f"/items/{parent}", headers={"Accept": "text/html"})
-        assert page.status == 200
-        api.good("PUT", f"/api/items/{parent}", {"properties": {"m": 1}})
-        api.good("PUT", bom(parent, child), {"metadata": {"m": 2}})
-        assert api.get(f"/api/items/{parent}")["properties"] == {"m": 1}
-        assert api.get(bom(parent))[0]["metadata"] == {"m": 2}
 
 
 @pytest.mark.parametrize(

@@ -29,9 +29,7 @@ from silo_server.routes.context import (
     raw_json,
 )
 from silo_server.routes.models import (
-    BomLineOut,
     BomsOut,
-    ExpandedLineOut,
     LineChangeBody,
     LineOut,
     NewLineBody,
@@ -70,7 +68,7 @@ MERGE_BODY = {
 }
 
 
-@router.get("", response_model=list[BomLineOut], responses=READ_ERRORS)
+@router.get("", response_model=list[LineOut], responses=READ_ERRORS)
 def get_bom(call: Viewer, part_number: str) -> Response:
     """The lines of one level. ``ETag`` is the BOM's version, for ``If-Match``."""
     with call.read() as tx:
@@ -165,7 +163,7 @@ async def merge(call: Editor, part_number: str, expected: ExpectedVersion) -> Re
     return raw_json(outcome.answer, headers={"ETag": etag_of(outcome.version)})
 
 
-@router.get("/expanded", response_model=list[ExpandedLineOut], responses=READ_ERRORS)
+@router.get("/expanded", response_model=list[LineOut], responses=READ_ERRORS)
 def get_expanded(call: Viewer, part_number: str, depth: Depth = tree.MAX_DEPTH) -> Response:
     """The tree as rows, parents before children; quantities per one parent, and in total."""
     with call.read() as tx:

@@ -15,11 +15,12 @@ from pydantic import (
     WithJsonSchema,
 )
 
-from silo.api.wire import LinkedFile
+from silo.api import wire
 from silo.bom.numbers import LARGEST_QUANTITY, read_quantity
 from silo_server.routes import document
 from silo_server.services.bom.edits import REL_TYPES, SOURCES
 from silo_server.services.bom.merge_json import quantity_problem
+from silo_server.services.search import LookAlike
 
 
 def _no_nul(text: str) -> str:
@@ -172,31 +173,15 @@ class NumberOut(BaseModel):
     part_number: str
 
 
-class ItemOut(BaseModel):
-    """An item."""
+class ItemOut(wire.Item):
+    """An item, with what this server says beyond the contract."""
 
-    model_config = ConfigDict(protected_namespaces=(), populate_by_name=True)
-
-    id: str
-    part_number: str
-    name: str
-    description: str
-    item_type: str
-    schema_name: str | None = Field(alias="schema")
-    category: str | None
-    sourcing_type: str | None
-    long_description: str | None
-    thumbnail_key: str | None
-    properties: dict[str, Any]
-    current_revision: int
-    bom_version: int
+    schema_name: str | None = Field(None, alias="schema")
     version: int
-    created_at: str
     created_by: str
-    updated_at: str
     updated_by: str
-    archived_at: str | None
-    last_sync: dict[str, Any] | None = None
+    archived_at: wire.Time
+    last_sync: wire.LastSync | None = None
 
 
 class ItemsOut(BaseModel):
@@ -205,38 +190,17 @@ class ItemsOut(BaseModel):
     items: list[ItemOut]
 
 
-class LookAlikeOut(BaseModel):
-    """An item with the name of a component, or with its very file."""
-
-    id: str
-    part_number: str
-    name: str
-    same_file: bool
-
-
 class LookAlikesOut(BaseModel):
     """For each component, in the order asked; at most twelve, those with the same file first."""
 
-    look_alikes: list[list[LookAlikeOut]]
+    look_alikes: list[list[LookAlike]]
 
 
-class RevisionOut(BaseModel):
+class RevisionOut(wire.Revision):
     """A revision: a property snapshot and, where one was uploaded, a file."""
 
     part_number: str
-    revision_number: int
-    comment: str
-    status: str
-    properties: dict[str, Any]
-    file_name: str | None
-    file_checksum: str | None
-    file_size: int | None
     thumbnail_key: str | None
-    created_at: str
-    created_by: str
-    base_revision: int | None
-    file_path: str | None
-    links: list[LinkedFile] | None = None
 
 
 class RevisionBody(Body):
@@ -246,53 +210,23 @@ class RevisionBody(Body):
     comment: Text = ""
 
 
-class LineOut(BaseModel):
-    """A BOM line. ``unreferenced_since`` is set while no component of the assembly uses it."""
+class LineOut(wire.BomLine):
+    """A BOM line, with what this server says beyond the contract.
+
+    ``assembly_told`` and ``components`` are in a list of one level only, ``depth`` in a tree.
+    """
 
     id: str
-    parent_part_number: str
-    child_part_number: str
-    child_id: str
-    child_name: str
-    child_description: str
-    child_item_type: str
-    rel_type: str
-    quantity: float
-    unit: str | None
-    reference_designators: list[str]
-    find_number: str | None
-    notes: str | None
-    child_revision: int | None
-    effective_revision: int
     newer_revision_exists: bool
     child_archived: bool
-    source: str
-    unreferenced_since: str | None
-    override: bool
     cad_quantity: float | None
     reason: str | None
-    metadata: dict[str, Any]
-
-
-class BomLineOut(LineOut):
-    """A line of one level. ``assembly_told``: the last merge said another quantity, ``assembly_quantity``."""
-
-    assembly_told: bool
-    assembly_quantity: float | None
-    components: list[dict[str, str]]
 
 
 class BomsOut(BaseModel):
     """The lines of each item that was found, by the part number as it was asked for."""
 
-    boms: dict[str, list[BomLineOut]]
-
-
-class ExpandedLineOut(LineOut):
-    """A line somewhere down the tree; ``total_quantity`` is per one of the top item."""
-
-    depth: int
-    total_quantity: float
+    boms: dict[str, list[LineOut]]
 
 
 class NewLineBody(Body):

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import uuid as uuids
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -16,7 +17,7 @@ from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import items
 from silo_server.errors import DuplicateError
-from silo_server.json_values import check_json, loads, merge_patch
+from silo_server.json_values import check_json, merge_patch
 from silo_server.schema.catalog import ITEM_TYPES, Category, find_schema
 from silo_server.services import events, revisions
 from silo_server.services.numbering import check_number, take_number
@@ -74,7 +75,7 @@ SORTS: Mapping[str, Sequence[ColumnElement[Any]]] = {
 
 def to_item(row: Any) -> Item:
     """A frozen item from its row."""
-    return from_row(Item, row, schema=row.schema_name, properties=loads(row.properties))
+    return from_row(Item, row, schema=row.schema_name, properties=json.loads(row.properties))
 
 
 def get_item(tx: Tx, part_number: str, *, include_archived: bool = False, lock: bool = False) -> Item:

@@ -14,7 +14,7 @@ from silo.bom.errors import ConflictError, NewerRevisionError, NotFoundError
 from silo.bom.undoing import base_of, would_undo
 from silo_server.db.engine import Tx
 from silo_server.db.tables import items, revisions
-from silo_server.json_values import check_json, dumps, loads
+from silo_server.json_values import check_json, dumps
 from silo_server.services import events
 from silo_server.services.search import index_item
 from silo_server.values import Item, Revision, from_row, to_wire
@@ -182,7 +182,7 @@ def _by_key(tx: Tx, item: Item, key: str, file: StoredFile | None) -> Revision |
 
 def _to_revision(row: Row[Any]) -> Revision:
     links = json.loads(row.links) if row.links else ()
-    return from_row(Revision, row, properties=loads(row.properties), links=links)
+    return from_row(Revision, row, properties=json.loads(row.properties), links=links)
 
 
 def revision_to_wire(part_number: str, revision: Revision, *, links: bool = False) -> dict[str, Any]:

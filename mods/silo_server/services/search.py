@@ -11,6 +11,7 @@ material, …) and the names of the uploaded files.
 
 from __future__ import annotations
 
+import json
 import re
 import unicodedata
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -26,7 +27,6 @@ from silo.bom.naming import name_key
 from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx, get_state, put_state
 from silo_server.db.tables import items, revisions
-from silo_server.json_values import loads
 
 # Counts up when the rules below change; the next start then makes the index anew.
 RULES = "1"
@@ -226,7 +226,7 @@ def _ends(word: str) -> frozenset[str]:
 
 def _limited(texts: Iterable[str], properties: str) -> set[str]:
     found: set[str] = set()
-    for written in [*texts, *_texts(loads(properties))]:
+    for written in [*texts, *_texts(json.loads(properties))]:
         words = words_of(written)
         found.update(words)
         if len(words) > 1 and len(written) <= LONGEST_WORD and any(c.isdigit() for c in written):
@@ -276,7 +276,9 @@ def find_look_alikes(tx: Tx, wanted: Sequence[tuple[str, str]]) -> list[list[Loo
         same = names.get(name_key(row.name))
         if same is not None and len(same) < MOST_LOOK_ALIKES:
             same.append(row)
-        digest = str(loads(row.properties).get("file_sha256")).lower() if row.properties and files else ""
+        digest = (
+            str(json.loads(row.properties).get("file_sha256")).lower() if row.properties and files else ""
+        )
         if digest in files:
             files[digest][row.id] = row
     query = select(*columns, revisions.c.file_checksum).join(items).where(live)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import secrets
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query
@@ -23,51 +23,14 @@ from silo_server.values import Item
 from silo_server.web.item_edit_page import shown_properties
 from silo_server.web.login_page import Reader
 from silo_server.web.render import page, segment
-from silo_server.web.structure import Structure, Wanted, flat_page, level_counts, tree_page, usual_depth
+from silo_server.web.structure import Look, Structure, flat_page, level_counts, tree_page, usual_depth
 from silo_server.web.tables import PAGE_ROWS, Address, Page
 
 router = APIRouter(include_in_schema=False)
 
 MOST_USES = 200
-MOST_PIECES = 1_000_000
 # Some 400 sheets of paper.
 MOST_PRINTED = 20_000
-
-
-@dataclass(frozen=True)
-class Look:
-    """The part of the address that says how the BOM is shown."""
-
-    view: Annotated[str, Query(max_length=10)] = "tree"
-    q: Annotated[str, Query(max_length=200)] = ""
-    type: Annotated[str, Query(max_length=20)] = ""
-    sort: Annotated[str, Query(max_length=20)] = ""
-    page: Annotated[int, Query(ge=1, le=10**9)] = 1
-    depth: Annotated[int, Query(ge=0, le=tree.MAX_DEPTH)] = 0
-    flip: Annotated[str, Query(max_length=20_000)] = ""
-    pieces: Annotated[int, Query(ge=1, le=MOST_PIECES)] = 1
-
-    @property
-    def is_flat(self) -> bool:
-        return self.view == "flat"
-
-    @property
-    def wanted(self) -> Wanted:
-        """The same for the tables."""
-        flipped = frozenset(filter(None, self.flip.split(",")))
-        return Wanted(self.q, self.type, self.sort, self.page, self.depth, flipped, self.pieces)
-
-    def address(self, path: str) -> Address:
-        """The page with this view."""
-        usual = {"view": "tree", "page": 1, "depth": 0, "pieces": 1}
-        names = ("view", "q", "type", "sort", "page", "depth", "flip", "pieces")
-        values = {name: getattr(self, name) for name in names}
-        return Address(path, {n: str(v) for n, v in values.items() if v not in ("", usual.get(n))})
-
-    def flipped(self, key: str) -> str:
-        """``flip`` where this branch is the other way round."""
-        keys = list(dict.fromkeys(filter(None, self.flip.split(","))))
-        return ",".join(one for one in keys if one != key) if key in keys else ",".join([*keys, key])
 
 
 Asked = Annotated[Look, Depends()]
@@ -142,15 +105,15 @@ def structure_of(tx: Tx, item: Item, look: Look, size: int = PAGE_ROWS) -> dict[
         return values
     counts = level_counts(graph)
     depth = look.depth or (len(counts) if size > PAGE_ROWS else usual_depth(counts))
-    wanted = replace(look.wanted, depth=depth, rows=size)
+    look = replace(look, depth=depth)
     values |= {"levels": len(counts), "occurrences": sum(counts), "depth": depth}
     try:
         parts = rollup.parts_of(tx, graph)
         values |= {"cost": rollup.roll_up_cost(graph, parts), "mass": rollup.roll_up_mass(graph, parts)}
-        shown = Structure(graph, parts, rollup.worths(graph, parts), marks)
+        shown = Structure(graph, parts, rollup.worths(graph, parts), marks, size)
         if look.is_flat:
-            return values | {"table": flat_page(shown, wanted)}
-        table, above = tree_page(shown, wanted, sum(counts))
+            return values | {"table": flat_page(shown, look)}
+        table, above = tree_page(shown, look, sum(counts))
         return values | {"table": table, "above": above}
     except (ConflictError, TooLargeError) as error:
         return {**values, "problem": str(error)}

@@ -7,6 +7,7 @@ Change 0 is the empty BOM before everything.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -17,7 +18,6 @@ from silo.bom.errors import ConflictError, NotFoundError
 from silo_server.db.bulk import newest_first, one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import bom_change_lines, bom_changes, bom_conflicts
-from silo_server.json_values import loads
 from silo_server.services.bom.changes import (
     ChangeKind,
     ChangeNote,
@@ -265,10 +265,8 @@ def undo(tx: Tx, part_number: str, change_id: int, expected: int | None) -> tupl
 def _reopen(tx: Tx, parent: Item, change: Change, current: Mapping[str, Line]) -> None:
     # "Keep Silo's quantity" lives beside the line; undoing it asks the question again.
     kept = [decision for decision in change.decisions if decision["action"] == "keep_silo"]
-    # Decisions of older versions name their line by its part number alone, which may be another by now.
-    ids = {decision.get("line_id") for decision in kept}
-    numbers = {decision["child_part_number"] for decision in kept if not decision.get("line_id")}
-    children = [n.child_id for n in current.values() if n.id in ids or n.child_part_number in numbers]
+    ids = {decision["line_id"] for decision in kept}
+    children = [line.child_id for line in current.values() if line.id in ids]
     tx.conn.execute(
         bom_conflicts.update()
         .where(bom_conflicts.c.parent_id == parent.id, one_of(tx, bom_conflicts.c.child_id, children))
@@ -292,7 +290,10 @@ def _changes(
     query = select(bom_changes, lines).where(*conditions)
     return [
         from_row(
-            Change, row, kind=ChangeKind(row.kind), decisions=loads(row.decisions) if row.decisions else ()
+            Change,
+            row,
+            kind=ChangeKind(row.kind),
+            decisions=json.loads(row.decisions) if row.decisions else (),
         )
         for row in newest_first(tx, query, bom_changes.c.id, limit, before, after)
     ]

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -17,7 +18,7 @@ from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import bom_lines, items
 from silo_server.errors import TooLargeError
-from silo_server.json_values import MAX_DEPTH, dumps, loads
+from silo_server.json_values import dumps
 from silo_server.values import Item, Line, LineState, names_of, to_wire
 
 # "override" as the number that SQLite has: making a bool of it costs more than all the rest of the row.
@@ -57,9 +58,9 @@ def _state(*columns: Any) -> LineState:
     state = LineState(*columns)  # the columns are in the order of the fields
     return replace(
         state,
-        reference_designators=tuple(loads(columns[4])),
+        reference_designators=tuple(json.loads(columns[4])),
         override=bool(state.override),
-        metadata=loads(columns[12]),
+        metadata=json.loads(columns[12]),
     )
 
 
@@ -154,7 +155,7 @@ def mark_of(state: LineState, cad_quantity: float | None = None) -> str:
 
 def stored_state(text: str) -> LineState:
     """The state that :func:`state_to_json` gave and history stored."""
-    values = dict(loads(text, MAX_DEPTH + 1))  # the metadata lie one level down
+    values = dict(json.loads(text))
     if "reference_designators" in values:
         values["reference_designators"] = tuple(values["reference_designators"])
     return replace(LineState(values.pop("quantity"), values.pop("source")), **values)

@@ -8,6 +8,7 @@ but the sub-assembly itself states ``mass_kg``, that is taken for the whole of i
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
@@ -19,7 +20,6 @@ from silo.bom.numbers import as_decimal, exact_product, exact_sum, plain, read_n
 from silo_server.db.bulk import one_of
 from silo_server.db.engine import Tx
 from silo_server.db.tables import items
-from silo_server.json_values import loads
 from silo_server.services.bom.tree import Exact, Graph, added, flatten, order_of
 from silo_server.values import Line
 
@@ -102,7 +102,7 @@ def parts_of(tx: Tx, graph: Graph) -> dict[int, Part]:
             items.c.id, items.c.part_number, items.c.name, items.c.properties, items.c.thumbnail_key
         ).where(one_of(tx, items.c.id, children))
     )
-    parts = {row[0]: Part(row[1], row[2], loads(row[3]), row[4]) for row in rows}
+    parts = {row[0]: Part(row[1], row[2], json.loads(row[3]), row[4]) for row in rows}
     root = graph.root
     own = Part(root.part_number, root.name, root.properties, root.thumbnail_key)
     return {**parts, root.id: own}
