@@ -133,6 +133,12 @@ def test_a_structure_that_would_fill_the_memory_is_not_read(url: str, tmp_path: 
             assert "more than 3 different lines" in html.body.decode()
 
 
+def test_a_file_that_breaks_off_shows_what_can_be_read_of_it() -> None:
+    """A quote too many in one row: the person sees the header, and can say which column is which."""
+    data = b'Part number,Quantity\nA,1\n"B" x,2\n'
+    assert imports.first_lines(data, ",") == [["Part number", "Quantity"], ["A", "1"]]
+
+
 def test_a_file_that_is_no_bom_is_not_read_to_its_end() -> None:
     """The header is looked for near the top; what stands at the end of such a file does not matter."""
     rows = b"a;b,c\td\n" * 5000

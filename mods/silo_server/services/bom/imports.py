@@ -12,6 +12,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any
@@ -125,11 +126,11 @@ def refuse_workbook(data: bytes) -> None:
 
 
 def first_lines(data: bytes, delimiter: str, count: int = 8) -> list[list[str]]:
-    """The first lines of a file as cells, for a person who says which column is which."""
-    try:
-        return [row[:MAX_COLUMNS] for row in islice(_rows(_decode(data), delimiter), count)]
-    except csv.Error:
-        return []
+    """The first lines of a file as cells, for a person who says which column is which; those that can be read."""
+    lines: list[list[str]] = []
+    with suppress(csv.Error):
+        lines.extend(row[:MAX_COLUMNS] for row in islice(_rows(_decode(data), delimiter), count))
+    return lines
 
 
 def likely_delimiter(data: bytes) -> str:

@@ -12,7 +12,7 @@ function changed(field) {
   if (field.type === "file") return field.files.length > 0;
   if (field.options) {
     const first = Math.max(0, [...field.options].findIndex((option) => option.defaultSelected));
-    return field.selectedIndex !== first;
+    return field.options.length > 0 && field.selectedIndex !== first;
   }
   return "defaultValue" in field && field.value !== field.defaultValue;
 }
