@@ -126,7 +126,7 @@ def refuse_workbook(data: bytes) -> None:
 
 
 def first_lines(data: bytes, delimiter: str, count: int = 8) -> list[list[str]]:
-    """The first lines of a file as cells, for a person who says which column is which; those that can be read."""
+    """The first lines of a file as cells, those that can be read; for a person who says what each column is."""
     lines: list[list[str]] = []
     with suppress(csv.Error):
         lines.extend(row[:MAX_COLUMNS] for row in islice(_rows(_decode(data), delimiter), count))
