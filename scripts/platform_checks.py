@@ -11,7 +11,6 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import socket
 import subprocess
 import sys
 import tempfile
@@ -55,16 +54,14 @@ def demo(folder: Path) -> None:
 def server(folder: Path) -> None:
     """A second server on a port that is taken is refused; ``*.FCStd`` is expanded, as cmd does not."""
     shutil.copytree(ROOT / "examples" / "gearbox", folder / "gearbox")
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = str(probe.getsockname()[1])
-    words = [sys.executable, "-m", "silo.cli.main", "serve", "--port", port, "--json"]
+    words = [sys.executable, "-m", "silo.cli.main", "serve", "--port", "0", "--json"]
     pipe = subprocess.PIPE
     with subprocess.Popen(words, cwd=folder, env=environment(folder), stdout=pipe, stderr=pipe) as first:
         assert first.stdout is not None
         try:
             greeting = json.loads(first.stdout.readline() or b"{}")
             assert greeting, "the server did not start"
+            port = greeting["url"].rpartition(":")[2]
             silo_mod("serve", "--port", port, cwd=folder, code=2)
             known = {"SILO_API_URL": greeting["url"], "SILO_API_TOKEN": greeting["token"]}
             pattern = folder / "gearbox" / "*.FCStd"

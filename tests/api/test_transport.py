@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from server_testing import reserved_port
 
 from silo.api.client import SiloClient
 from silo.api.policy import Retries
@@ -409,11 +410,9 @@ def test_half_an_answer_is_no_answer(server: Any, client: SiloClient, answer: An
 
 def test_nobody_there_says_how_to_start_one(pauses: list[float]) -> None:
     """Connection refused."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        url = f"http://127.0.0.1:{free.getsockname()[1]}"
     with (
-        SiloClient(url, retries=Retries(sleep=pauses.append)) as client,
+        reserved_port() as port,
+        SiloClient(f"http://127.0.0.1:{port}", retries=Retries(sleep=pauses.append)) as client,
         pytest.raises(UnreachableError, match=r"nothing answers at 127\.0\.0\.1.*silo-mod serve"),
     ):
         client.get_item("F01-0001")

@@ -21,7 +21,7 @@ from settled import come_late
 from silo_server.run import RunningServer, running_server
 
 TOKEN = "silo_" + "browser0" * 5
-SECONDS = 60
+SECONDS = 90
 # Style sheets, scripts and pictures come so many seconds late: a hunt for tests that depend on time.
 LATE = float(os.environ.get("SILO_LATE_ASSETS", "0"))
 
@@ -52,7 +52,9 @@ def chromium() -> Iterator[Browser]:
     # A machine that does much else at the same time is slow, not wrong.
     expect.set_options(timeout=SECONDS * 1000)
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox", "--disable-gpu"])
+        browser = playwright.chromium.launch(
+            executable_path=path, args=["--no-sandbox", "--disable-gpu"], timeout=SECONDS * 1000
+        )
         yield browser
         browser.close()
 

@@ -8,14 +8,13 @@ import os
 import re
 import shutil
 import signal
-import socket
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from server_testing import Api, wait_until
+from server_testing import Api, reserved_port, wait_until
 
 from silo.cli.main import build_parser
 from silo_server.run import running_server
@@ -84,21 +83,16 @@ def nginx(config: str, folder: Path) -> Iterator[None]:
         process.wait(30)
 
 
-def free_port() -> int:
-    """A port that nobody listens at."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
 @pytest.mark.skipif(shutil.which("nginx") is None, reason="nginx is not on this machine")
 @pytest.mark.parametrize("sub_path", ["", "/silo"])
 def test_nginx_passes_pages_and_events_on(tmp_path: Path, sub_path: str) -> None:
     """The file as it is but for TLS, ports, and the sub-path as its comment says."""
-    port = free_port()
     os.chmod(tmp_path, 0o755)
     settings = Settings(database_url=f"sqlite:///{tmp_path / 'x.db'}", root_path=sub_path)
-    with running_server(settings.database_url, token=TOKEN, settings=settings) as server:
+    with (
+        reserved_port() as port,
+        running_server(settings.database_url, token=TOKEN, settings=settings) as server,
+    ):
         text = (DEPLOY / "nginx.conf").read_text("utf-8")
         text = re.sub(r"ssl_\w+ .*;", "", text).replace("listen 443 ssl", f"listen 127.0.0.1:{port}")
         text = text.replace("http://127.0.0.1:8080", server.base_url)

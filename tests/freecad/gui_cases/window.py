@@ -9,7 +9,6 @@ import shutil
 import signal
 import subprocess
 import threading
-import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
@@ -18,9 +17,10 @@ from typing import Any
 
 from freecad_cases import machines
 from freecad_cases.machines import REPOSITORY, FreeCAD
+from server_testing import reserved_port
 
 from silo.api.client import SiloClient
-from silo_server.run import RunningServer, running_server
+from silo_server.run import running_server
 
 TOKEN = "silo_" + "0123456789abcdef" * 2
 TIMEOUT_S = 300
@@ -40,23 +40,17 @@ _SEED = """<?xml version="1.0" encoding="UTF-8" standalone="no" ?>
 class Server:
     """An embedded server that can go away and come back at the same address, with the same data."""
 
-    def __init__(self, folder: Path) -> None:
-        self._database = f"sqlite:///{folder / 'silo.db'}"
+    def __init__(self, folder: Path, port: int) -> None:
+        self._database, self._port = f"sqlite:///{folder / 'silo.db'}", port
         self._stack = ExitStack()
-        self._running: RunningServer | None = None
-        self._port = 0
         self.url = ""
 
     def up(self) -> None:
-        self._running = self._stack.enter_context(
-            running_server(self._database, token=TOKEN, port=self._port)
-        )
-        self.url = self._running.base_url
-        self._port = int(self.url.rsplit(":", 1)[1])
+        running = running_server(self._database, token=TOKEN, port=self._port)
+        self.url = self._stack.enter_context(running).base_url
 
     def down(self) -> None:
         self._stack.close()
-        self._running = None
 
     @contextmanager
     def client(self) -> Iterator[SiloClient]:
@@ -203,15 +197,10 @@ def window(version: str, folder: Path) -> Iterator[Window]:
     freecad = machines.need(version)
     if shutil.which("Xvfb") is None:
         machines.miss("Xvfb is not installed")
-    server = Server(folder)
-    server.up()
-    try:
-        yield Window(
-            freecad, folder, server, {"server down": server.down, "server up": server.up, "pause": _pause}
-        )
-    finally:
-        server.down()
-
-
-def _pause() -> None:
-    time.sleep(0.1)
+    with reserved_port() as port:
+        server = Server(folder, port)
+        server.up()
+        try:
+            yield Window(freecad, folder, server, {"server down": server.down, "server up": server.up})
+        finally:
+            server.down()

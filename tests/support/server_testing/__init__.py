@@ -12,7 +12,7 @@ from server_testing.caller import (
     wait_until,
 )
 from server_testing.databases import Databases, empty_database, postgres
-from server_testing.process import ServerProcess
+from server_testing.process import ServerProcess, reserved_port
 
 __all__ = [
     "Answer",
@@ -26,5 +26,6 @@ __all__ = [
     "form_body",
     "merge_body",
     "postgres",
+    "reserved_port",
     "wait_until",
 ]

@@ -6,14 +6,16 @@ from __future__ import annotations
 import atexit
 import os
 import shutil
+import subprocess
 import tempfile
+import time
 import uuid
 import warnings
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from functools import cache
 from pathlib import Path
-from typing import LiteralString
+from typing import Any, LiteralString
 
 GIVEN = "SILO_TEST_DATABASE_URL"
 
@@ -31,7 +33,7 @@ def postgres() -> str:
     server = PostgresServer(Path(folder), cleanup_mode="stop")
     # The server stops itself when this process ends; its folder goes after it (last in, first out).
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    server.start()
+    _start(server)
     url = str(server.get_uri())
     # In tests nothing in it outlives the machine; a benchmark measures it as people run it.
     if "PYTEST_VERSION" in os.environ:
@@ -39,6 +41,18 @@ def postgres() -> str:
             _run(url, "ALTER SYSTEM SET {} = off", setting)
         _run(url, "SELECT pg_reload_conf()")
     return url
+
+
+def _start(server: Any, seconds: int = 120) -> None:
+    """The package waits ten seconds; on a busy machine PostgreSQL is up later than that."""
+    for left in reversed(range(seconds)):
+        try:
+            server.start()
+            return
+        except (subprocess.TimeoutExpired, OSError, AssertionError):  # not up yet; up, and not ready yet
+            if not left:
+                raise
+            time.sleep(1)
 
 
 @contextmanager

@@ -6,16 +6,19 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import socket
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from functools import cache
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerContext
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any, Self
+
+from silo.platform import own_the_port
 
 TIMEOUT = 60
 
@@ -114,6 +117,18 @@ class ServerProcess:
 
 def _environ(files_dir: Path, token: str, settings: dict[str, str]) -> dict[str, str]:
     return {"SILO_API_TOKEN": token, "SILO_STORAGE_ROOT_DIR": str(files_dir), **settings}
+
+
+@contextmanager
+def reserved_port() -> Iterator[int]:
+    """A port of this machine that nobody else is given meanwhile; a server that is told it may listen there.
+
+    Nothing answers there until one does: a port that was merely free a moment ago may be anybody's by now.
+    """
+    with socket.socket() as held:
+        own_the_port(held)
+        held.bind(("127.0.0.1", 0))
+        yield held.getsockname()[1]
 
 
 def forked(work: Callable[..., None], *args: Any) -> BaseProcess:
