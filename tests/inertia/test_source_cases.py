@@ -167,3 +167,40 @@ def test_a_sub_assemblys_material_on_a_part_without_a_solid(
     report = compute(asm, HEAD + "1,1,,PLA,,print\n")
     assert part(report, "wires").mass == 0
     assert codes(report) == ["no_volume"]
+
+
+def test_a_material_that_varies_says_so_and_by_how_much(
+    assemble: Fixture, compute: Fixture, codes: Fixture, part: Fixture
+) -> None:
+    """Boards of EPS have 10 to 30 kg/m³: the mass is ± 50 %, and a mass within that contradicts nothing."""
+    asm = assemble(("l/a", cube("a", 0.1)), ("l/b", cube("b", 0.1)), ("l/c", cube("c", 0.1)))
+    report = compute(asm, HEAD + "1,1,,EPS,,a\n2,1,,EPS,0.0280 kg,b\n3,1,,steel,7.85 kg,c\n")
+    assert part(report, "a").quantum == pytest.approx(0.5 * 0.02)
+    assert codes(report) == ["density_varies"]
+    assert "± 50%" in report.warnings[0].message
+    assert part(report, "c").quantum < 0.01
+    report = compute(asm, HEAD + "1,1,,EPS,0.045 kg,a\n2,1,,steel,7.85 kg,b\n3,1,,steel,7.85 kg,c\n")
+    assert codes(report) == ["mass_differs"]
+
+
+@pytest.mark.parametrize(("mass", "doubted"), [("7.85 g", True), ("2.7 g", True), ("15 g", False)])
+def test_grams_for_kilograms_are_doubted_without_a_material(
+    assemble: Fixture, compute: Fixture, codes: Fixture, mass: str, doubted: bool
+) -> None:
+    """A litre of steel or aluminium by 1000 too light; a litre of foam is not."""
+    report = compute(assemble(("l/a", cube("a", 0.1))), HEAD + f"1,1,,,{mass},a\n")
+    assert ("mass_implausible" in codes(report)) is doubted
+
+
+def test_a_guessed_or_varying_material_of_a_sub_assembly_is_reported(
+    assemble: Fixture, compute: Fixture, codes: Fixture
+) -> None:
+    """What holds for the material of a part holds for that of the sub-assembly around it."""
+    from silo.inertia.links import link_map
+
+    asm = assemble(("arm/a", cube("a")))
+    one = link_map({"links": {"l": ["arm"]}})
+    for material, code in (("tin can", "material_guessed"), ("EPS", "density_varies")):
+        report = compute(asm, HEAD + f"1,1,P-7,{material},,arm\n", links=one)
+        assert codes(report, "a") == [code]
+        assert report.links["l"].parts[0].part_number == ""

@@ -45,31 +45,38 @@ _ALIASES: dict[Role, str] = {
         bezeichnung; benennung; teil; teilename; bauteil; bauteilname; produkt; nom; nom de la pièce; pièce;
         composant; désignation; nombre; nombre de pieza; pieza; componente; denominación; nome; nome parte;
         nome componente; denominazione; 名前; 名称; 部品名; 品名; パーツ名; 部品; 名稱; 零件名称;
-        零件; 部件名称""",
+        零件; 部件名称; 이름; item name;
+        objektkurztext; materialkurztext; designation; piece; denominacion; part""",
     Role.PART_NUMBER: """part number; part no; part nr; partnumber; pn; item number; article number;
         article no; sku; child part number; teilenummer; teile nr; artikelnummer; artikel nr; sachnummer;
         numéro de pièce; référence; réf; número de pieza; número de parte; referencia; código; numero parte;
         codice; codice articolo; 部品番号; 品番; 型番; 図番;
-        零件编号; 零件号; 零件號; 料号; 料號; 物料编码; number""",
+        零件编号; 零件号; 零件號; 料号; 料號; 物料编码; number; item id;
+        bauteilnummer; komponentennummer; n de pièce; n o de pièce; numero de piece; n de pieza; n o de pieza;
+        numero de pieza; numero de parte; codigo; 부품 번호""",
     Role.DESCRIPTION: """description; desc; child description; beschreibung; descripción; descripcion;
         descrizione; 説明; 描述; 说明; 説明文; 備考""",
     Role.MATERIAL: """material; materials; werkstoff; werkstoffe; matériau; matière; materiau; material pieza;
-        materiale; 材料; 材質; 材质; 素材""",
+        materiale; 材料; 材質; 材质; 素材; 재질; 재료; matl;
+        mat l; mtl; ptc material name; nx material""",
     Role.MASS: """mass; unit mass; mass each; weight; unit weight; weight each; masse; einzelmasse; gewicht;
         einzelgewicht; stückgewicht; masse unitaire; poids; poids unitaire; masa; masa unitaria; peso;
         peso unitario; massa; massa unitaria; 質量; 重量; 单重; 質量 単体; 质量; 单件质量; 單重; gew;
-        einzelgew; nettogewicht; pds; 単重; 単体質量; 単体重量; 净重; 单件重量""",
+        einzelgew; nettogewicht; pds; 単重; 単体質量; 単体重量; 净重; 单件重量; 질량; 무게;
+        wt; unit wt; nx mass""",
     Role.TOTAL_MASS: """total mass; total weight; mass total; weight total; extended mass; extended weight;
         gesamtmasse; gesamtgewicht; masse totale; poids total; masa total; peso total; massa totale;
         peso totale; 总重量; 総質量; 総重量; 合計質量; 总质量; 总重; 總重; 合计重量;
-        小计重量; 質量計; 重量計""",
+        小计重量; 質量計; 重量計; total wt; ext wt""",
     Role.MASS_UNIT: """mass unit; mass units; weight unit; weight units; unit of mass; unit of weight;
         mass uom; weight uom; gewichtseinheit; masseneinheit; unité de masse; unidad de masa""",
     Role.QUANTITY: """quantity; qty; count; pieces; pcs; menge; anzahl; stückzahl; stück; quantité; qté; nb;
-        cantidad; cant; quantità; q tà; qta; quantita; 数量; 個数; 員数; 數量""",
+        cantidad; cant; quantità; q tà; qta; quantita; 数量; 個数; 員数; 數量; 수량; qte; qtà;
+        quantite; anz; komponentenmenge; req qty; qty reqd; qty req d; no req d""",
     Role.ITEM: """item; item no; index; pos; position; row; line; nr; lfd nr; rang;
         repère; article; elemento; artículo; posición; ítem; posizione; voce; 項目; 番号; 项目; 项; 序号;
-        編號; 序號""",
+        編號; 序號; 项目号; アイテム番号; 항목; 항목 번호; pos nr; positionsnummer; objekt; element; élément;
+        no article; n articolo; n de elemento; n o de elemento; articulo; posicion""",
     Role.LEVEL: """level; depth; indent; ebene; stufe; niveau; nivel; livello; レベル; 階層;
         级别; 层级; 層級""",
     Role.UNIT: """unit; uom; unit of measure; einheit; mengeneinheit; unité; unidad; unità; 単位; 单位""",

@@ -19,6 +19,7 @@ class MassCode(StrEnum):
     NO_BOM = "no_bom"  # no BOM was given: default density throughout
     UNKNOWN_MATERIAL = "unknown_material"  # default density
     GUESSED_MATERIAL = "material_guessed"  # a word in the material's name is not understood
+    DENSITY_VARIES = "density_varies"  # foam, wood, rubber: the density depends on the kind
     ZERO_MASS = "bom_zero_mass"  # the BOM says 0 kg; the material's mass is used where it is known
     NO_VOLUME = "no_volume"  # a material, but no solid to take a volume from: zero
     POINT_MASS = "point_mass"  # a BOM mass without a solid: mass at one point, no inertia

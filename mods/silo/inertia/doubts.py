@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from silo.inertia.codes import MassCode
+from silo.inertia.materials import Material
 from silo.inertia.materials.density import DENSEST, LIGHTEST
 from silo.inertia.model import Prototype
 
@@ -15,6 +16,13 @@ ROUNDING_LIMIT = 0.02
 
 MISMATCH_LIMIT = 0.05
 """Mass against density times volume, and STEP density against the one used: above this share is reported."""
+
+SPREAD_LIMIT = 0.1
+"""A material whose density varies by this share or more is reported."""
+
+LIGHTEST_PART = 12.0
+"""[kg/m^3] a part that weighs less by the BOM is doubted: foams have 15 and more, and grams that were read as
+kilograms make 1.7 to 11 of a metal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,18 +49,19 @@ class GivenMass:
 
 @dataclass(frozen=True, slots=True)
 class Expectation:
-    """A density [kg/m^3] that the mass can be held against, in words as well."""
+    """A density [kg/m^3] that the mass can be held against, in words as well; it varies by ``spread``."""
 
     density: float
     words: str
+    spread: float = 0.0
 
 
-def expectation(prototype: Prototype, material: str | None, density: float | None) -> Expectation | None:
-    """By the row's material where its ``density`` is known, else by what the geometry file states."""
+def expectation(prototype: Prototype, text: str | None, material: Material | None) -> Expectation | None:
+    """By the row's material where it is known, else by what the geometry file states."""
     if prototype.volume_m3 <= 0:
         return None
-    if density:
-        return Expectation(density, f"{material} ({density:g} kg/m³)")
+    if material is not None:
+        return Expectation(material.density, f"{text} ({material.density:g} kg/m³)", material.spread)
     stated = prototype.step_density
     return Expectation(stated, f"the file's {stated:g} kg/m³") if stated is not None else None
 
@@ -99,7 +108,7 @@ def zero_doubt(given: GivenMass, volume: float, density: float, material: str) -
 
 def _against(given: GivenMass, volume: float, expected: Expectation) -> Iterator[Note]:
     weight = expected.density * volume
-    allowed = max(given.quantum, MISMATCH_LIMIT * given.kg)
+    allowed = max(given.quantum, MISMATCH_LIMIT * given.kg, expected.spread * weight)
     if not given.kg or abs(weight - given.kg) <= allowed:
         return
     pieces = next((q for q in given.quantities if _is_multiple(given.kg, weight, q)), None)
@@ -123,7 +132,7 @@ def implausible(given: GivenMass, volume: float) -> Iterator[Note]:
     if volume <= 0 or not given.kg:
         return
     least, most = (given.kg - given.quantum) / volume, (given.kg + given.quantum) / volume
-    if most >= LIGHTEST and least <= DENSEST:
+    if most >= LIGHTEST_PART and least <= DENSEST:
         return
     dense = least > DENSEST
     than, shape = ("denser than any metal", "shell") if dense else ("lighter than any solid", "envelope")
@@ -153,15 +162,22 @@ TOTAL_BY_OTHERS = Note(
 )
 
 
-def density_doubts(prototype: Prototype, density: float, name: str) -> Iterator[Note]:
-    """The density that the geometry file states against the one that is used."""
-    stated = prototype.step_density
-    if stated is not None and abs(stated - density) > MISMATCH_LIMIT * density:
+def density_doubts(prototype: Prototype, used: Material) -> Iterator[Note]:
+    """What the geometry file states against the material that is used, and how much that one varies."""
+    stated, density = prototype.step_density, used.density
+    if used.spread >= SPREAD_LIMIT:
+        low, high = density * (1 - used.spread), density * (1 + used.spread)
+        yield Note(
+            MassCode.DENSITY_VARIES,
+            f"{used.name} has from {low:.4g} to {high:.4g} kg/m³, by its kind; {density:g} kg/m³ were used, "
+            f"so the mass is ± {used.spread:.0%}",
+        )
+    if stated is not None and abs(stated - density) > max(MISMATCH_LIMIT, used.spread) * density:
         material = f" ({prototype.step_material})" if prototype.step_material else ""
         yield Note(
             MassCode.STEP_DENSITY,
             f"the file states {stated:g} kg/m³{material}, "
-            f"{name} has {density:g} kg/m³; the BOM's material was used",
+            f"{used.name} has {density:g} kg/m³; the BOM's material was used",
         )
 
 

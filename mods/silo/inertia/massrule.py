@@ -9,7 +9,7 @@ default (or of zero) only where the user asks for it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from silo.inertia.bom.rows import BomCode, BOMEntry
 from silo.inertia.codes import Decided, MassCode, Rule, Source
@@ -51,6 +51,8 @@ class Decision:
 
     mass_kg
         of one piece, where it is given as such; else None and ``density`` [kg/m^3] times volume it is.
+    quantum_kg
+        the mass is known to ± this: by the BOM's digits, or by how much the material's density varies.
     material, material_name, density_source
         the BOM's text, the table's row it was understood as, and where its density comes from.
     pieces, compared
@@ -99,20 +101,33 @@ class MassRule:
         if match is None:
             return self._without_row(prototype)
         row = match.row
-        base = Decision(
-            source=Source.ZERO,
-            rule=match.rule,
-            decided=match.decided,
-            material=row.material,
-            part_number=row.part_number,
-            lines=tuple(r.line for r in match.bundle.rows),
-            notes=(Note(MassCode.AMBIGUOUS, match.doubt),) if match.doubt else (),
-        )
+        base = replace(self._base(match, match.rule), part_number=row.part_number)
         if row.mass_kg is not None:
             return self._bom_mass(base, prototype, match)
-        if row.material is not None:
-            return self._material(base, prototype, row.material)
-        return self._neither(base, prototype)
+        return self._without_mass(base, prototype, row.material)
+
+    def decide_by_sub_assembly(self, prototype: Prototype, match: Match) -> Decision:
+        """As :meth:`decide`, by the row of a sub-assembly around the part, which gives no mass."""
+        base = self._base(match, Rule.SUB_ASSEMBLY)
+        return self._without_mass(base, prototype, match.row.material, f" to “{match.row.name}” around it")
+
+    def _without_mass(
+        self, base: Decision, prototype: Prototype, material: str | None, to: str = ""
+    ) -> Decision:
+        if material is None:
+            return self._neither(base, prototype, to)
+        return self._material(base, prototype, material, to)
+
+    @staticmethod
+    def _base(match: Match, rule: Rule) -> Decision:
+        return Decision(
+            source=Source.ZERO,
+            rule=rule,
+            decided=match.decided,
+            material=match.row.material,
+            lines=tuple(row.line for row in match.bundle.rows),
+            notes=(Note(MassCode.AMBIGUOUS, match.doubt),) if match.doubt else (),
+        )
 
     def _bom_mass(self, base: Decision, prototype: Prototype, match: Match) -> Decision:
         row = match.row
@@ -122,8 +137,8 @@ class MassRule:
         if mass == 0 and known and prototype.volume_m3 > 0 and not row.overridden and row.material:
             return self._zero_of_known_material(base, prototype, row)
         given = GivenMass(mass, row.quantum_kg, match.bundle.quantities)
-        expected = expectation(prototype, row.material, known.density if known else None)
-        return _with(
+        expected = expectation(prototype, row.material, known)
+        return replace(
             base,
             source=Source.BOM_MASS,
             mass_kg=mass,
@@ -139,51 +154,54 @@ class MassRule:
         decision = self._material(base, prototype, row.material or "")
         given = GivenMass(0.0, row.quantum_kg)
         note = zero_doubt(given, prototype.volume_m3, decision.density or 0.0, row.material or "")
-        return _with(decision, quantum_kg=0.0, notes=(*decision.notes, note))
+        return replace(decision, notes=(*decision.notes, note))
 
-    def _material(self, base: Decision, prototype: Prototype, text: str) -> Decision:
+    def _material(self, base: Decision, prototype: Prototype, text: str, to: str = "") -> Decision:
         answer = self.materials.find(text)
+        notes = list(base.notes)
+        name, spread = None, 0.0
         if isinstance(answer, MaterialHit):
             found = answer.material
-            density, name, source = found.density, found.name, found.source
-            notes = [*base.notes, *density_doubts(prototype, density, name)]
+            kind, density, where = Source.MATERIAL, found.density, found.source
+            name, spread = found.name, found.spread
+            notes += density_doubts(prototype, found)
             if answer.doubt:
                 words = f"'{text}' was taken for {name} ({density:g} kg/m³): {answer.doubt}"
                 notes.append(Note(MassCode.GUESSED_MATERIAL, words))
-        elif self.options.step_density and prototype.step_density is not None:
-            density, name, source = prototype.step_density, None, "the geometry file"
-            why = f"the density in the file ({density:g} kg/m³) was used"
-            notes = [*base.notes, _unknown(text, answer.advice, why)]
         else:
-            density, name, source = self.options.default_density, None, "default"
-            why = f"the default density ({density:g} kg/m³) was used"
-            notes = [*base.notes, _unknown(text, answer.advice, why)]
+            if self.options.step_density and prototype.step_density is not None:
+                kind, density, where = Source.STEP_DENSITY, prototype.step_density, "the geometry file"
+                used = f"the density in the file ({density:g} kg/m³) was used"
+            else:
+                kind, density, where = Source.DEFAULT_DENSITY, self.options.default_density, "default"
+                used = f"the default density ({density:g} kg/m³) was used"
+            words = f"Unknown material '{text}'{to and ', assigned' + to}: {answer.advice}; {used}"
+            notes.append(Note(MassCode.UNKNOWN_MATERIAL, words))
         if not prototype.volume_m3:
             notes.append(_no_volume(prototype))
-        known = isinstance(answer, MaterialHit)
-        fallback = Source.STEP_DENSITY if source == "the geometry file" else Source.DEFAULT_DENSITY
-        return _with(
+        return replace(
             base,
-            source=Source.MATERIAL if known else fallback,
+            source=kind,
             density=density,
+            quantum_kg=spread * density * prototype.volume_m3,
             material_name=name,
-            density_source=source,
+            density_source=where,
             notes=tuple(notes),
         )
 
-    def _neither(self, base: Decision, prototype: Prototype) -> Decision:
+    def _neither(self, base: Decision, prototype: Prototype, to: str) -> Decision:
         if self.options.step_density and prototype.step_density is not None:
             note = Note(
                 MassCode.NO_MASS_NO_MATERIAL,
-                "No mass or material assigned in the BOM; "
+                f"No mass or material assigned{to} in the BOM; "
                 f"the density in the file ({prototype.step_density:g} kg/m³) was used",
             )
             return self._from_file(base, prototype, (*base.notes, note))
         hint = ""
         if prototype.step_density is not None:
             hint = f" (the file states {prototype.step_density:g} kg/m³)"
-        note = Note(MassCode.NO_MASS_NO_MATERIAL, f"No mass or material assigned: counted as 0 kg{hint}")
-        return _with(base, source=Source.ZERO, mass_kg=0.0, notes=(*base.notes, note))
+        note = Note(MassCode.NO_MASS_NO_MATERIAL, f"No mass or material assigned{to}: counted as 0 kg{hint}")
+        return replace(base, source=Source.ZERO, mass_kg=0.0, notes=(*base.notes, note))
 
     def _without_row(self, prototype: Prototype) -> Decision:
         stated = prototype.step_density
@@ -201,7 +219,7 @@ class MassRule:
             return self._from_file(base, prototype, tuple(notes))
         if not self.has_bom and self.options.unknown_is_zero:
             words = f"{message}: counted as 0 kg"
-            return _with(
+            return replace(
                 base, source=Source.ZERO, mass_kg=0.0, notes=(Note(MassCode.NO_MASS_NO_MATERIAL, words),)
             )
         if stated is not None:
@@ -211,10 +229,10 @@ class MassRule:
         notes = [Note(code, f"{message}; the default density ({density:g} kg/m³) was used")]
         if not prototype.volume_m3:
             notes = [*(notes if self.has_bom else ()), _no_volume(prototype)]
-        return _with(base, density=density, density_source="default", notes=tuple(notes))
+        return replace(base, density=density, density_source="default", notes=tuple(notes))
 
     def _from_file(self, base: Decision, prototype: Prototype, notes: tuple[Note, ...]) -> Decision:
-        return _with(
+        return replace(
             base,
             source=Source.STEP_DENSITY,
             density=prototype.step_density,
@@ -232,14 +250,6 @@ def two_ways(row: BOMEntry) -> tuple[Note, ...]:
     return (Note(BomCode.AMBIGUOUS_MASS, words),)
 
 
-def _unknown(text: str, reason: str, what: str) -> Note:
-    return Note(MassCode.UNKNOWN_MATERIAL, f"Unknown material '{text}': {reason}; {what}")
-
-
 def _no_volume(prototype: Prototype) -> Note:
     kind = "no solid" if not prototype.has_solid else "no volume"
     return Note(MassCode.NO_VOLUME, f"the part has {kind} to multiply a density with: counted as 0 kg")
-
-
-def _with(decision: Decision, **changes: object) -> Decision:
-    return Decision(**{**decision.__dict__, **changes})

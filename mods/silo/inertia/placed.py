@@ -16,7 +16,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from silo.inertia.bom.rows import BOMEntry
 from silo.inertia.codes import MassCode, Rule, Source
 from silo.inertia.core import Floats, place, rigid_mask
 from silo.inertia.doubts import (
@@ -29,7 +28,7 @@ from silo.inertia.doubts import (
 )
 from silo.inertia.massrule import Decision, MassRule, two_ways
 from silo.inertia.matching import Match, Matching
-from silo.inertia.model import Assembly, GeometryCode, Instance, companions
+from silo.inertia.model import Assembly, GeometryCode, companions
 
 
 @dataclass(frozen=True)
@@ -51,14 +50,6 @@ class Occurrence:
     implausible: bool
 
 
-@dataclass(frozen=True)
-class _Density:
-    source: Source
-    density: float
-    where: str = ""
-    notes: tuple[Note, ...] = ()
-
-
 @dataclass(eq=False)
 class Groups:
     """The masses and decisions of all instances, while sub-assembly rows may still change them.
@@ -66,7 +57,7 @@ class Groups:
     ``mass`` and ``decisions`` are changed in place; instances that are not ``counted`` are left alone.
     """
 
-    instances: Sequence[Instance]
+    assembly: Assembly
     volume: Floats
     mass: Floats
     decisions: list[Decision]
@@ -103,7 +94,7 @@ class Groups:
             return
         below: dict[tuple[str, ...], list[int]] = defaultdict(list)
         product: dict[tuple[str, ...], str] = {}
-        for index, instance in enumerate(self.instances):
+        for index, instance in enumerate(self.assembly.instances):
             if not self.counted[index]:
                 continue
             for depth in range(1, len(instance.product_path)):
@@ -133,9 +124,11 @@ class Groups:
         volume = float(self.volume[gaps].sum())
         doubts = tuple(implausible(GivenMass(mass, row.quantum_kg), volume)) if solid else ()
         for index in gaps:
-            self._decide(
-                index,
-                match,
+            new = replace(
+                self.decisions[index],
+                rule=Rule.SUB_ASSEMBLY,
+                decided=match.decided,
+                lines=tuple(line.line for line in match.bundle.rows),
                 source=Source.SUB_ASSEMBLY_MASS,
                 mass_kg=None,
                 density=None,
@@ -143,6 +136,7 @@ class Groups:
                 quantum_kg=row.quantum_kg,
                 notes=(*_doubt(match), note, *doubts),
             )
+            self._set(index, match, new)
 
     def _compare(self, match: Match, below: list[int], first: int) -> bool:
         row = match.row
@@ -163,47 +157,16 @@ class Groups:
 
     def _cover(self, match: Match, gaps: list[int]) -> None:
         """A row without children and mass stands for the parts that the BOM does not have themselves."""
-        found = self._density(match.row)
         for index in gaps:
-            if self.decisions[index].rule is not Rule.NONE:
-                continue
-            self._decide(
-                index,
-                match,
-                source=found.source,
-                mass_kg=None,
-                density=found.density,
-                density_source=found.where,
-                material=match.row.material,
-                notes=(*_doubt(match), *found.notes, *(() if self.volume[index] > 0 else (_NO_VOLUME,))),
-            )
-            self.mass[index] = found.density * self.volume[index]
+            prototype = self.assembly.prototypes[self.assembly.instances[index].prototype]
+            if self.decisions[index].rule is Rule.NONE:
+                self._set(index, match, self.rule.decide_by_sub_assembly(prototype, match))
+                self.mass[index] = (self.decisions[index].density or 0.0) * self.volume[index]
 
-    def _density(self, row: BOMEntry) -> _Density:
-        """What a sub-assembly's row says of its parts' density."""
-        if row.material is None:
-            words = f"No mass or material assigned to “{row.name}” around it: counted as 0 kg"
-            return _Density(Source.ZERO, 0.0, notes=(Note(MassCode.NO_MASS_NO_MATERIAL, words),))
-        known = self.rule.density_of(row.material)
-        if known is not None:
-            return _Density(Source.MATERIAL, known, f"material of “{row.name}”")
-        default = self.rule.options.default_density
-        words = (
-            f"Unknown material '{row.material}' of “{row.name}” around it; "
-            f"the default density ({default:g} kg/m³) was used"
-        )
-        return _Density(Source.DEFAULT_DENSITY, default, "default", (Note(MassCode.UNKNOWN_MATERIAL, words),))
-
-    def _decide(self, index: int, match: Match, **changes: object) -> None:
+    def _set(self, index: int, match: Match, new: Decision) -> None:
         """One decision per (row, product): instances of one product stay one part in the report."""
-        old = self.decisions[index]
-        lines = tuple(row.line for row in match.bundle.rows)
-        common = {"rule": Rule.SUB_ASSEMBLY, "decided": match.decided, "lines": lines}
-        new = Decision(**{**old.__dict__, **common, **changes})
-        self.decisions[index] = self._made.setdefault((match, old, bool(self.volume[index] > 0)), new)
-
-
-_NO_VOLUME = Note(MassCode.NO_VOLUME, "the part has no solid to multiply a density with: counted as 0 kg")
+        key = (match, self.decisions[index], bool(self.volume[index] > 0))
+        self.decisions[index] = self._made.setdefault(key, new)
 
 
 def _has_data(decision: Decision) -> bool:
@@ -263,7 +226,7 @@ def place_all(assembly: Assembly, rule: MassRule, matching: Matching) -> Placed:
         float,
     ).reshape(len(instances))
     mass[~counted] = 0.0
-    groups = tuple(Groups(instances, volume, mass, decisions, counted, rule).apply(matching.groups))
+    groups = tuple(Groups(assembly, volume, mass, decisions, counted, rule).apply(matching.groups))
     return Placed(volume, com, unit, mass, decisions, counted, groups)
 
 

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from silo.bom.errors import InputError
 from silo.inertia.bom import BomCode, BOMParser, BomTable
+from silo.inertia.bom.columns import find_columns
 from silo.inertia.bom.masses import unit_factor
 
 PLAIN = (
@@ -394,3 +395,46 @@ def test_the_servers_real_export_is_read() -> None:
         assert table["Gearbox"].mass_kg == pytest.approx(1.2)
         assert table["Lid, red"].material == "PLA"
         assert table.warnings == ()
+
+
+@pytest.mark.parametrize(
+    ("header", "found"),
+    [
+        ("POS-NR.;BENENNUNG;BESCHREIBUNG;MENGE;GEWICHT", "item name description quantity mass"),  # SolidWorks
+        ("No. ARTICLE;NUMERO DE PIECE;QTE;MATERIAU;POIDS", "item part_number quantity material mass"),
+        ("アイテム番号;部品番号;説明;数量;質量", "item part_number description quantity mass"),
+        ("N. ARTICOLO;NUMERO PARTE;DESCRIZIONE;QTÀ", "item part_number description quantity"),
+        ("Objekt;Bauteilnummer;ANZAHL;Material;Masse", "item part_number quantity material mass"),  # Inventor
+        ("Article;N° de pièce;QTE unitaire;QTE;Masse", "item part_number - quantity mass"),
+        ("Élément;Quantité;Numéro de pièce;Nom;Masse", "item quantity part_number name mass"),  # Onshape
+        ("항목;수량;부품 번호;이름;질량", "item quantity part_number name mass"),
+        ("BOM Line;Item ID;Item Name;Quantity;Mass", "- part_number name quantity mass"),  # Teamcenter
+        ("Stufe;Komponentennummer;Objektkurztext;Nettogewicht", "level part_number name mass"),  # SAP
+        ("Callout;Part Name;Qty;NX_Mass [kg];NX_Material", "- name quantity mass material"),
+        (
+            "PART NO.;PART;NO. REQ'D;MAT'L;WT. EA.;EXT. WT.",
+            "part_number name quantity material mass total_mass",
+        ),
+        ("Reference;Value;Footprint;Qty;Designation", "- - - quantity name"),  # KiCad: R1, R2 is no number
+    ],
+)
+def test_headers_of_cad_systems_are_known(header: str, found: str) -> None:
+    cells = header.split(";")
+    columns = find_columns(cells)
+    roles = {index: role for role, index in columns.at.items()}
+    assert [str(roles.get(index, "-")) for index in range(len(cells))] == found.split()
+
+
+def test_indented_names_are_a_structure() -> None:
+    """Two levels by spaces; a stray space, or a jump over a level, is none."""
+    head = "Name,Qty,Material,Mass (g)\n"
+    table = BOMParser().parse_bytes(
+        (head + "Arm,2,,\n  Plate,4,steel,2\n    Pin,3,steel,1\n  Bolt,1,steel,1\n").encode()
+    )
+    assert [row.parent for row in table.rows] == [None, 0, 1, 0]
+    assert table.total_quantity(table.rows[2]) == 24
+    assert ["indented" in warning.message for warning in table.warnings] == [True]
+    for rows in ("Arm,2,,\n Plate,4,steel,2\n", "Arm,2,,\n  Plate,4,,\n      Pin,3,steel,1\n", "  Arm,1,,\n"):
+        table = BOMParser().parse_bytes((head + rows).encode())
+        assert {row.parent for row in table.rows} == {None}
+        assert not table.warnings

@@ -6,6 +6,7 @@ from __future__ import annotations
 import datetime
 import io
 import zipfile
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -62,12 +63,112 @@ def test_a_workbook_is_read_like_a_csv_file() -> None:
 
 
 def test_what_is_no_number_in_a_workbook_is_reported() -> None:
-    """A date for a quantity, a truth value and an error for a mass; a formula that nothing has computed."""
-    rows = [["a", datetime.date(2026, 1, 2), "steel", 1], ["b", 1, "steel", True], ["c", 1, "steel", "=1+1"]]
+    """A date for a quantity, a truth value and an error for a mass; formulas that nothing has computed.
+
+    Such a formula looks like an empty cell to a reader of values, and the part would get its material's mass.
+    """
+    rows = [
+        ["a", datetime.date(2026, 1, 2), "steel", 1],
+        ["b", 1, "steel", True],
+        ["c", 1, "steel", "=1+1"],
+        ["d", "=2+2", "steel", "#REF!"],
+    ]
     table = BOMParser().parse_bytes(xlsx(BOM=[HEAD, *rows]))
-    assert [row.mass_kg for row in table.rows] == [pytest.approx(1e-3), None, None]
+    assert [row.mass_kg for row in table.rows] == [pytest.approx(1e-3), None, None, None]
     found = [(w.code, w.line) for w in table.warnings]
-    assert found == [(BomCode.UNREADABLE_QUANTITY, 2), (BomCode.UNREADABLE_MASS, 3)]
+    assert found == [
+        (BomCode.FILE, 0),
+        (BomCode.UNREADABLE_QUANTITY, 2),
+        (BomCode.UNREADABLE_MASS, 3),
+        (BomCode.UNREADABLE_MASS, 4),
+        (BomCode.UNREADABLE_QUANTITY, 5),
+        (BomCode.UNREADABLE_MASS, 5),
+    ]
+    assert "2 formulas without a value" in table.warnings[0].message
+
+
+def edited(*rows: list[Any], change: Callable[[Any], object]) -> bytes:
+    """A workbook of one sheet, after ``change`` of that sheet."""
+    book = openpyxl.load_workbook(io.BytesIO(xlsx(BOM=list(rows))))
+    change(book["BOM"])
+    book.save(out := io.BytesIO())
+    return out.getvalue()
+
+
+def test_a_merged_cell_gives_each_of_its_lines_the_text() -> None:
+    """One material for three lines is meant for each of them; a number may be of all lines together."""
+
+    def merge(sheet: Any) -> None:
+        for cells in ("A1:A2", "C3:C5", "D3:D4", "E3:E5"):
+            sheet.merge_cells(cells)
+
+    units = [None, "", "", "g", ""]
+    rows = [["a", 4, "steel", 12, "x"], ["b", 2, None, None, None], ["c", 1, None, 7, None]]
+    table = BOMParser().parse_bytes(edited([*HEAD[:3], "Mass", "Note"], units, *rows, change=merge))
+    assert [(row.name, row.material) for row in table.rows] == [
+        ("a", "steel"),
+        ("b", "steel"),
+        ("c", "steel"),
+    ]
+    assert [row.mass_kg for row in table.rows] == [pytest.approx(0.012), None, pytest.approx(0.007)]
+    texts, numbers = (warning.message for warning in table.warnings)
+    assert texts == "merged cells: “steel” in lines 3 to 5; each of these lines was given the text"
+    assert numbers == "merged cells: “12” in lines 3 to 4; only the first of these lines has the number"
+
+
+def test_hidden_lines_are_read_and_named_and_a_hidden_sheet_comes_last() -> None:
+    """A filter hides what was ordered elsewhere; the robot has it all the same."""
+
+    def hide(sheet: Any) -> None:
+        sheet.row_dimensions[3].hidden = True
+        sheet.row_dimensions[9].hidden = True
+        old = sheet.parent.create_sheet("old", 0)
+        old.append(HEAD)
+        old.append(["z", 1, "steel", 1])
+        old.sheet_state = "hidden"
+
+    table = BOMParser().parse_bytes(edited(HEAD, ["a", 1, "", 1], ["b", 1, "", 2], change=hide))
+    assert [row.name for row in table.rows] == ["a", "b"]
+    sheets, lines = sorted(warning.message for warning in table.warnings)
+    assert "line 3 is hidden" in sheets
+    assert "not read: sheet “old”" in lines
+
+
+def test_texts_with_a_point_or_a_comma_prove_no_decimal_mark() -> None:
+    """A number is stored as one; a text in its place was pasted from anywhere."""
+    table = BOMParser().parse_bytes(xlsx(BOM=[HEAD, ["a", 1, "", "36.826"], ["b", 1, "", 1.234]]))
+    assert [w.code for w in table.warnings] == []  # the number shows its point
+    table = BOMParser().parse_bytes(xlsx(BOM=[HEAD, ["a", 1, "", "36.826"], ["b", 1, "", 1]]))
+    assert [w.code for w in table.warnings] == [BomCode.AMBIGUOUS_MASS]
+
+
+def test_item_numbers_that_a_spreadsheet_changed_are_named() -> None:
+    """1.10 becomes 1.1 as a number, and 1.2 a day in January; either takes a row from its parent."""
+    head = ["Item", "Name", "Qty", "Material", "Mass (g)"]
+    rows = [
+        [1, "top", 1],
+        [1.1, "a", 4],
+        [1.10, "b", 2],
+        [datetime.date(2026, 1, 2), "c", 1],
+        ["1.3", "d", 1],
+    ]
+    table = BOMParser().parse_bytes(xlsx(BOM=[head, *rows]))
+    assert [row.parent for row in table.rows] == [None, 0, 0, None, 0]
+    assert [(w.line, w.name) for w in table.warnings] == [(4, "b"), (5, "c")]
+
+
+def test_a_workbook_with_a_doctype_or_broken_parts_is_read_without_a_look_inside() -> None:
+    """What hostile or strange files say beside their values is not worth a failure."""
+    good = xlsx(BOM=[HEAD, ["a", 1, "steel", 1]])
+    for path, old, new in (
+        ("xl/workbook.xml", b"<workbook", b"<!DOCTYPE workbook><workbook"),
+        ("xl/worksheets/sheet1.xml", b' r="2"', b""),
+    ):
+        with zipfile.ZipFile(io.BytesIO(good)) as source, zipfile.ZipFile(out := io.BytesIO(), "w") as target:
+            for name in source.namelist():
+                data = source.read(name)
+                target.writestr(name, data.replace(old, new, 1) if name == path else data)
+        assert [row.name for row in BOMParser().parse_bytes(out.getvalue()).rows] == ["a"]
 
 
 def test_a_second_sheet_with_a_bom_is_named() -> None:

@@ -466,3 +466,34 @@ def test_short_texts_are_like_nothing(materials: MaterialTable, text: str) -> No
     found = materials.find(text)
     assert isinstance(found, MaterialMiss)
     assert found.nearest is None
+
+
+@pytest.mark.parametrize(
+    ("header", "density"),
+    [
+        ("density lb/ft3", 7.85 * 0.45359237 / 0.3048**3),
+        ("Density_g/cm3", 7850),
+        ("density [g/cm³]", 7850),
+        ("density, t/m3", 7850),
+    ],
+)
+def test_a_unit_in_a_header_needs_no_brackets(tmp_path: Path, header: str, density: float) -> None:
+    """Read as kg/m³, "density lb/ft3" would be 16 times too light for every row."""
+    from silo.inertia.materials.files import user_rows
+
+    (tmp_path / "m.csv").write_text(f'name,"{header}"\nx,7.85\n')
+    assert user_rows(tmp_path / "m.csv")[0].density == pytest.approx(density)
+
+
+def test_a_users_table_may_say_how_much_a_density_varies(tmp_path: Path) -> None:
+    """In percent, in both formats; what is no percentage is refused."""
+    from silo.inertia.materials.files import user_rows
+
+    (tmp_path / "m.csv").write_text("name,density,spread\nx,500 kg/m3,20\ny,500 kg/m3,5 %\nz,500 kg/m3,\n")
+    assert [row.spread for row in user_rows(tmp_path / "m.csv")] == [0.2, 0.05, 0.0]
+    (tmp_path / "m.toml").write_text('[materials]\nx = { density = 500, spread = 20, aliases = ["a"] }\n')
+    (row,) = user_rows(tmp_path / "m.toml")
+    assert (row.spread, row.aliases) == (0.2, ("a",))
+    (tmp_path / "m.csv").write_text("name,density,spread\nx,500 kg/m3,much\ny,500 kg/m3,120\n")
+    with pytest.raises(ConfigError, match=r"“x”.*“much”.*“y”.*“120”"):
+        user_rows(tmp_path / "m.csv")

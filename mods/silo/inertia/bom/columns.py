@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from silo.bom.errors import InputError
 from silo.bom.headers import Role, alias, normal, plain_cell
@@ -114,24 +114,18 @@ ROLES = (
 
 @dataclass(frozen=True, slots=True)
 class Columns:
-    """Where each role is (column index), and the units that the headers of the mass columns state.
+    """Where each role is (column index), and what the headers of the mass columns say.
 
     others
         columns that mean a quantity, a mass or a material as well, and lost to the one that is used.
     exact
         masses are written in full (Silo's own export does so): a short one was not rounded.
-    strange
-        what the header of a mass column says in brackets and is not understood.
-    pieces
-        how many pieces a mass column's cells are the mass of, where it is not one.
     """
 
     at: Mapping[Role, int]
-    units: Mapping[Role, str] = field(default_factory=dict)
-    others: tuple[tuple[Role, int], ...] = ()
-    exact: bool = False
-    strange: Mapping[Role, str] = field(default_factory=dict)
-    pieces: Mapping[Role, int] = field(default_factory=dict)
+    masses: Mapping[Role, MassHeader]
+    others: tuple[tuple[Role, int], ...]
+    exact: bool
 
     def cell(self, row: Sequence[str], role: Role) -> str:
         """The row's cell for a role; "" where there is no such column or the row is too short.
@@ -148,8 +142,8 @@ class Columns:
         return bool({Role.NAME, Role.PART_NUMBER, Role.DESCRIPTION} & self.at.keys())
 
 
-_MASSES = (Role.MASS, Role.TOTAL_MASS)
-_ONE_ONLY = (*_MASSES, Role.MATERIAL, Role.QUANTITY)
+MASS_COLUMNS = (Role.MASS, Role.TOTAL_MASS)
+_ONE_ONLY = (*MASS_COLUMNS, Role.MATERIAL, Role.QUANTITY)
 _SILOS_OWN = {"part number", "total quantity", "unreferenced since"}
 
 
@@ -176,13 +170,10 @@ def find_columns(header: Sequence[str], given: Mapping[str, str] | None = None) 
         seen.append((role, index))
         if rank < best.get(role, sys.maxsize):
             at[role], best[role] = index, rank
-    masses = {role: read_mass_header(header[at[role]]) for role in _MASSES if role in at}
-    units = {role: mass.unit for role, mass in masses.items() if mass.unit}
-    strange = {role: mass.strange for role, mass in masses.items() if mass.strange}
-    pieces = {role: mass.pieces for role, mass in masses.items()}
+    masses = {role: read_mass_header(header[at[role]]) for role in MASS_COLUMNS if role in at}
     others = tuple((role, i) for role, i in seen if role in _ONE_ONLY and at[role] != i)
     exact = {normal(cell) for cell in header} >= _SILOS_OWN
-    return Columns(at, units, others, exact, strange, pieces)
+    return Columns(at, masses, others, exact)
 
 
 def _given_roles(given: Mapping[str, str]) -> dict[Role, str]:
@@ -202,6 +193,6 @@ def _role_of(cell: str) -> tuple[Role, int] | None:
         return found if found[0] in ROLES else None
     header = read_mass_header(cell)
     found = found or alias(header.title)
-    if found is None or found[0] not in _MASSES or header.rate:
+    if found is None or found[0] not in MASS_COLUMNS or header.rate:
         return None
     return (Role.TOTAL_MASS, found[1]) if header.total else found

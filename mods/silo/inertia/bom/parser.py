@@ -7,13 +7,13 @@ import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 from silo.bom.errors import InputError
 from silo.bom.headers import Role, find_clashes
 from silo.bom.numbers import LARGEST_QUANTITY, Mark, read_count
-from silo.inertia.bom.columns import read_mass_header
-from silo.inertia.bom.masscolumn import MASS_COLUMNS, MassReader
+from silo.inertia.bom.masscolumn import MassReader
 from silo.inertia.bom.masses import is_empty, unit_factor
 from silo.inertia.bom.rows import BomCode, BOMEntry, BomTable, BomWarning
 from silo.inertia.bom.sheet import Row, Sheet, read_sheet
@@ -74,18 +74,12 @@ class BOMParser:
         warnings = [BomWarning(BomCode.FILE, note) for note in sheet.notes]
         warnings += _doubtful_columns(sheet)
         warnings += _second_columns(sheet)
-
-        def tell(code: BomCode, message: str, row: Row, name: str) -> None:
-            warnings.append(BomWarning(code, message, row.line, name))
-
-        masses = MassReader(sheet, self._decimal, self._mass_unit, tell)
+        masses = MassReader(sheet, self._decimal, self._mass_unit, warnings)
         item_role = _item_role(sheet)
-        rows: list[BOMEntry] = []
-        for row in sheet.rows:
-            entry = _entry(sheet, row, masses, item_role, warnings)
-            if entry is not None:
-                rows.append(entry)
+        found = [_entry(sheet, row, masses, item_role, warnings) for row in sheet.rows]
+        rows = _indented([entry for entry in found if entry is not None], sheet, warnings)
         table_rows = masses.check_totals(BomTable(with_structure(masses.to_display_precision(rows))))
+        warnings += _doubtful_items(table_rows)
         warnings += _duplicates(table_rows)
         return BomTable(table_rows, tuple(warnings), source)
 
@@ -97,9 +91,8 @@ def _entry(
     number, text = cell(row.cells, Role.PART_NUMBER), cell(row.cells, Role.DESCRIPTION)
     name = cell(row.cells, Role.NAME) or ("" if Role.NAME in sheet.columns.at else text) or number
     if not name:
-        warnings.append(
-            BomWarning(BomCode.NO_NAME, "has no name and no part number; it was left out", row.line)
-        )
+        words = "has no name and no part number; it was left out"
+        warnings.append(BomWarning(BomCode.NO_NAME, words, row.line))
         return None
     _check_length(sheet, row, name, warnings)
     quantity = _quantity(cell(row.cells, Role.QUANTITY), row.line, name, warnings)
@@ -119,6 +112,32 @@ def _entry(
         level=_level(cell(row.cells, Role.LEVEL), item_role, row.line, name, warnings),
         line=row.line,
     )
+
+
+def _indented(rows: list[BOMEntry], sheet: Sheet, warnings: list[BomWarning]) -> list[BOMEntry]:
+    """The rows with levels by the spaces before their names, where nothing else gives a structure.
+
+    Steps of two spaces or more, never two steps down at once: a stray space makes no sub-assembly.
+    """
+    at = sheet.columns.at
+    if Role.LEVEL in at or any("." in row.item for row in rows):
+        return rows
+    column = next(at[role] for role in (Role.NAME, Role.DESCRIPTION, Role.PART_NUMBER) if role in at)
+    cells = {row.line: row.cells[column] for row in sheet.rows if column < len(row.cells)}
+    depths = [_depth(cells.get(row.line, "")) for row in rows]
+    step = min(filter(None, depths), default=0)
+    levels = [depth // step if step else 0 for depth in depths]
+    deeper = any(level > above + 1 for above, level in pairwise([-1, *levels]))
+    if step < 2 or deeper or any(depth % step for depth in depths):
+        return rows
+    words = "the names are indented; a row belongs to the one above it that is indented less"
+    warnings.append(BomWarning(BomCode.FILE, words, sheet.header_line))
+    return [replace(row, level=level + 1) for row, level in zip(rows, levels, strict=True)]
+
+
+def _depth(cell: str) -> int:
+    text = cell.expandtabs(4)
+    return len(text) - len(text.lstrip())
 
 
 def _quantity(text: str, line: int, name: str, warnings: list[BomWarning]) -> float | None:
@@ -152,55 +171,28 @@ def _level(text: str, item_role: Role, line: int, name: str, warnings: list[BomW
 
 
 def _check_length(sheet: Sheet, row: Row, name: str, warnings: list[BomWarning]) -> None:
-    extra = [cell for cell in row.cells[len(sheet.header) :] if cell.strip()]
-    if extra:
-        warnings.append(
-            BomWarning(
-                BomCode.ROW_LENGTH,
-                f"has {counted(len(row.cells), 'cell')} where the header has {len(sheet.header)}; "
-                "a comma without quotes shifts the columns",
-                row.line,
-                name,
-            )
-        )
+    if any(cell.strip() for cell in row.cells[len(sheet.header) :]):
+        what = "a comma without quotes shifts the columns"
     elif len(row.cells) <= max(sheet.columns.at.values()):
-        warnings.append(
-            BomWarning(
-                BomCode.ROW_LENGTH,
-                f"has {counted(len(row.cells), 'cell')} where the header has {len(sheet.header)}; "
-                "the missing ones count as empty",
-                row.line,
-                name,
-            )
-        )
+        what = "the missing ones count as empty"
+    else:
+        return
+    words = f"has {counted(len(row.cells), 'cell')} where the header has {len(sheet.header)}; {what}"
+    warnings.append(BomWarning(BomCode.ROW_LENGTH, words, row.line, name))
 
 
-def _doubtful_columns(sheet: Sheet) -> list[BomWarning]:
+def _doubtful_columns(sheet: Sheet) -> Iterator[BomWarning]:
     at = sheet.columns.at
+    for role, header in sheet.columns.masses.items():
+        if header.rate:
+            words = f"“{sheet.header[at[role]].strip()}” is no mass by its header, and was taken for one"
+            yield BomWarning(BomCode.FILE, words, sheet.header_line)
     seen = ", ".join(cell.strip() for cell in sheet.header if cell.strip())
-    missing = []
-    if Role.MASS not in at and Role.TOTAL_MASS not in at:
-        missing.append("mass")
-    if Role.MATERIAL not in at:
-        missing.append("material")
-    rates = [
-        BomWarning(
-            BomCode.FILE,
-            f"“{sheet.header[at[role]].strip()}” is no mass by its header, and was taken for one",
-            sheet.header_line,
-        )
-        for role in MASS_COLUMNS
-        if role in at and read_mass_header(sheet.header[at[role]]).rate
-    ]
-    return rates + [
-        BomWarning(
-            BomCode.MISSING_COLUMN,
-            f"there is no {what} column (the columns are {seen}); "
-            f"if one of them is it, say --column {what}=…",
-            sheet.header_line,
-        )
-        for what in missing
-    ]
+    for what, known in (("mass", sheet.columns.masses), ("material", Role.MATERIAL in at)):
+        if not known:
+            words = f"there is no {what} column (the columns are {seen}); "
+            words += f"if one of them is it, say --column {what}=…"
+            yield BomWarning(BomCode.MISSING_COLUMN, words, sheet.header_line)
 
 
 def _second_columns(sheet: Sheet) -> Iterator[BomWarning]:
@@ -214,6 +206,22 @@ def _second_columns(sheet: Sheet) -> Iterator[BomWarning]:
             f"“{one.unused}” in the other. --column {one.role}={one.other} takes the other one",
             sheet.header_line,
         )
+
+
+def _doubtful_items(rows: Sequence[BOMEntry]) -> Iterator[BomWarning]:
+    """Item numbers that a spreadsheet may have changed: 1.10 to 1.1, and 1.2 to the second of January."""
+    if not any("." in row.item for row in rows):
+        return
+    first: dict[str, int] = {}
+    for row in rows:
+        if first.setdefault(row.item, row.line) != row.line and "." in row.item:
+            words = (
+                f"the item number {row.item} stands in line {first[row.item]} as well (was it 1.10 for 1.1?)"
+            )
+            yield BomWarning(BomCode.FILE, f"{words}; rows below may belong to either", row.line, row.name)
+        elif row.item and not _ITEM.fullmatch(row.item.strip().rstrip(".")):
+            words = f"the item number “{row.item}” cannot be read; the row is taken to stand at the top"
+            yield BomWarning(BomCode.FILE, words, row.line, row.name)
 
 
 def _duplicates(rows: Sequence[BOMEntry]) -> list[BomWarning]:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 
@@ -121,12 +121,11 @@ class BomTable(Mapping[str, BOMEntry]):
 
     def total_quantity(self, row: BOMEntry) -> float | None:
         """Pieces in the whole product: its quantity times that of every parent; None where one is unknown."""
-        total = row.quantity
-        parent = row.parent
-        while total is not None and parent is not None:
-            above = self.rows[parent]
-            total = None if above.quantity is None else total * above.quantity
-            parent = above.parent
+        total = 1.0
+        for one in (row, *self.ancestors(row)):
+            if one.quantity is None:
+                return None
+            total *= one.quantity
         return total
 
     def ancestors(self, row: BOMEntry) -> tuple[BOMEntry, ...]:
@@ -143,9 +142,4 @@ def as_table(entries: Mapping[str, BOMEntry]) -> BomTable:
     """Any mapping name → entry as a table; a table passes unchanged."""
     if isinstance(entries, BomTable):
         return entries
-    rows = tuple(entry if entry.name == name else _renamed(entry, name) for name, entry in entries.items())
-    return BomTable(rows)
-
-
-def _renamed(entry: BOMEntry, name: str) -> BOMEntry:
-    return BOMEntry(**{**entry.__dict__, "name": name})
+    return BomTable(tuple(replace(entry, name=name) for name, entry in entries.items()))

@@ -11,26 +11,21 @@ from __future__ import annotations
 import csv
 import io
 import re
-import zipfile
-import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
-from functools import reduce
 from itertools import islice, zip_longest
 
 from silo.bom.errors import InputError
 from silo.bom.headers import Role
 from silo.inertia.bom.columns import Columns, find_columns, read_mass_header
+from silo.inertia.bom.workbook import STARTS, SheetText, read_workbook
 
 MAX_BYTES = 64 * 1024 * 1024
 HEADER_WITHIN = 40
 """The header must be among this many first lines (title blocks are a few lines long)."""
 
-DELIMITERS = (",", ";", "\t", "|")
-_WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
-"""How XLSX and ODS files begin, and XLS files."""
-MAX_UNPACKED, MOST_CELLS = 8 * MAX_BYTES, 20_000_000
-_REFERENCE = re.compile(rb'\sr="([A-Z]{1,3})([0-9]{1,7})"')
+DELIMITERS = ",;\t|"
+_NUMBER = re.compile(r"[\s+\-−~(]*[\d.,]")
 _CODE_PAGES = ("cp1252", "cp932", "gb18030", "latin-1")
 
 
@@ -44,13 +39,12 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Sheet:
-    """A decoded table. ``notes``: what had to be assumed to read it."""
+    """A decoded table; a workbook has no ``delimiter``. ``notes``: what had to be assumed to read it."""
 
     header: tuple[str, ...]
     header_line: int
     columns: Columns
     rows: tuple[Row, ...]
-    encoding: str
     delimiter: str
     notes: tuple[str, ...] = ()
 
@@ -74,22 +68,30 @@ def read_sheet(
         raise InputError(f"{source}: {len(data) / 1e6:.0f} MB is no BOM (limit {MAX_BYTES / 1e6:.0f} MB)")
     if delimiter is not None and len(delimiter) != 1:
         raise InputError(f"a delimiter is one character, got “{delimiter}”")
-    marks = (delimiter,) if delimiter else DELIMITERS
+    workbook = data.startswith(STARTS)
+    marks = "," if workbook else delimiter or DELIMITERS
+    texts = _workbook(data, source, columns) if workbook else _decodings(data, encoding, source)
     first_lines = ""
-    workbook = data.startswith(_WORKBOOKS)
-    marks = (",",) if workbook else marks
-    texts = _sheets(data, source) if workbook else _decodings(data, encoding, source)
-    for name, text in texts:
+    for found in texts:
+        text = found.text
         if text.lstrip()[:1] == "<":
             raise InputError(f"{source}: this is HTML or XML and no table; export it as CSV or XLSX")
         first_lines = first_lines or text
         best = _best_header(text, marks, columns)
         if best is not None:
-            sheet = _sheet(text, name, best, data, columns)
-            more = [name for name, text in texts if workbook and _best_header(text, marks, columns)]
-            note = f"{name} of the workbook was read; not read: {', '.join(more)}"
-            return replace(sheet, notes=(*sheet.notes, note)) if more else sheet
+            return _sheet(found, best, data, columns)
     raise InputError(_no_header(source, first_lines))
+
+
+def _workbook(data: bytes, source: str, given: Mapping[str, str] | None) -> Iterator[SheetText]:
+    """The sheets; the first one that holds a BOM names the others that do."""
+    sheets = list(read_workbook(data, source))
+    usable = [sheet.name for sheet in sheets if _best_header(sheet.text, ",", given)]
+    for sheet in sheets:
+        if usable[1:] and sheet.name == usable[0]:
+            note = f"{sheet.name} of the workbook was read; not read: {', '.join(usable[1:])}"
+            sheet = sheet._replace(notes=(*sheet.notes, note))
+        yield sheet
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,8 +101,8 @@ class _Header:
     columns: Columns
 
 
-def _sheet(text: str, encoding: str, best: _Header, data: bytes, given: Mapping[str, str] | None) -> Sheet:
-    records = list(_records(text, best.delimiter))
+def _sheet(found: SheetText, best: _Header, data: bytes, given: Mapping[str, str] | None) -> Sheet:
+    records = list(_records(found.text, best.delimiter))
     header = records[best.index]
     columns = best.columns
     below = records[best.index + 1 : best.index + 2]
@@ -114,8 +116,9 @@ def _sheet(text: str, encoding: str, best: _Header, data: bytes, given: Mapping[
         header = Row(header.line, tuple(cells))
         columns = find_columns(cells, given)
         best = replace(best, index=best.index + 1, columns=columns)
-    notes = list(_notes(encoding, data, header, columns, given))
-    bad = _bad_quotes(text, best.delimiter)
+    notes = [*_notes(found.name, data, header, columns, given), *found.notes]
+    notes += _unmerged(records, found.merged, records[best.index].line, set(columns.at.values()))
+    bad = _bad_quotes(found.text, best.delimiter)
     if bad is not None:
         notes.append(
             f"line {bad}: the quotes do not match; rows from here on may be read wrongly or be missing"
@@ -123,7 +126,40 @@ def _sheet(text: str, encoding: str, best: _Header, data: bytes, given: Mapping[
     rows = tuple(
         r for r in records[best.index + 1 :] if any(c.strip() for c in r.cells) and r.cells != header.cells
     )
-    return Sheet(header.cells, header.line, columns, rows, encoding, best.delimiter, tuple(notes))
+    delimiter = "" if data.startswith(STARTS) else best.delimiter
+    return Sheet(header.cells, header.line, columns, rows, delimiter, tuple(notes))
+
+
+def _unmerged(
+    records: list[Row], merged: Sequence[tuple[int, int, int]], header: int, used: Set[int]
+) -> Iterator[str]:
+    """Give each line of a merged cell its text. A number may be of all lines together: the first keeps it."""
+    at = {row.line: index for index, row in enumerate(records)}
+    texts, numbers = [], []
+    for first, last, column in merged:
+        text = (
+            records[at[first]].cells[column].strip()
+            if first > header and first in at and column in used
+            else ""
+        )
+        if not text:
+            continue
+        what = f"“{text}” in lines {first} to {last}"
+        if _NUMBER.match(text):
+            numbers.append(what)
+            continue
+        texts.append(what)
+        for index in range(at[first] + 1, min(at[first] + 1 + last - first, len(records))):
+            row = records[index]
+            records[index] = replace(row, cells=(*row.cells[:column], text, *row.cells[column + 1 :]))
+    if texts:
+        yield f"merged cells: {_some(texts)}; each of these lines was given the text"
+    if numbers:
+        yield f"merged cells: {_some(numbers)}; only the first of these lines has the number"
+
+
+def _some(words: Sequence[str]) -> str:
+    return ", ".join(words[:4]) + (f" and {len(words) - 4} more" if len(words) > 4 else "")
 
 
 def _continues(header: Row, columns: Columns, below: Row) -> bool:
@@ -154,75 +190,28 @@ def _notes(
             yield f"there is no column “{text}” for {role} in line {header.line} ({seen})"
 
 
-def _sheets(data: bytes, source: str) -> Iterator[tuple[str, str]]:
-    """Each sheet of a workbook as CSV; numbers in full, with decimal points; dates as in ISO 8601."""
-    try:
-        from python_calamine import CalamineError, load_workbook
-    except ImportError as error:
-        raise InputError(
-            f"{source}: this is a workbook; export it as CSV, or install silo-mod[inertia]"
-        ) from error
-    _check_extent(data, source)
-    try:
-        book = load_workbook(io.BytesIO(data))
-        for name in book.sheet_names:
-            out = io.StringIO()
-            rows = book.get_sheet_by_name(name).to_python(skip_empty_area=False)
-            csv.writer(out).writerows([_shown(value) for value in row] for row in rows)
-            yield f"sheet “{name}”", out.getvalue()
-    except CalamineError as error:
-        raise InputError(f"{source}: the workbook cannot be read ({error})") from error
-
-
-def _check_extent(data: bytes, source: str) -> None:
-    """InputError where a stray cell in a far corner would cost the reader more memory than there is."""
-    try:
-        archive = zipfile.ZipFile(io.BytesIO(data))
-        if sum(info.file_size for info in archive.infolist()) > MAX_UNPACKED:
-            raise InputError(f"{source}: unpacked, the workbook is larger than {MAX_UNPACKED / 1e6:.0f} MB")
-        sheets = [n for n in archive.namelist() if n.startswith("xl/worksheets/") and n.endswith(".xml")]
-        found = {name: _REFERENCE.findall(archive.read(name)) for name in sheets}
-    except (zipfile.BadZipFile, zlib.error, OSError, EOFError, RuntimeError):
-        return  # the reader says what is wrong with it
-    for name, cells in found.items():
-        row = max((int(number) for _, number in cells), default=0)
-        column = max((letters.rjust(3, b"@") for letters, _ in cells), default=b"@@@")
-        width = reduce(lambda number, letter: number * 26 + letter - 64, column, 0)
-        if row * width > MOST_CELLS:
-            last = f"{column.decode().strip('@')}{row}"
-            raise InputError(f"{source}: {name} reaches to {last}; delete what stands outside of the table")
-
-
-def _shown(value: object) -> str:
-    if isinstance(value, float):
-        text = f"{value:.15g}"
-        return text + "0" * (text[-4:-3] == ".")  # "1.2340" cannot be 1234
-    return " ".join(str(value).splitlines())
-
-
-def _decodings(data: bytes, encoding: str | None, source: str) -> Iterator[tuple[str, str]]:
+def _decodings(data: bytes, encoding: str | None, source: str) -> Iterator[SheetText]:
+    """The text by each encoding that may be meant; its name is the encoding's."""
     if encoding is not None:
         try:
-            yield encoding, data.decode(encoding)
+            yield SheetText(encoding, data.decode(encoding))
         except (UnicodeDecodeError, LookupError) as error:
             raise InputError(f"{source}: cannot be read as {encoding}: {error}") from error
         return
-    for mark, name in (
-        (b"\xef\xbb\xbf", "utf-8-sig"),
-        (b"\xff\xfe", "utf-16"),
-        (b"\xfe\xff", "utf-16"),
-    ):
-        if data.startswith(mark):
-            yield name, data.decode(name, errors="replace")
-            return
+    start = data[:64]
     # UTF-16 without its mark: every second byte of ASCII text is zero.
-    if data[:64].count(0) > len(data[:64]) // 4:
-        name = "utf-16-le" if data[1:2] == b"\0" else "utf-16-be"
-        yield name, data.decode(name, errors="replace")
-        return
+    wide = "utf-16-le" if data[1:2] == b"\0" else "utf-16-be"
+    for found, name in (
+        (data.startswith(b"\xef\xbb\xbf"), "utf-8-sig"),
+        (data.startswith((b"\xff\xfe", b"\xfe\xff")), "utf-16"),
+        (start.count(0) > len(start) // 4, wide),
+    ):
+        if found:
+            yield SheetText(name, data.decode(name, errors="replace"))
+            return
     for name in ("utf-8", *_CODE_PAGES):
         try:
-            yield name, data.decode(name)
+            yield SheetText(name, data.decode(name))
         except UnicodeDecodeError:
             continue
 
@@ -249,7 +238,7 @@ def _bad_quotes(text: str, delimiter: str) -> int | None:
     return None
 
 
-def _best_header(text: str, delimiters: tuple[str, ...], given: Mapping[str, str] | None) -> _Header | None:
+def _best_header(text: str, delimiters: str, given: Mapping[str, str] | None) -> _Header | None:
     """The (delimiter, line) that names most roles; None where no line names a usable set."""
     best: _Header | None = None
     score = (0, 0)

@@ -7,6 +7,7 @@ import csv
 import io
 import re
 import tomllib
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -30,7 +31,8 @@ def user_rows(path: Path | str) -> tuple[Material, ...]:
     """A user's table, by suffix.
 
     ``.csv``: columns ``name``, ``density`` (kg/m^3, or as the header says: ``density (g/cm3)``; a cell may
-    carry its own unit), optional ``aliases`` (separated by ``;``), ``source``, ``family``.
+    carry its own unit), optional ``aliases`` (separated by ``;``), ``source``, ``family``, ``spread`` (by how
+    many percent the density varies).
     ``.toml``: ``[materials]`` with ``"My alloy" = 2810``, ``= "2.81 g/cm3"`` or
     ``= { density = …, aliases = […] }``.
 
@@ -44,70 +46,70 @@ def user_rows(path: Path | str) -> tuple[Material, ...]:
     if path.suffix.lower() == ".csv":
         return _csv_rows(text, str(path))
     if path.suffix.lower() == ".toml":
-        return _toml_rows(text, str(path))
+        return _checked(_toml_records(text, str(path)), None, str(path))
     raise ConfigError(f"{path}: a material table is a .csv or .toml file")
+
+
+_Record = tuple[str, Mapping[str, Any]]
+"""Where a row stands, and its cells."""
 
 
 def _csv_rows(text: str, source: str) -> tuple[Material, ...]:
     first = text.partition("\n")[0]
     reader = csv.DictReader(io.StringIO(text), delimiter=";" if ";" in first and "," not in first else ",")
-    heads = {re.sub(r"[\s(\[].*", "", head).casefold(): head for head in reader.fieldnames or () if head}
+    heads = {
+        re.sub(r"[\W_].*", "", head.strip()).casefold(): head for head in reader.fieldnames or () if head
+    }
     if not {"name", "density"} <= heads.keys():
         raise ConfigError(f"{source}: wanted columns “name” and “density”, got {reader.fieldnames}")
-    unit = re.search(r"[(\[](.+)[)\]]", heads["density"])
-    factor = unit_factor(unit[1]) if unit else 1.0
-    if factor is None:
+    # "density (g/cm3)", "Density [g/cm3]", "density_g/cm3": whatever stands behind the word is the unit.
+    unit = heads["density"].strip()[len("density") :].strip(" _:,-()[]")
+    factor = unit_factor(unit) if unit else None
+    if unit and factor is None:
         raise ConfigError(f"{source}: unknown density unit in the header “{heads['density']}”")
-    rows: list[Material] = []
-    problems: list[str] = []
-    for record in reader:
-        cells = {key: (record.get(head) or "").strip() for key, head in heads.items()}
-        row = _material(
-            cells["name"],
-            cells["density"],
-            [alias.strip() for alias in cells.get("aliases", "").split(";") if alias.strip()],
-            cells.get("source", "") or source,
-            cells.get("family", ""),
-            factor if unit else None,
-        )
-        if isinstance(row, str):
-            problems.append(f"line {reader.line_num}: {row}")
-        else:
-            rows.append(row)
-    return _checked(rows, problems, source)
+    records = (
+        (f"line {reader.line_num}", {key: record.get(head) or "" for key, head in heads.items()})
+        for record in reader
+    )
+    return _checked(records, factor, source)
 
 
-def _toml_rows(text: str, source: str) -> tuple[Material, ...]:
+def _toml_records(text: str, source: str) -> Iterator[_Record]:
     try:
         table = tomllib.loads(text).get("materials", {})
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{source}: this is no TOML ({error})") from error
     if not isinstance(table, dict) or not table:
         raise ConfigError(f"{source}: wanted a table [materials] with name = density")
+    for name, value in table.items():
+        given = value if isinstance(value, dict) else {"density": value}
+        yield f"materials.{name}", {"name": name, **given}
+
+
+def _checked(records: Iterable[_Record], factor: float | None, source: str) -> tuple[Material, ...]:
+    """``factor``: kg/m^3 per unit of the header, None where it states none."""
     rows: list[Material] = []
     problems: list[str] = []
-    for name, value in table.items():
-        given: dict[str, Any] = value if isinstance(value, dict) else {"density": value}
-        aliases = given.get("aliases", [])
-        row = _material(
-            str(name),
-            str(given.get("density", "")),
-            [str(alias) for alias in aliases] if isinstance(aliases, list) else [],
-            str(given.get("source", source)),
-            str(given.get("family", "")),
-            None,
-        )
+    for where, cells in records:
+        row = _material(cells, factor, source)
         if isinstance(row, str):
-            problems.append(f"materials.{name}: {row}")
+            problems.append(f"{where}: {row}")
         else:
             rows.append(row)
-    return _checked(rows, problems, source)
+    seen: dict[Words, Material] = {}
+    for row in rows:
+        for alias in (row.name, *row.aliases):
+            other = seen.setdefault(words(alias), row)
+            if other is not row and other.density != row.density:
+                problems.append(f"“{alias}” has two densities, {other.density:g} and {row.density:g} kg/m³")
+    if problems:
+        raise ConfigError(f"{source}: " + "; ".join(problems))
+    return tuple(rows)
 
 
-def _material(
-    name: str, density: str, aliases: list[str], source: str, family: str, factor: float | None
-) -> Material | str:
-    """``factor``: kg/m^3 per unit of the header, None where it states none. What is wrong, in words, else."""
+def _material(cells: Mapping[str, Any], factor: float | None, source: str) -> Material | str:
+    """A row, or in words what is wrong with it."""
+    name, density, spread = (str(cells.get(key, "")).strip() for key in ("name", "density", "spread"))
     if not name:
         return f"wanted a name, got none for the density “{density}”"
     cell = read_density(density, factor or 1.0)
@@ -118,21 +120,21 @@ def _material(
         )
     if cell.value is None:
         return f"the density of “{name}”: {cell.problem}"
-    return Material(name, cell.value, tuple(aliases), source, family)
+    percent = parse_number(spread.removesuffix("%") or "0")
+    if percent is None or not 0 <= percent.value < 100:
+        return f"the spread of “{name}”: wanted 0 to 100 percent, got “{spread}”"
+    given = cells.get("aliases", "")
+    aliases = given.split(";") if isinstance(given, str) else map(str, given)
+    return Material(
+        name,
+        cell.value,
+        tuple(filter(None, (alias.strip() for alias in aliases))),
+        str(cells.get("source", "")).strip() or source,
+        str(cells.get("family", "")).strip(),
+        percent.value / 100,
+    )
 
 
 def _is_below(text: str, limit: float) -> bool:
     number = parse_number(text)
     return number is not None and not number.ambiguous and 0 < number.value < limit
-
-
-def _checked(rows: list[Material], problems: list[str], source: str) -> tuple[Material, ...]:
-    seen: dict[Words, Material] = {}
-    for row in rows:
-        for alias in (row.name, *row.aliases):
-            other = seen.setdefault(words(alias), row)
-            if other is not row and other.density != row.density:
-                problems.append(f"“{alias}” has two densities, {other.density:g} and {row.density:g} kg/m³")
-    if problems:
-        raise ConfigError(f"{source}: " + "; ".join(problems))
-    return tuple(rows)

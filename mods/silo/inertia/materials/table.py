@@ -30,13 +30,20 @@ class Found(StrEnum):
 
 @dataclass(frozen=True)
 class Material:
-    """One material. ``density`` [kg/m^3] at room temperature; ``family``: the more general row, or ""."""
+    """One material.
+
+    density
+        [kg/m^3] at room temperature; it varies by ± ``spread`` of itself between kinds of the material.
+    family
+        the more general row, or "".
+    """
 
     name: str
     density: float
     aliases: tuple[str, ...] = ()
     source: str = ""
     family: str = ""
+    spread: float = 0.0
 
 
 @dataclass(frozen=True)
