@@ -28,7 +28,7 @@ from silo.batch import Options, TopResult, sync_top
 from silo.bom.errors import InputError, SiloError
 from silo.bom_sync import Status, compare, resolve
 from silo.cli.common import read_assembly
-from silo.inertia.push import PushItem, PushPlan, push
+from silo.inertia.output.push import PushItem, PushPlan, push
 from silo.outbox.entry import Commit, State
 from silo.outbox.send import send_all
 from silo.outbox.store import Store

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from silo.inertia.geometry import ReadOptions
     from silo.inertia.materials import MaterialTable
     from silo.inertia.model import Assembly
-    from silo.inertia.push import PushPlan
+    from silo.inertia.output.push import PushPlan
     from silo.inertia.report import InertiaReport
 
 REPORTS = (".json", ".csv", ".md")
@@ -330,7 +330,7 @@ def push_report(
     args: argparse.Namespace, report: InertiaReport, part_numbers: Mapping[str, str] | None = None
 ) -> int:
     """Write the masses to the server, or show the plan; 1 where an item is unknown there."""
-    from silo.inertia.push import plan_push, push
+    from silo.inertia.output.push import plan_push, push
 
     plan = plan_push(report, part_numbers, args.item)
     if args.dry_run:
@@ -349,7 +349,7 @@ def push_report(
 
 
 def _tell_plan(plan: PushPlan) -> None:
-    from silo.inertia.push import describe
+    from silo.inertia.output.push import describe
 
     _say(f"Would write {counted(len(plan.items), 'item')} ({plan.comment}):")
     for item in plan.items:

@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from silo.inertia.bom import BOMEntry, BOMParser
     from silo.inertia.calculator import EnhancedInertiaCalculator, InertiaCalculator, compute_link_inertials
-    from silo.inertia.core import MassProps
+    from silo.inertia.core import InertialProperties, MassProps
     from silo.inertia.materials import MATERIAL_DENSITIES
     from silo.inertia.report import InertiaReport, PartWarning
-    from silo.inertia.types import InertialProperties
 
 __all__ = [
     "MATERIAL_DENSITIES",
@@ -36,7 +35,7 @@ _HOME = {
     "EnhancedInertiaCalculator": "calculator",
     "InertiaCalculator": "calculator",
     "InertiaReport": "report",
-    "InertialProperties": "types",
+    "InertialProperties": "core",
     "MATERIAL_DENSITIES": "materials",
     "MassProps": "core",
     "PartWarning": "report",

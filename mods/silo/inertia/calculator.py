@@ -14,7 +14,7 @@ import numpy as np
 from silo.inertia.aggregate import chosen_frame, fill_links, tell_bom, tell_claims, tell_rows, tell_tensors
 from silo.inertia.bom import BOMEntry, BOMParser, BomTable, as_table
 from silo.inertia.codes import MassCode
-from silo.inertia.core import Floats
+from silo.inertia.core import Floats, InertialProperties
 from silo.inertia.links import ROOT_LINK, Claims, FrameChoice, LinkFrame, LinkMap, apart, as_link_map, claim
 from silo.inertia.massrule import MassRule, Options
 from silo.inertia.matching import match
@@ -23,7 +23,6 @@ from silo.inertia.model import Assembly, Prototype, leaf_products, sub_assemblie
 from silo.inertia.names import Suggester
 from silo.inertia.placed import place_all
 from silo.inertia.report import InertiaReport
-from silo.inertia.types import InertialProperties
 
 if TYPE_CHECKING:
     from silo.inertia.geometry import ReadOptions

@@ -20,7 +20,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from silo.bom.errors import InputError
-from silo.inertia.types import InertialProperties
 
 Floats = NDArray[np.float64]
 
@@ -31,6 +30,29 @@ CHECK_TOLERANCE = 1e-9
 """Relative to the largest principal moment: what counts as rounding when a tensor is checked."""
 
 _EYE3 = np.eye(3)
+
+
+@dataclass(frozen=True)
+class InertialProperties:
+    """Mass, centre of mass and inertia tensor of one rigid body, as URDF wants them (spec, Task 2).
+
+    mass
+        [kg]
+    com
+        (x, y, z) [m], in the link's frame.
+    ixx, iyy, izz, ixy, ixz, iyz
+        tensor elements [kg m^2] about the centre of mass, axes of the link's frame; the products are the
+        elements themselves (-∫xy dm), so that they go into a URDF unchanged.
+    """
+
+    mass: float
+    com: tuple[float, float, float]
+    ixx: float
+    iyy: float
+    izz: float
+    ixy: float = 0.0
+    ixz: float = 0.0
+    iyz: float = 0.0
 
 
 class TensorProblem(StrEnum):

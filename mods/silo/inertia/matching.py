@@ -11,12 +11,11 @@ Rows with equal data are one :class:`Bundle`: nobody needs to distinguish them.
 from __future__ import annotations
 
 import re
-from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from itertools import count
-from typing import TypeVar
 
 from silo.inertia.bom.rows import BOMEntry, BomTable
 from silo.inertia.codes import Decided, Rule
@@ -52,181 +51,6 @@ class Bundle:
 
 
 @dataclass(frozen=True, eq=False)
-class Pair:
-    """One product and the rows it got."""
-
-    product: Product
-    bundle: Bundle
-    decided: Decided
-    doubt: str = ""
-
-
-@dataclass(eq=False)
-class _Open:
-    """What is still to be matched."""
-
-    products: list[Product]
-    bundles: list[Bundle]
-    pairs: list[Pair] = field(default_factory=list)
-
-    def close(self, product: Product, bundle: Bundle, decided: Decided, doubt: str = "") -> None:
-        self.products.remove(product)
-        self.bundles.remove(bundle)
-        self.pairs.append(Pair(product, bundle, decided, doubt))
-
-
-class Reading(StrEnum):
-    """What a quantity in a structured BOM counts."""
-
-    PER_PARENT = "per_parent"  # pieces in one parent
-    TOTAL = "total"  # pieces in the whole product
-
-
-BOTH = frozenset(Reading)
-
-
-def readings(products: Sequence[Product], table: BomTable) -> frozenset[Reading]:
-    """Which reading of the quantities the parts that nothing can be mistaken for agree on; else both.
-
-    Only rows count on which the readings differ, of a name that one row and one product have.
-    """
-    by_name = _once((plain(product.name), product) for product in products)
-    rows = _once((plain(row.name), row) for row in table.rows if not row.has_children)
-    fits = dict.fromkeys(Reading, 0)
-    for name in by_name.keys() & rows.keys():
-        row, count = rows[name], by_name[name].count
-        total = table.total_quantity(row)
-        if row.quantity is None or total is None or row.quantity == total:
-            continue
-        fits[Reading.PER_PARENT] += count == total
-        fits[Reading.TOTAL] += count == row.quantity
-    best = [reading for reading in Reading if fits[reading]]
-    if len(best) == 2 and max(fits.values()) >= 2 * min(fits.values()):
-        best = [max(fits, key=lambda reading: fits[reading])]
-    return frozenset(best) if len(best) == 1 else BOTH
-
-
-_T = TypeVar("_T")
-
-
-def _once(pairs: Iterable[tuple[str, _T]]) -> dict[str, _T]:
-    """What stands under a name of its own."""
-    found: dict[str, list[_T]] = {}
-    for name, value in pairs:
-        found.setdefault(name, []).append(value)
-    return {name: values[0] for name, values in found.items() if len(values) == 1}
-
-
-def assign(
-    products: Sequence[Product],
-    rows: Sequence[BOMEntry],
-    table: BomTable,
-    density: DensityOf,
-    read: frozenset[Reading] = BOTH,
-) -> list[Pair]:
-    """Pairs of products and rows of one name. A product without a pair has no row."""
-    bundles = bundled(rows, table, read)
-    if len(bundles) == 1:
-        return _one_bundle(list(products), bundles[0], density)
-    state = _Open(list(products), bundles)
-    _settle(state, Decided.PARENT, _same_parent)
-    _settle(state, Decided.QUANTITY, lambda p, b: p.count in b.quantities)
-    _settle(state, Decided.MASS, lambda p, b: _may_count(p, b) and _mass_fits(p, b, density))
-    _settle(state, Decided.MASS, lambda p, b: _mass_fits(p, b, density))
-    if len(state.products) == len(state.bundles) == 1 and state.pairs:
-        state.close(state.products[0], state.bundles[0], Decided.REMAINING)
-    _in_order(state)
-    return state.pairs
-
-
-def bundled(rows: Sequence[BOMEntry], table: BomTable, read: frozenset[Reading] = BOTH) -> list[Bundle]:
-    """Rows of one name, those with equal data together, in the order of their first row."""
-    groups: dict[tuple[str | None, float | None], list[BOMEntry]] = {}
-    for row in rows:
-        groups.setdefault(row.data, []).append(row)
-    return [_bundle(tuple(group), table, read) for group in groups.values()]
-
-
-def _bundle(rows: tuple[BOMEntry, ...], table: BomTable, read: frozenset[Reading]) -> Bundle:
-    # Quantities of a structured BOM are per parent here and per product there; either may be meant.
-    kinds = {
-        Reading.TOTAL: [row.quantity for row in rows],
-        Reading.PER_PARENT: [table.total_quantity(row) for row in rows],
-    }
-    sums = {sum(q for q in kinds[r] if q is not None) for r in read if None not in kinds[r]}
-    above = {table.rows[row.parent].name if row.parent is not None else "" for row in rows}
-    return Bundle(rows, frozenset(sums), frozenset(plain(name) for name in above))
-
-
-def _one_bundle(products: list[Product], bundle: Bundle, density: DensityOf) -> list[Pair]:
-    several = len(bundle.rows) > 1
-    decided = Decided.SAME_DATA if several else Decided.ONLY
-    if len(products) == 1:
-        return [Pair(products[0], bundle, decided)]
-    total = sum(product.count for product in products)
-    if bundle.quantities and total not in bundle.quantities:
-        by_count = [p for p in products if p.count in bundle.quantities]
-        if len(by_count) == 1:
-            return [Pair(by_count[0], bundle, Decided.QUANTITY)]
-        fitting = [p for p in products if _mass_fits(p, bundle, density)]
-        if len(fitting) == 1:
-            return [Pair(fitting[0], bundle, Decided.MASS)]
-    return [Pair(product, bundle, decided) for product in products]
-
-
-def _settle(state: _Open, decided: Decided, fits: Callable[[Product, Bundle], bool]) -> None:
-    """Pair what fits one way only, from both sides, until nothing changes."""
-    changed = True
-    while changed and state.products and state.bundles:
-        changed = False
-        for product in list(state.products):
-            options = [b for b in state.bundles if fits(product, b)]
-            if len(options) != 1:
-                continue
-            rivals = [p for p in state.products if fits(p, options[0])]
-            if len(rivals) == 1:
-                state.close(product, options[0], decided)
-                changed = True
-
-
-def _in_order(state: _Open) -> None:
-    left = len(state.products), len(state.bundles)
-    for product, bundle in list(zip(state.products, state.bundles, strict=False)):
-        lines = ", ".join(str(row.line) for b in [bundle] for row in b.rows)
-        state.close(
-            product,
-            bundle,
-            Decided.ORDER,
-            f"{counted(left[0], 'part')} and {counted(left[1], 'row')} named “{product.name}” cannot be told "
-            f"apart by parent, quantity or mass; in order of appearance this one got line {lines}",
-        )
-
-
-def _same_parent(product: Product, bundle: Bundle) -> bool:
-    # Only where the BOM is structured: else every row stands at the top and proves nothing.
-    structured = any(parent for parent in bundle.parents)
-    return structured and {plain(name) for name in product.parents} <= bundle.parents
-
-
-def _may_count(product: Product, bundle: Bundle) -> bool:
-    return not bundle.quantities or product.count in bundle.quantities
-
-
-def _mass_fits(product: Product, bundle: Bundle, density: DensityOf) -> bool:
-    row = bundle.row
-    rho = density(row, product)
-    if row.mass_kg is None or rho is None or product.volume_m3 <= 0:
-        return False
-    allowed = max(row.quantum_kg, MASS_TOLERANCE * row.mass_kg)
-    return abs(rho * product.volume_m3 - row.mass_kg) <= allowed
-
-
-def _shapes_differ(products: Sequence[Product]) -> bool:
-    volumes = [product.volume_m3 for product in products]
-    return max(volumes) - min(volumes) > 0.01 * max(volumes)
-
-
-@dataclass(frozen=True, eq=False)
 class Match:
     """How a product found its row. ``doubt``: what keeps this from being certain, "" where nothing does."""
 
@@ -254,15 +78,18 @@ def match(
     parts: Sequence[Product], groups: Sequence[Product], table: BomTable, density: DensityOf
 ) -> Matching:
     """Match leaf products first, then sub-assemblies with the rows that no leaf used."""
-    read = readings(parts, table)
-    claims = _Claims(table, read)
-    by_part = _tiers(parts, _rows_for_parts(table), table, density, claims)
-    by_group = _tiers(groups, table.rows, table, lambda row, product: None, claims)
+    matcher = _Matcher(table, _readings(parts, table))
+    leaves = {plain(row.name) for row in table.rows if not row.has_children}
+    # A row with children is a part's only where no other row has its name.
+    rows = [row for row in table.rows if not row.has_children or plain(row.name) not in leaves]
+    by_part = matcher.run(parts, rows, density)
+    by_group = matcher.run(groups, table.rows, lambda row, product: None)
     told_below = {id(above) for row in table.rows if _has_data(row) for above in table.ancestors(row)}
     unused = tuple(
         row
         for row in table.rows
-        if not claims.used(row) and (not row.has_children or (_has_data(row) and id(row) not in told_below))
+        if not matcher.taken[id(row)]
+        and (not row.has_children or (_has_data(row) and id(row) not in told_below))
     )
     return Matching(by_part, by_group, unused)
 
@@ -271,53 +98,166 @@ def _has_data(row: BOMEntry) -> bool:
     return row.has_mass or row.has_material
 
 
-class _Claims:
-    """Which row was given to how many instances."""
+class _Reading(StrEnum):
+    """What a quantity in a structured BOM counts."""
 
-    def __init__(self, table: BomTable, read: frozenset[Reading]) -> None:
+    PER_PARENT = "per_parent"  # pieces in one parent
+    TOTAL = "total"  # pieces in the whole product
+
+
+def _readings(products: Sequence[Product], table: BomTable) -> frozenset[_Reading]:
+    """Which reading of the quantities the parts that nothing can be mistaken for agree on; else both.
+
+    Only rows count on which the readings differ, of a name that one row and one product have.
+    """
+    rows = {plain(row.name): row for row in table.rows if not row.has_children}
+    row_names = Counter(plain(row.name) for row in table.rows if not row.has_children)
+    names = Counter(plain(product.name) for product in products)
+    fits = dict.fromkeys(_Reading, 0)
+    for product in products:
+        name = plain(product.name)
+        if names[name] != 1 or row_names[name] != 1:
+            continue
+        one, total = rows[name].quantity, table.total_quantity(rows[name])
+        if one is not None and total is not None and one != total:
+            fits[_Reading.PER_PARENT] += product.count == total
+            fits[_Reading.TOTAL] += product.count == one
+    low, high = sorted(fits, key=lambda reading: fits[reading])
+    clear = fits[high] > 0 and fits[high] >= 2 * fits[low]
+    return frozenset((high,) if clear else _Reading)
+
+
+class _Matcher:
+    """Matches products tier by tier. ``taken``: by id of a row, how many instances it was given to."""
+
+    def __init__(self, table: BomTable, read: frozenset[_Reading]) -> None:
         self._table = table
-        self.read = read
-        self._count: dict[int, int] = defaultdict(int)
-        self._used: set[int] = set()
+        self._read = read
+        self.taken: Counter[int] = Counter()
 
-    def used(self, row: BOMEntry) -> bool:
-        return id(row) in self._used
+    def run(
+        self, products: Sequence[Product], rows: Sequence[BOMEntry], density: DensityOf
+    ) -> dict[str, Match]:
+        """Matches by the products' keys."""
+        found: dict[str, Match] = {}
+        for rule, candidates in _finders(rows):
+            wanted = [product for product in products if product.key not in found]
+            options = {p.key: [r for r in candidates(p) if self._is_open(r, p)] for p in wanted}
+            for same, theirs in _components(wanted, options):
+                contest = _Contest(rule, density, list(same), self._bundled(theirs))
+                contest.decide()
+                for product in same:
+                    if product.key in contest.found:
+                        self.taken.update(
+                            {id(r): product.count for r in contest.found[product.key].bundle.rows}
+                        )
+                found |= contest.found
+        return _with_doubtful_shapes(products, found)
 
-    def take(self, pair: Pair) -> None:
-        for row in pair.bundle.rows:
-            self._used.add(id(row))
-            self._count[id(row)] += pair.product.count
-
-    def open_for(self, row: BOMEntry, product: Product) -> bool:
+    def _is_open(self, row: BOMEntry, product: Product) -> bool:
         """A used row still takes a product where its quantity leaves room for all of its instances."""
-        if not self.used(row):
+        if not self.taken[id(row)]:
             return True
-        total = self._table.total_quantity(row) if Reading.PER_PARENT in self.read else row.quantity
-        return total is not None and self._count[id(row)] + product.count <= total
+        total = self._table.total_quantity(row) if _Reading.PER_PARENT in self._read else row.quantity
+        return total is not None and self.taken[id(row)] + product.count <= total
+
+    def _bundled(self, rows: Sequence[BOMEntry]) -> list[Bundle]:
+        """Rows with equal data together, in the order of their first row."""
+        groups: dict[tuple[str | None, float | None], list[BOMEntry]] = {}
+        for row in rows:
+            groups.setdefault(row.data, []).append(row)
+        return [self._bundle(tuple(group)) for group in groups.values()]
+
+    def _bundle(self, rows: tuple[BOMEntry, ...]) -> Bundle:
+        # Quantities of a structured BOM are per parent here and per product there; either may be meant.
+        kinds = {
+            _Reading.TOTAL: [row.quantity for row in rows],
+            _Reading.PER_PARENT: [self._table.total_quantity(row) for row in rows],
+        }
+        sums = {sum(q for q in kinds[r] if q is not None) for r in self._read if None not in kinds[r]}
+        above = {self._table.rows[row.parent].name if row.parent is not None else "" for row in rows}
+        return Bundle(rows, frozenset(sums), frozenset(plain(name) for name in above))
 
 
-def _rows_for_parts(table: BomTable) -> tuple[BOMEntry, ...]:
-    """Rows without children; one with children only where no other row has its name."""
-    leaves = {plain(row.name) for row in table.rows if not row.has_children}
-    return tuple(row for row in table.rows if not row.has_children or plain(row.name) not in leaves)
+@dataclass(eq=False)
+class _Contest:
+    """Products and bundles of rows of one name; who gets what ends in ``found``, by the products' keys."""
+
+    rule: Rule
+    density: DensityOf
+    products: list[Product]
+    bundles: list[Bundle]
+    found: dict[str, Match] = field(default_factory=dict)
+
+    def decide(self) -> None:
+        """A product that is not in ``found`` afterwards has no row."""
+        if len(self.bundles) == 1:
+            self._share_one(self.bundles[0])
+            return
+        self._settle(Decided.PARENT, _same_parent)
+        self._settle(Decided.QUANTITY, lambda p, b: p.count in b.quantities)
+        self._settle(Decided.MASS, lambda p, b: _may_count(p, b) and self._mass_fits(p, b))
+        self._settle(Decided.MASS, self._mass_fits)
+        if len(self.products) == len(self.bundles) == 1 and self.found:
+            self._pair(self.products[0], self.bundles[0], Decided.REMAINING)
+        self._in_order()
+
+    def _pair(self, product: Product, bundle: Bundle, decided: Decided, doubt: str = "") -> None:
+        self.products.remove(product)
+        self.bundles.remove(bundle)
+        self.found[product.key] = Match(bundle, self.rule, decided, doubt)
+
+    def _share_one(self, bundle: Bundle) -> None:
+        """All products have the one bundle, unless its quantity or mass is that of one of them only."""
+        decided = Decided.SAME_DATA if len(bundle.rows) > 1 else Decided.ONLY
+        takers = self.products
+        if len(takers) > 1 and bundle.quantities and sum(p.count for p in takers) not in bundle.quantities:
+            by_count = [p for p in takers if p.count in bundle.quantities]
+            by_mass = [p for p in takers if self._mass_fits(p, bundle)]
+            if len(by_count) == 1:
+                takers, decided = by_count, Decided.QUANTITY
+            elif len(by_mass) == 1:
+                takers, decided = by_mass, Decided.MASS
+        for product in takers:
+            self.found[product.key] = Match(bundle, self.rule, decided)
+
+    def _settle(self, decided: Decided, fits: Callable[[Product, Bundle], bool]) -> None:
+        """Pair what fits one way only, from both sides, until nothing changes."""
+        changed = True
+        while changed and self.products and self.bundles:
+            changed = False
+            for product in list(self.products):
+                options = [b for b in self.bundles if fits(product, b)]
+                if len(options) == 1 and sum(fits(p, options[0]) for p in self.products) == 1:
+                    self._pair(product, options[0], decided)
+                    changed = True
+
+    def _in_order(self) -> None:
+        left = f"{counted(len(self.products), 'part')} and {counted(len(self.bundles), 'row')}"
+        for product, bundle in list(zip(self.products, self.bundles, strict=False)):
+            lines = ", ".join(str(row.line) for row in bundle.rows)
+            doubt = (
+                f"{left} named “{product.name}” cannot be told apart by parent, quantity or mass; "
+                f"in order of appearance this one got line {lines}"
+            )
+            self._pair(product, bundle, Decided.ORDER, doubt)
+
+    def _mass_fits(self, product: Product, bundle: Bundle) -> bool:
+        row = bundle.row
+        rho = self.density(row, product)
+        if row.mass_kg is None or rho is None or product.volume_m3 <= 0:
+            return False
+        allowed = max(row.quantum_kg, MASS_TOLERANCE * row.mass_kg)
+        return abs(rho * product.volume_m3 - row.mass_kg) <= allowed
 
 
-def _tiers(
-    products: Sequence[Product],
-    rows: Sequence[BOMEntry],
-    table: BomTable,
-    density: DensityOf,
-    claims: _Claims,
-) -> dict[str, Match]:
-    found: dict[str, Match] = {}
-    for rule, candidates in _finders(rows):
-        wanted = [product for product in products if product.key not in found]
-        options = {p.key: [r for r in candidates(p) if claims.open_for(r, p)] for p in wanted}
-        for same, theirs in _components(wanted, options):
-            for pair in assign(same, theirs, table, density, claims.read):
-                claims.take(pair)
-                found[pair.product.key] = Match(pair.bundle, rule, pair.decided, pair.doubt)
-    return _with_doubtful_shapes(products, found)
+def _same_parent(product: Product, bundle: Bundle) -> bool:
+    # Only where the BOM is structured: else every row stands at the top and proves nothing.
+    return any(bundle.parents) and {plain(name) for name in product.parents} <= bundle.parents
+
+
+def _may_count(product: Product, bundle: Bundle) -> bool:
+    return not bundle.quantities or product.count in bundle.quantities
 
 
 def _with_doubtful_shapes(products: Sequence[Product], found: dict[str, Match]) -> dict[str, Match]:
@@ -327,7 +267,8 @@ def _with_doubtful_shapes(products: Sequence[Product], found: dict[str, Match]) 
         if product.key in found and found[product.key].row.has_mass and product.volume_m3 > 0:
             by_row[id(found[product.key].row)].append(product)
     for same in by_row.values():
-        if _shapes_differ(same):
+        volumes = [product.volume_m3 for product in same]
+        if max(volumes) - min(volumes) > 0.01 * max(volumes):
             names = listed(list(dict.fromkeys(product.name for product in same)))
             words = (
                 f"{len(same)} different shapes are named {names} and the BOM has one mass for all of them; "
@@ -341,11 +282,11 @@ def _with_doubtful_shapes(products: Sequence[Product], found: dict[str, Match]) 
 Finder = Callable[[Product], Sequence[BOMEntry]]
 
 
-def _finders(rows: Sequence[BOMEntry]) -> Iterable[tuple[Rule, Finder]]:
-    by_name = _index(rows, lambda row: (row.name,))
-    by_plain = _index(rows, lambda row: (plain(row.name),))
-    by_bare = _index(rows, lambda row: (bare(row.name),))
-    by_number = _index(rows, lambda row: (plain(row.part_number), plain(row.name)))
+def _finders(rows: Sequence[BOMEntry]) -> Iterator[tuple[Rule, Finder]]:
+    by_name = _index((row.name, row) for row in rows)
+    by_plain = _index((plain(row.name), row) for row in rows)
+    by_bare = _index((bare(row.name), row) for row in rows)
+    by_number = _index((plain(text), row) for row in rows for text in {row.part_number, row.name})
     lossy_rows = [row for row in rows if is_lossy(row.name)]
 
     def wildcard(product: Product) -> list[BOMEntry]:
@@ -376,15 +317,13 @@ def _tells_apart(number: str) -> bool:
     return bool(number.strip()) and not re.fullmatch(r"\s*\d{1,3}\s*", number)
 
 
-def _index(
-    rows: Sequence[BOMEntry], keys: Callable[[BOMEntry], Sequence[str]]
-) -> Mapping[str, Sequence[BOMEntry]]:
-    index: dict[str, list[BOMEntry]] = defaultdict(list)
-    for row in rows:
-        for key in dict.fromkeys(keys(row)):
-            if key:
-                index[key].append(row)
-    return index
+def _index(pairs: Iterable[tuple[str, BOMEntry]]) -> Mapping[str, Sequence[BOMEntry]]:
+    """Key → its rows, each once."""
+    index: dict[str, dict[int, BOMEntry]] = defaultdict(dict)
+    for key, row in pairs:
+        if key:
+            index[key][id(row)] = row
+    return {key: list(rows.values()) for key, rows in index.items()}
 
 
 def _components(

@@ -9,11 +9,10 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from silo.inertia.codes import Decided, Rule, Source
-from silo.inertia.types import InertialProperties
 from silo.inertia.wording import counted
 
 if TYPE_CHECKING:
-    from silo.inertia.core import MassProps, TensorProblem
+    from silo.inertia.core import InertialProperties, MassProps, TensorProblem
     from silo.inertia.links import LinkFrame
 
 logger = logging.getLogger(__name__)

@@ -37,7 +37,7 @@ from step_writer import StepDocument, trsf_of
 
 from silo.inertia.geometry.kernel import occt
 from silo.inertia.model import Assembly, GeometryCode, Prototype
-from silo.inertia.push import DOUBTS
+from silo.inertia.output.push import DOUBTS
 
 COUNT = int(os.environ.get("SILO_HUNT", "120"))
 SEED = int(os.environ.get("SILO_HUNT_SEED", "13"))

@@ -8,9 +8,8 @@ from collections.abc import Callable, Mapping
 from xml.sax.saxutils import quoteattr
 
 from silo.bom.errors import InputError
-from silo.inertia.core import MassProps
+from silo.inertia.core import InertialProperties, MassProps
 from silo.inertia.output.values import number
-from silo.inertia.types import InertialProperties
 
 
 def urdf_inertial(props: MassProps) -> str:
