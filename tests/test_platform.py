@@ -57,6 +57,30 @@ def test_a_file_that_a_virus_scanner_has_open_is_waited_for() -> None:
     assert act.waited == sorted(act.waited)
 
 
+def test_no_child_opens_a_console_window_on_windows() -> None:
+    windows = SimpleNamespace(CREATE_NO_WINDOW=0x08000000, CREATE_NEW_PROCESS_GROUP=0x200)
+    assert child_options(offered=windows) == {"creationflags": 0x08000000}
+    assert child_options(offered=windows, group=True) == {"creationflags": 0x08000200}
+    assert child_options(offered=SimpleNamespace()) == {}
+    assert child_options(offered=SimpleNamespace(), group=True) == {"start_new_session": True}
+
+
+def test_every_child_is_started_with_these_options() -> None:
+    calls = [
+        (path, node)
+        for path in MODS.rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call) and re.fullmatch(r"subprocess\.(run|Popen|call|check_\w+)", ast.unparse(node.func))
+    ]
+    assert len(calls) >= 6
+    bare = [
+        f"{path}:{node.lineno}"
+        for path, node in calls
+        if not any(word.arg is None and "child_options(" in ast.unparse(word.value) for word in node.keywords)
+    ]
+    assert not bare
+
+
 def test_patience_ends() -> None:
     act = Refusals(1000, InUse())
     with pytest.raises(PermissionError):

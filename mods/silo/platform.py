@@ -256,16 +256,16 @@ def allow_many_files(resources: Resources | None = None) -> None:
         found.setrlimit(found.RLIMIT_NOFILE, (hard, hard))
 
 
-def child_options(*, group: bool = False) -> dict[str, Any]:
+def child_options(*, group: bool = False, offered: object = subprocess) -> dict[str, Any]:
     """Options of ``subprocess`` for a child that nobody sees: no console window opens on Windows.
 
     group
         the child and its own children can be ended together, by :func:`end`.
+    offered
+        has the flags of this platform.
     """
-    flags = getattr(subprocess, "CREATE_NO_WINDOW", 0)
-    if flags:
-        own = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0) if group else 0
-        return {"creationflags": flags | own}
+    if flags := getattr(offered, "CREATE_NO_WINDOW", 0):
+        return {"creationflags": flags | (getattr(offered, "CREATE_NEW_PROCESS_GROUP", 0) if group else 0)}
     return {"start_new_session": True} if group else {}
 
 

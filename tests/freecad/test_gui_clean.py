@@ -52,7 +52,8 @@ def test_our_save_takes_the_mark_away(said: dict[str, Any]) -> None:
 
 
 def test_the_property_editor_has_number_and_state(said: dict[str, Any]) -> None:
-    """Of each component, read only, in a group of its own; the file has nothing of it."""
+    """Of each selected component, read only, in a group of its own; the file has nothing of it."""
+    assert (said["shown_early"], said["selecting_changed"]) == ([], {})
     number, *rest = said["shown"]["P"]
     assert number.startswith("M01-")
     assert rest == ["in Silo", "Silo", True]

@@ -68,6 +68,8 @@ def test_a_tool_tip_shows_markup_as_text() -> None:
     """Qt would draw it otherwise, and load pictures that it names."""
     assert tip('a <img src="x"> & b') == '<qt>a &lt;img src="x"&gt; &amp; b</qt>'
     assert tip("") == ""
+    # What a cell cuts is whole here.
+    assert "the end" in tip("word " * 500 + "the end")
 
 
 def test_one_and_many() -> None:

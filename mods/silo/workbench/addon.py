@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
 from importlib import import_module
@@ -18,12 +18,12 @@ from silo.workbench.settings.preferences import GROUP, Preferences
 from silo.workbench.words import plain, translate
 
 if TYPE_CHECKING:
-    from silo.bom.model import BomEntry
     from silo.outbox.report import Sent
     from silo.workbench.buttons import Buttons
     from silo.workbench.commit.flow import CommitFlow
     from silo.workbench.freecad.hooks import CommitHook
     from silo.workbench.freecad.live_desk import LiveDesk
+    from silo.workbench.freecad.silo_group import SiloGroup
     from silo.workbench.preview.flow import PreviewFlow
     from silo.workbench.register.flow import RegisterFlow
     from silo.workbench.revisions.flow import RevisionFlow
@@ -157,8 +157,15 @@ class AddOn:
             register=self.buttons.register,
             show=self.buttons.show_objects,
             view=self.buttons.open_page,
-            known=self._show_numbers,
+            known=self.group.know,
         )
+
+    @cached_property
+    def group(self) -> SiloGroup:
+        """What the property editor shows of components."""
+        from silo.workbench.freecad.silo_group import SiloGroup
+
+        return SiloGroup()
 
     @cached_property
     def registrations(self) -> RegisterFlow:
@@ -208,17 +215,12 @@ class AddOn:
         """A commit of this FreeCAD arrived."""
         path = sent.entry.path
         if sent.resolved is not None:
-            self._show_numbers(path, sent.resolved.entries)
+            self.group.know(path, sent.resolved.entries)
         if "previews" in vars(self):
             self.previews.again(path)
         left = len(sent.resolved.unresolved) if sent.resolved is not None else 0
         if left and self.preferences.flag("AskRegister") and self.commits.was_asked_for(sent.entry.key):
             self.buttons.register(path)
-
-    def _show_numbers(self, path: str, entries: Iterable[BomEntry]) -> None:
-        from silo.workbench.freecad import silo_group
-
-        silo_group.show(path, entries)
 
     def _bug(self, error: BaseException) -> None:
         host.error(plain(f"[Silo] unexpected problem: {type(error).__name__}: {error}", 500))

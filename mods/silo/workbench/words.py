@@ -87,6 +87,10 @@ def visible(text: str, most: int = 20_000) -> str:
     return "".join(shown) + ("…" if len(text) > most else "")
 
 
+# A tool tip has the whole of what a cell cuts; no screen has room for more than this.
+MOST_TIP = 3000
+
+
 def tip(text: str) -> str:
     """A tool tip. Qt takes text that looks like markup for markup, so ours is some, with nothing in it.
 
@@ -95,7 +99,7 @@ def tip(text: str) -> str:
     # FreeCAD's start must not pay for its table of names.
     import html
 
-    return f"<qt>{html.escape(plain(text, 400), quote=False)}</qt>" if text else ""
+    return f"<qt>{html.escape(plain(text, MOST_TIP), quote=False)}</qt>" if text else ""
 
 
 def counted(count: int, one: str, many: str) -> str:

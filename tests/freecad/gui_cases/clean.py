@@ -53,11 +53,7 @@ def story() -> None:
         RUNS.get(name, nothing)(one)
         wait(settled)
         done[name] = {"known": name in RUNS, "changed": difference(before, states())}
-    # The group of a document is filled in turns.
-    wait(lambda: all("SiloState" in doc.getObject(name).PropertiesList for name in ("P", "B")))
-    tell(
-        done=done, shown={obj.Name: shown_in_editor(obj) for obj in (doc.getObject("P"), doc.getObject("B"))}
-    )
+    tell(done=done, **selecting(doc))
     # Another save, so that what must not be in the file could be.
     from silo.workbench.freecad import saving
 
@@ -187,6 +183,22 @@ def settings(one: Any) -> None:
 
 def activity(one: Any) -> None:
     Gui.runCommand("Silo_Activity")
+
+
+def selecting(doc: Any) -> dict[str, Any]:
+    """Select one link in the tree, and one below the assembly, as a click in the 3D view does."""
+    plate, bolt = doc.getObject("P"), doc.getObject("B")
+    before = states()
+    early = [obj.Name for obj in doc.Objects if "SiloState" in obj.PropertiesList]
+    Gui.Selection.clearSelection()
+    Gui.Selection.addSelection(plate)
+    wait(lambda: "SiloState" in plate.PropertiesList)
+    Gui.Selection.addSelection(doc.Name, bolt.InList[0].Name, "B.Box.Face1")
+    wait(lambda: "SiloState" in bolt.PropertiesList)
+    marked = difference(before, states())
+    Gui.Selection.clearSelection()
+    shown = {obj.Name: shown_in_editor(obj) for obj in (plate, bolt)}
+    return {"shown": shown, "shown_early": early, "selecting_changed": marked}
 
 
 def shown_in_editor(obj: Any) -> list[Any]:

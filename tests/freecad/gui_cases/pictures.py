@@ -277,8 +277,8 @@ def commit(one: Any, top: Any) -> None:
     photograph(one.dock, "activity")
     # Its number and state are in the property editor.
     bolt = top.getObject("FlangeBolt1")
-    wait(lambda: "SiloState" in bolt.PropertiesList)
     Gui.Selection.addSelection(bolt)
+    wait(lambda: "SiloState" in bolt.PropertiesList)
     photograph_window("window")
     Gui.Selection.clearSelection()
 

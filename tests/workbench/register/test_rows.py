@@ -7,8 +7,8 @@ import pytest
 
 from silo.bom.model import BomEntry
 from silo.bom.naming import Proposal
-from silo.registering.offer import Candidate, Similar, State
-from silo.workbench.register.rows import ASK, NEW, SAME, EditedRow, choose, number_texts, retype
+from silo.registering.offer import Candidate, Offer, Similar, State
+from silo.workbench.register.rows import ASK, NEW, SAME, EditedRow, choose, notices, number_texts, retype
 
 NUMBERS = {"M01": "M01-0007"}
 
@@ -24,6 +24,13 @@ def row(
 def test_a_new_part_shows_the_number_that_it_would_get() -> None:
     """The first of a category gets the next number; what comes after it gets a later one."""
     assert number_texts([row("A"), row("B")], NUMBERS) == ["M01-0007 (new)", "M01-0007 or later"]
+
+
+def test_a_person_learns_that_look_alikes_were_not_looked_for() -> None:
+    """And of mistakes in the site's rules, each in a line of its own."""
+    assert notices(Offer((), {})) == ""
+    told = notices(Offer((), Categories({}, problem="line 3"), unsearched="the index\nis broken"))
+    assert [line.partition(": ")[2] for line in told.splitlines()] == ["line 3", "the index is broken"]
 
 
 def test_what_cannot_be_registered_is_promised_no_number() -> None:

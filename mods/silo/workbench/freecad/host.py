@@ -361,6 +361,20 @@ def select(doc: Any, names: Iterable[str]) -> int:
     return len(found)
 
 
+def add_selection_observer(observer: Any) -> None:
+    """Have an object notified of what is selected (``addSelection`` and its like)."""
+    gui().Selection.addObserver(observer, 0)
+
+
+def selected() -> list[tuple[Any, str]]:
+    """Document and name of each selected object, and of each that lies on the way to it: once."""
+    found: dict[tuple[str, str], Any] = {}
+    for one in gui().Selection.getSelectionEx("*", 0):
+        for name in (one.ObjectName, *(part for path in one.SubElementNames for part in path.split("."))):
+            found[one.DocumentName, name] = one.Document
+    return [(doc, name) for (_, name), doc in found.items()]
+
+
 def active_assembly() -> Any:
     """The container that is active in the 3D view (the one new parts go into), or None."""
     view = getattr(gui().ActiveDocument, "ActiveView", None)

@@ -1,16 +1,14 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Part number and state of each component in FreeCAD's property editor, as the group "Silo".
+"""Part number and state of the selected components in FreeCAD's property editor, as the group "Silo".
 
 The properties are shown only: they are read only, are not written into the file, touch nothing and mark no
-document. GUI thread.
+document. FreeCAD measures the whole assembly for its axis cross after each change of a member, so an object
+gets them when it is selected, which is when the property editor shows it. GUI thread.
 """
 
 from __future__ import annotations
 
-import time
-from collections import deque
 from collections.abc import Iterable
-from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from silo.workbench.freecad import host, saving
@@ -21,54 +19,62 @@ from silo.workbench.words import translate
 if TYPE_CHECKING:
     from silo.bom.model import BomEntry
 
-# Nobody looks at more of them. Each turn takes so many seconds of the window's time, and then pauses.
-MOST, MOST_S, PAUSE_MS = 500, 0.005, 40
+# Of more objects the property editor shows only what they have in common.
+MOST = 20
 # FreeCAD's numbers for "asks for no recompute" and "not written into the file" (App::PropertyType).
 _OUTPUT, _NO_PERSIST = 8, 32
 
 
-# Path of a document → what is still to be shown in it.
-_todo: dict[str, deque[tuple[str, str, str]]] = {}
+class SiloGroup:
+    """A selection observer. It keeps part number and state of each component: path → object → both."""
+
+    def __init__(self) -> None:
+        self._known: dict[str, dict[str, tuple[str, str]]] = {}
+        self._is_due = False
+        host.add_selection_observer(self)
+
+    def know(self, path: str, entries: Iterable[BomEntry]) -> None:
+        """Take over what Silo knows of the components of a document."""
+        in_silo = translate("Silo", "in Silo")
+        left_out = translate("Silo", "not registered: left out of the BOM")
+        self._known[path] = {
+            name: (entry.part_number or "", in_silo if entry.part_number else left_out)
+            for entry in entries
+            for name in entry.instances
+        }
+        self._soon()
+
+    # FreeCAD calls these, once for each object; what is selected then is looked at once.
+
+    def addSelection(self, *_what: Any) -> None:
+        """One more is selected."""
+        self._soon()
+
+    def setSelection(self, *_what: Any) -> None:
+        """Others are selected."""
+        self._soon()
+
+    def _soon(self) -> None:
+        if not self._is_due:
+            self._is_due = True
+            qt.later(0, self._show)
+
+    def _show(self) -> None:
+        self._is_due = False
+        open_now = host.documents_by_path()
+        self._known = {path: known for path, known in self._known.items() if path in open_now}
+        known = {open_now[path].Name: found for path, found in self._known.items()}
+        selected = [pair for pair in host.selected() if pair[1] in known.get(pair[0].Name, ())]
+        wanted = [(doc.getObject(name), known[doc.Name][name]) for doc, name in selected[:MOST]]
+        left = [(obj, told) for obj, told in wanted if obj is not None and not _is_shown(obj, *told)]
+        if left:
+            with saving.others_unmarked():
+                for obj, (number, state) in left:
+                    _put(obj, SHOWN_NUMBER, number, translate("Silo", "Part number in Silo"))
+                    _put(obj, SHOWN_STATE, state, translate("Silo", "What Silo knows of this component"))
 
 
-def show(path: str, entries: Iterable[BomEntry]) -> None:
-    """Show the number and the state of the components of a document, where it is open; some in each turn."""
-    in_silo = translate("Silo", "in Silo")
-    left_out = translate("Silo", "not registered: left out of the BOM")
-    wanted = (
-        (name, entry.part_number or "", in_silo if entry.part_number else left_out)
-        for entry in entries
-        for name in entry.instances
-    )
-    is_under_way = path in _todo
-    _todo[path] = deque(islice(wanted, MOST))
-    if not is_under_way:
-        _turn(path)
-
-
-def _turn(path: str) -> None:
-    doc, todo = host.find_document(path), _todo[path]
-    while doc is not None and todo and _is_shown(doc, *todo[0]):
-        todo.popleft()
-    if doc is None or not todo:
-        del _todo[path]
-        return
-    # Each change makes FreeCAD measure the whole assembly for its axis cross: 1000 links take 2 s.
-    until = time.thread_time() + MOST_S
-    with saving.others_unmarked():
-        while todo and time.thread_time() < until:
-            name, number, state = todo.popleft()
-            obj = doc.getObject(name)
-            if obj is not None:
-                _put(obj, SHOWN_NUMBER, number, translate("Silo", "Part number in Silo"))
-                _put(obj, SHOWN_STATE, state, translate("Silo", "What Silo knows of this component"))
-    qt.later(PAUSE_MS, lambda: _turn(path))
-
-
-def _is_shown(doc: Any, name: str, number: str, state: str) -> bool:
-    obj = doc.getObject(name)
-    if obj is None:
-        return True
+def _is_shown(obj: Any, number: str, state: str) -> bool:
     # A link without them would answer with those of its part.
     if SHOWN_STATE not in obj.PropertiesList:
         return False

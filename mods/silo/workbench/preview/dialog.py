@@ -10,7 +10,7 @@ from silo.bom.errors import SiloError
 from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QtCore, QtGui, QtWidgets
 from silo.workbench.pane.activity import Tone
-from silo.workbench.preview.rows import MOST_ROWS, Kind, Preview, Row, rows, summary
+from silo.workbench.preview.rows import MOST_CELL, MOST_ROWS, Kind, Preview, Row, rows, summary
 from silo.workbench.preview.window import Wishes
 from silo.workbench.words import counted, plain, tip, translate
 
@@ -249,9 +249,10 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
 
     def _item(self, row: Row, children: list[Any]) -> Any:
         sign = _SIGNS.get(row.kind, "")
-        texts = [f"{sign} {row.number}".strip(), row.name, row.cad, row.silo, row.note]
+        note = plain(row.note, MOST_CELL)
+        texts = [f"{sign} {row.number}".strip(), row.name, row.cad, row.silo, note]
         if row.kind in _WIDE:
-            texts = [" ".join(filter(None, (row.number, row.name or row.note)))]
+            texts = [" ".join(filter(None, (row.number, row.name or note)))]
         item = QtWidgets.QTreeWidgetItem(texts)
         item.setData(2, QtCore.Qt.ItemDataRole.UserRole, texts[0])
         tone = Tone.ERROR if row.number == "✗" else _TONES.get(row.kind, Tone.PLAIN)

@@ -19,11 +19,15 @@ from silo.bom.paths import relative
 from silo.bom.report import shorten
 from silo.workbench.commit.snapshot import Snapshot
 from silo.workbench.session.jobs import Control
-from silo.workbench.words import plain, quantity, translate
+from silo.workbench.words import MOST_TIP, plain, quantity, translate
 
 if TYPE_CHECKING:
     # It brings pydantic with it, which only a worker may import.
     from silo.bom_sync import Resolved
+
+
+# Letters of a cell; its tool tip has the rest.
+MOST_CELL = 300
 
 
 class Kind(StrEnum):
@@ -62,8 +66,8 @@ class Row:
     children: tuple[Row, ...] = ()
 
     def __post_init__(self) -> None:
-        for text in ("number", "name", "note"):
-            object.__setattr__(self, text, plain(getattr(self, text), 300))
+        for text, most in (("number", MOST_CELL), ("name", MOST_CELL), ("note", MOST_TIP)):
+            object.__setattr__(self, text, plain(getattr(self, text), most))
 
 
 @dataclass(frozen=True)

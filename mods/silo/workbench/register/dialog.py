@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from silo.activity import rules_text
 from silo.bom.errors import SiloError
 from silo.registering.items import Registration
 from silo.registering.offer import Offer
@@ -23,13 +22,14 @@ from silo.workbench.register.rows import (
     choose,
     group,
     heading,
+    notices,
     number_texts,
     retype,
     section_words,
     type_words,
 )
 from silo.workbench.register.window import Wishes
-from silo.workbench.words import plain, tip, told_apart, translate
+from silo.workbench.words import plain, tip, told_apart, translate, visible
 
 # Rows have buttons, and nobody decides on a thousand parts at once; the next ones come after these.
 MOST_ROWS = 400
@@ -146,7 +146,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
     def fill(self, offer: Offer) -> None:
         """Show what can be registered."""
         self._offer = offer
-        self.tell(rules_text(getattr(offer.categories, "problem", ""), translate))
+        self.tell(notices(offer))
         self._categories = {
             code: f"{code} {plain(text, 60)}".strip() for code, text in offer.categories.items()
         }
@@ -207,8 +207,8 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self.tell(str(error))
 
     def tell(self, text: str) -> None:
-        """Show a problem; "" takes it away."""
-        self._problem.setText(plain(text, 500))
+        """Show a problem, of one or more lines; "" takes it away."""
+        self._problem.setText(visible(text, 1000))
         self._problem.setVisible(bool(text))
 
     def registered(self, order: Order, result: Registration) -> None:
@@ -236,9 +236,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
 
     def set_number(self, category: str, number: str) -> None:
         """The next number of a category is known."""
-        self._offer = Offer(
-            self._offer.candidates, self._offer.categories, {**self._offer.numbers, category: number}
-        )
+        self._offer = replace(self._offer, numbers={**self._offer.numbers, category: number})
         self._refresh()
 
     def _refresh(self) -> None:

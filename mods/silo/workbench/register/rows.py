@@ -8,8 +8,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+from silo.activity import rules_text
 from silo.registering.items import Registration
-from silo.registering.offer import Candidate, Similar, State
+from silo.registering.offer import Candidate, Offer, Similar, State
 from silo.registering.orders import Order
 from silo.workbench.pane.activity import Tone
 from silo.workbench.words import counted, plain, translate
@@ -298,6 +299,15 @@ def number_texts(rows: list[EditedRow], numbers: Mapping[str, str]) -> list[str]
         if row.number == NEW and row.checked and not row.finished:
             taken[row.category] = taken.get(row.category, 0) + 1
     return texts
+
+
+def notices(offer: Offer) -> str:
+    """What a person should know of the whole offer: mistakes in the site's rules, look-alikes not looked for."""
+    told = [rules_text(getattr(offer.categories, "problem", ""), translate)]
+    if offer.unsearched:
+        text = translate("Silo", "Silo was not searched for parts that look alike: {problem}")
+        told.append(text.replace("{problem}", plain(offer.unsearched, 300)))
+    return "\n".join(filter(None, told))
 
 
 def heading(rows: Sequence[EditedRow], title: str, more: int) -> str:
