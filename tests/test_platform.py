@@ -70,7 +70,8 @@ def test_every_child_is_started_with_these_options() -> None:
         (path, node)
         for path in MODS.rglob("*.py")
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.Call) and re.fullmatch(r"subprocess\.(run|Popen|call|check_\w+)", ast.unparse(node.func))
+        if isinstance(node, ast.Call)
+        and re.fullmatch(r"subprocess\.(run|Popen|call|check_\w+)", ast.unparse(node.func))
     ]
     assert len(calls) >= 6
     bare = [

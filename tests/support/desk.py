@@ -151,7 +151,8 @@ class PreviewWindow:
     """What the flow did with it."""
 
     title: str
-    wishes: Any
+    path: str
+    flow: Any
     filled: list[Preview] = field(default_factory=list)
     failed: list[SiloError] = field(default_factory=list)
     seen: list[tuple[str, bool]] = field(default_factory=list)
@@ -169,9 +170,6 @@ class PreviewWindow:
     def tell_view(self, text: str, *, agrees: bool) -> None:
         self.seen.append((text, agrees))
 
-    def show(self) -> None:
-        return
-
     def raise_(self) -> None:
         self.raised += 1
 
@@ -181,7 +179,8 @@ class RegisterWindow:
     """What the flow did with it."""
 
     title: str
-    wishes: Any
+    path: str
+    flow: Any
     offers: list[Offer] = field(default_factory=list)
     results: list[Registration] = field(default_factory=list)
     numbers: dict[str, str] = field(default_factory=dict)
@@ -201,6 +200,9 @@ class RegisterWindow:
     def registered(self, _order: Order, result: Registration) -> None:
         self.results.append(result)
 
+    def register(self, orders: Iterable[Order]) -> None:
+        self.flow.register(self.path, orders)
+
     def undeclared(self, row: Any) -> None:
         self.undone.append(row)
 
@@ -209,9 +211,6 @@ class RegisterWindow:
 
     def tell(self, text: str) -> None:
         self.told.append(text)
-
-    def show(self) -> None:
-        return
 
     def raise_(self) -> None:
         return
@@ -261,12 +260,12 @@ class Desk:
     def find(self, path: str) -> Document | None:
         return next((doc for doc in self.open if doc.FileName == path), None)
 
-    def preview_window(self, title: str, wishes: Any) -> PreviewWindow:
-        self.previews.append(PreviewWindow(title, wishes))
+    def preview_window(self, title: str, path: str, flow: Any) -> PreviewWindow:
+        self.previews.append(PreviewWindow(title, path, flow))
         return self.previews[-1]
 
-    def register_window(self, title: str, wishes: Any, *, asks: bool) -> RegisterWindow:
-        self.registers.append(RegisterWindow(title, wishes))
+    def register_window(self, title: str, path: str, flow: Any, *, asks: bool) -> RegisterWindow:
+        self.registers.append(RegisterWindow(title, path, flow))
         return self.registers[-1]
 
     def look_at(self, paths: Iterable[str]) -> dict[str, Seen]:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 from silo.workbench.words import translate
@@ -25,33 +26,29 @@ OPEN = "Silo_Open"
 HISTORY = "Silo_History"
 
 
+@dataclass(frozen=True)
 class Command:
     """A command as FreeCAD wants it: an object with ``GetResources``, ``Activated`` and ``IsActive``."""
 
-    def __init__(
-        self,
-        *,
-        text: str,
-        tip: str,
-        icon: str,
-        keys: str = "",
-        help: str = "",
-        run: Callable[[], None],
-        active: Callable[[], bool] = lambda: True,
-    ) -> None:
-        self.text, self.tip, self.icon, self.run, self.active = text, tip, icon, run, active
-        self.keys, self.help = keys, help or tip
+    text: str
+    tip: str
+    icon: str
+    run: Callable[[], None]
+    keys: str = ""
+    help: str = ""
+    active: Callable[[], bool] = lambda: True
 
     def GetResources(self) -> dict[str, str]:
         """What FreeCAD shows."""
         told = {
             "MenuText": self.text,
             "ToolTip": self.tip,
-            "WhatsThis": self.help,
+            "WhatsThis": self.help or self.tip,
             "StatusTip": self.tip,
             "Pixmap": self.icon,
+            "Accel": self.keys,
         }
-        return {**told, "Accel": self.keys} if self.keys else told
+        return {name: text for name, text in told.items() if text}
 
     def Activated(self, _index: int = 0) -> None:
         """Chosen from a menu, a toolbar, or by ``Gui.runCommand``."""

@@ -136,7 +136,7 @@ def test_an_unregistered_one_is_registered_with_its_comment(office: Office) -> N
     registering.start(new)
     office.settle()
     (window,) = office.desk.registers
-    window.wishes.register([Order(c, "New", "part", "M01") for c in window.offers[0].candidates])
+    window.register([Order(c, "New", "part", "M01") for c in window.offers[0].candidates])
     office.settle()
     (number,) = (s.item.part_number for s in office.silo.items.values())
     assert [r.comment for r in office.silo.revisions(number) if r.file_name] == ["a comment"]

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from activities import activity_of, entry_text
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -16,7 +17,6 @@ from silo.workbench.pane.activity import (
     Entry,
     Line,
     Tone,
-    entry_text,
     gathered,
 )
 
@@ -31,47 +31,40 @@ def keys(activity: Activity) -> list[str]:
 
 def test_newest_first_also_when_reported_late() -> None:
     """An event that arrives late is put where its time belongs."""
-    activity = Activity().extend([entry("a", 1), entry("c", 3), entry("b", 2)])
+    activity = activity_of([entry("a", 1), entry("c", 3), entry("b", 2)])
     assert keys(activity) == ["c", "b", "a"]
 
 
 def test_of_equal_time_the_later_one_stands_first() -> None:
     """What was reported last is what a person looks for."""
-    assert keys(Activity().extend([entry("a", 1), entry("b", 1)])) == ["b", "a"]
+    assert keys(activity_of([entry("a", 1), entry("b", 1)])) == ["b", "a"]
 
 
 def test_the_same_key_replaces() -> None:
     """One box per sync."""
-    activity = Activity().extend([entry("a", 1, "old"), entry("a", 2, "new")])
+    activity = activity_of([entry("a", 1, "old"), entry("a", 2, "new")])
     assert [one.title for one in activity.entries] == ["new"]
 
 
 def test_the_servers_event_does_not_replace_our_own_richer_box() -> None:
     """Whichever of the two comes first, our own stays."""
     ours, event = entry("sync:1", 1, "ours", rank=1), entry("sync:1", 2, "event")
-    assert [e.title for e in Activity().extend([ours, event]).entries] == ["ours"]
-    assert [e.title for e in Activity().extend([event, ours]).entries] == ["ours"]
+    assert [e.title for e in activity_of([ours, event]).entries] == ["ours"]
+    assert [e.title for e in activity_of([event, ours]).entries] == ["ours"]
 
 
 def test_a_box_that_includes_another_takes_its_place() -> None:
     """The upload's event is part of our own commit's box."""
     ours, event = entry("sync:1", 1, "ours", rank=1, also="revision:A:2"), entry("revision:A:2", 2, "event")
-    assert keys(Activity().extend([ours, event])) == ["sync:1"]
-    assert keys(Activity().extend([event, ours])) == ["sync:1"]
+    assert keys(activity_of([ours, event])) == ["sync:1"]
+    assert keys(activity_of([event, ours])) == ["sync:1"]
 
 
 def test_only_so_many_are_kept() -> None:
     """The oldest go."""
-    activity = Activity().extend(entry(str(i), i) for i in range(MOST_ENTRIES + 50))
+    activity = activity_of(entry(str(i), i) for i in range(MOST_ENTRIES + 50))
     assert len(activity.entries) == MOST_ENTRIES
     assert activity.entries[-1].key == "50"
-
-
-def test_a_removed_entry_is_gone() -> None:
-    """And removing an unknown one is harmless."""
-    activity = Activity().add(entry("a")).remove("a").remove("b")
-    assert activity.entries == ()
-    assert activity.get("a") is None
 
 
 def test_a_box_is_never_longer_than_can_be_read() -> None:
@@ -122,7 +115,7 @@ entries = st.builds(
 @given(st.lists(entries, max_size=40))
 def test_always_sorted_unique_and_never_poorer(told: list[Entry]) -> None:
     """Whatever comes in whatever order: newest first, one per key, the highest rank of each key wins."""
-    activity = Activity().extend(told)
+    activity = activity_of(told)
     whens = [one.when for one in activity.entries]
     assert whens == sorted(whens, reverse=True)
     assert sorted(keys(activity)) == sorted({one.key for one in told})
@@ -137,7 +130,7 @@ def news(number: int, when: float, part_of: Batch | None = Batch.CREATED, who: s
 def test_a_batch_is_one_box() -> None:
     """54 registered parts bury nothing: the BOM that came between them stands by itself."""
     bom = entry("bom", 20.5, "BOM Updated: A01-0001")
-    shown = gathered(Activity().extend([*(news(n, n) for n in range(54)), bom]).entries)
+    shown = gathered(activity_of([*(news(n, n) for n in range(54)), bom]).entries)
     assert [one.title for one in shown] == ["54 new items", "BOM Updated: A01-0001"]
     assert shown[0].when == 53
     assert shown[0].lines[0].text.startswith("M01-0000, M01-0001, ")
@@ -151,7 +144,7 @@ def test_two_are_no_batch_nor_is_what_lies_apart() -> None:
     people = [news(n, n, who=who) for n, who in enumerate(("ann", "bob", "ann", "bob"))]
     own = [news(n, n, None) for n in range(9)]
     for entries in (two, apart, people, own):
-        listed = Activity().extend(entries).entries
+        listed = activity_of(entries).entries
         assert gathered(listed) == listed
 
 
@@ -159,7 +152,7 @@ def test_two_are_no_batch_nor_is_what_lies_apart() -> None:
 def test_gathering_loses_nothing(told: list[tuple[int, Batch | None]]) -> None:
     """Newest first, and every box is shown or counted."""
     entries = [news(n, when, part_of) for n, (when, part_of) in enumerate(told)]
-    shown = gathered(Activity(most=1000).extend(entries).entries)
+    shown = gathered(activity_of(entries).entries)
     assert [one.when for one in shown] == sorted((one.when for one in shown), reverse=True)
     counts = [int(one.title.split()[0]) if one.key.startswith("batch:") else 1 for one in shown]
     assert sum(counts) == len(entries)
@@ -184,7 +177,7 @@ def buttons(activity: Activity, key: str) -> list[str]:
 def test_only_the_newest_box_of_an_assembly_asks() -> None:
     """It has all questions that are open; boxes of other assemblies, and newer ones, keep theirs."""
     other = asking("other", 1, "/v/a", document="/v/Other.FCStd")
-    activity = Activity().extend([asking("old", 1, "/v/a", "/v/b"), other, asking("late", 9, "/v/a")])
+    activity = activity_of([asking("old", 1, "/v/a", "/v/b"), other, asking("late", 9, "/v/a")])
     activity = activity.add(Entry("new", "x", 2, document="/v/Top.FCStd"))
     assert buttons(activity, "old") == ["Show"]
     assert buttons(activity, "other") == buttons(activity, "late") == ["Same part", "New part…", "Show"]
@@ -194,9 +187,7 @@ def test_only_the_newest_box_of_an_assembly_asks() -> None:
 
 def test_an_answer_takes_the_buttons_of_its_question_alone() -> None:
     """Of each box that asks it."""
-    activity = Activity().extend(
-        [asking("one", 1, "/v/a", "/v/b"), asking("two", 2, "/v/c", document="/v/X")]
-    )
+    activity = activity_of([asking("one", 1, "/v/a", "/v/b"), asking("two", 2, "/v/c", document="/v/X")])
     done = activity.answered(lambda asked: "/v/a" in asked.objects)
     assert buttons(done, "one") == ["Show"]
     assert buttons(done, "two") == ["Same part", "New part…", "Show"]

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from activities import activity_of, entry_text
 
 from silo.activity import counts_text, english
 from silo.api.merging import NOT_ATOMIC
@@ -15,7 +16,7 @@ from silo.api.wire import MergeDiff, MergeWarning
 from silo.bom.errors import InputError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.workbench import words
-from silo.workbench.pane.activity import Activity, Do, Entry, entry_text
+from silo.workbench.pane.activity import Do, Entry
 from silo.workbench.pane.entries import MOST_IN_CONSOLE, badges, console_lines, of_event, of_sent
 
 if TYPE_CHECKING:
@@ -141,7 +142,7 @@ def test_a_page_of_another_server_is_not_offered() -> None:
 def test_a_gap_is_reported_once() -> None:
     """A server that counts anew has forgotten what happened; the pane does not pretend to know."""
     gaps = [of_event(ServerEvent(str(n), "reset", {"reason": "counts anew"}), page, now=n) for n in range(3)]
-    activity = Activity().extend(gap for gap in gaps if gap is not None)
+    activity = activity_of(gap for gap in gaps if gap is not None)
     (entry,) = activity.entries
     assert entry.title == "Some activity may be missing"
 

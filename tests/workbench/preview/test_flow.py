@@ -48,7 +48,7 @@ def test_compare_sync_and_compare_again(office: Office, flow: PreviewFlow, top: 
     office.settle()
     (window,) = office.desk.previews
     assert [line.part_number for line in window.filled[0].top.diff.added] == ["M01-0002"]
-    window.wishes.sync(window.filled[0], False, False)
+    window.flow.sync(window.filled[0], False, False)
     office.settle()
     assert [line.quantity for line in office.silo.get_bom("M01-0001")] == [3]
     assert office.files("Top") == []
@@ -68,7 +68,7 @@ def test_a_sync_does_not_undo_a_colleagues_newer_file(
     flow.start(top)
     office.settle()
     (window,) = office.desk.previews
-    window.wishes.sync(window.filled[0], False, False)
+    window.flow.sync(window.filled[0], False, False)
     office.settle()
     theirs = office.folder / "theirs.FCStd"
     theirs.write_bytes(b"without plates")
@@ -79,7 +79,7 @@ def test_a_sync_does_not_undo_a_colleagues_newer_file(
         top.parts = dict.fromkeys(top.parts, 5)
         flow.again(top.FileName)
         office.settle()
-        window.wishes.sync(window.filled[-1], False, False)
+        window.flow.sync(window.filled[-1], False, False)
         office.settle()
         assert [line.quantity for line in office.silo.get_bom(number)] == [3], edited
         assert "alice has committed revision 2 since" in office.sent[-1].entry.remark
@@ -93,8 +93,8 @@ def test_a_closed_document_is_reported_in_its_window(
     office.settle()
     (window,) = office.desk.previews
     office.desk.open.remove(top)
-    window.wishes.refresh()
-    window.wishes.verify(window.filled[0])
+    window.flow.again(window.path)
+    window.flow.verify(window.filled[0])
     assert [str(error) for error in window.failed] == [
         "Top.FCStd is not open any more. Open it, then compare again."
     ] * 2
@@ -107,7 +107,7 @@ def test_one_window_per_document(office: Office, flow: PreviewFlow, top: Documen
     office.settle()
     (window,) = office.desk.previews
     assert window.raised == 1
-    window.wishes.closed()
+    window.flow.closed(window.path)
     flow.start(top)
     office.settle()
     assert len(office.desk.previews) == 2
@@ -153,13 +153,13 @@ def test_the_view_is_compared_and_what_no_line_explains_is_selected(
     office.settle()
     (window,) = office.desk.previews
     office.desk.witnessed = [Account(top.FileName, True), Account("/sub", True)]
-    window.wishes.verify(window.filled[0])
+    window.flow.verify(window.filled[0])
     assert (window.seen, shown) == ([("125 of 125", True)], [])
     office.desk.witnessed = [Account(top.FileName, True), Account("/sub", False, ("Loose",))]
-    window.wishes.verify(window.filled[0])
+    window.flow.verify(window.filled[0])
     assert (window.seen[-1], shown) == (("126 of 125", False), [("/sub", ("Loose",))])
     office.desk.refusal = DocumentError("/sub", "is gone")
-    window.wishes.verify(window.filled[0])
+    window.flow.verify(window.filled[0])
     assert "is gone" in office.desk.warned[-1]
 
 
@@ -175,11 +175,11 @@ def test_broken_links_are_mended_where_one_file_fits(
         for meant in ("", "/new")
     )
     preview = replace(window.filled[0], broken=broken)
-    window.wishes.relink(preview)
+    window.flow.relink(preview)
     office.settle()
     assert (office.desk.relinked, len(window.filled)) == (["/new"], 2)
     office.desk.refusal = DocumentError("/new", "holds no object")
-    window.wishes.relink(preview)
+    window.flow.relink(preview)
     office.settle()
     assert "holds no object" in office.desk.warned[-1]
     assert len(window.filled) == 2

@@ -51,7 +51,7 @@ def test_from_the_offer_to_the_bom(office: Office, flow: RegisterFlow, top: Docu
     office.settle()
     (window,) = office.desk.registers
     assert sorted(c.proposal.name for c in window.offers[0].candidates) == ["Plate", "Shaft"]
-    window.wishes.register(orders(office))
+    window.register(orders(office))
     office.settle()
     assert [result.error for result in window.results] == [None, None]
     assert window.stops == 1
@@ -73,7 +73,7 @@ def test_no_unsaved_edits_are_left(office: Office, flow: RegisterFlow, top: Docu
     edited.parts.update(top.parts)
     flow.start(top)
     office.settle()
-    office.desk.registers[0].wishes.register(orders(office))
+    office.desk.registers[0].register(orders(office))
     office.settle()
     assert not top.changed
     assert office.desk.documents.saved[-1] == "Top"
@@ -93,7 +93,7 @@ def test_a_server_that_refuses_leaves_the_files_alone(
             raise ReadOnlyError("maintenance")
 
     office.silo.before = refuse
-    office.desk.registers[0].wishes.register(orders(office))
+    office.desk.registers[0].register(orders(office))
     office.settle()
     assert {type(result.error) for result in office.desk.registers[0].results} == {ReadOnlyError}
     assert [doc.identity for doc in top.parts] == ["", ""]
@@ -107,8 +107,8 @@ def test_a_dialog_that_was_closed_meanwhile_is_not_drawn(
     flow.start(top)
     office.settle()
     (window,) = office.desk.registers
-    window.wishes.register(orders(office))
-    window.wishes.closed()
+    window.register(orders(office))
+    window.flow.closed(window.path)
     office.settle()
     assert (window.results, window.stops) == ([], 0)
     assert all(doc.identity for doc in top.parts)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import pytest
 
 from silo.bom.model import BomEntry
-from silo.bom.naming import Proposal
+from silo.bom.naming import Categories, Proposal
 from silo.registering.offer import Candidate, Offer, Similar, State
 from silo.workbench.register.rows import ASK, NEW, SAME, EditedRow, choose, notices, number_texts, retype
 

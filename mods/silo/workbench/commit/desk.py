@@ -7,13 +7,23 @@ With a desk of a test's own the flows run without FreeCAD and Qt. All calls are 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
 
 from silo.workbench.commit.plan import Documents, Plan, Row
 from silo.workbench.commit.snapshot import Snapshot
 from silo.workbench.commit.theirs import Choice, Theirs
+
+if TYPE_CHECKING:
+    from silo.bom.findings import Finding
+    from silo.bom.model import Extraction
+    from silo.registering.offer import Candidate, Seen
+    from silo.workbench.preview.flow import PreviewFlow
+    from silo.workbench.preview.flow import Window as Preview
+    from silo.workbench.register.flow import RegisterFlow
+    from silo.workbench.register.flow import Window as Registering
 
 Look = Callable[[Callable[[Mapping[str, Theirs]], None]], object]
 
@@ -32,6 +42,21 @@ class Answer:
     comment: str = ""
     register: bool = False
     choices: tuple[tuple[Row, Theirs, Choice], ...] = ()
+
+
+class Account(Protocol):
+    """One assembly's solids (:class:`silo.workbench.freecad.witness.Account`)."""
+
+    @property
+    def doc_path(self) -> str: ...
+
+    @property
+    def agrees(self) -> bool: ...
+
+    @property
+    def unexplained(self) -> tuple[str, ...]: ...
+
+    def sentence(self) -> str: ...
 
 
 class Desk(Protocol):
@@ -66,3 +91,51 @@ class Desk(Protocol):
 
     def later(self, call: Callable[[], None], /) -> None:
         """Run something in a turn of its own, once the present event is done."""
+
+    # -- files ------------------------------------------------------------------------------------------
+
+    def open(self, path: str, /) -> Any:
+        """The document of a file, opened whole."""
+
+    def close(self, doc: Any, /) -> None:
+        """Close a document without saving."""
+
+    def save_copy(self, doc: Any, path: Path, /) -> None:
+        """Write a document, with its unsaved edits, to another file."""
+
+    def open_paths(self) -> tuple[str, ...]:
+        """The files that this FreeCAD has open."""
+
+    def is_open_elsewhere(self, path: str, /) -> bool:
+        """True where another FreeCAD of this user has the file open."""
+
+    # -- previews ---------------------------------------------------------------------------------------
+
+    def preview_window(self, title: str, path: str, flow: PreviewFlow, /) -> Preview:
+        """Open the preview of a document."""
+
+    def accounts(self, extraction: Extraction, /) -> Sequence[Account]:
+        """The solids that FreeCAD shows, for the assembly and each sub-assembly."""
+
+    def relink(self, finding: Finding, /) -> list[str]:
+        """Set the live links of a finding to the file that was meant; their labels."""
+
+    # -- registering ------------------------------------------------------------------------------------
+
+    def register_window(self, title: str, path: str, flow: RegisterFlow, /, *, asks: bool) -> Registering:
+        """Open the Register Parts dialog of a document."""
+
+    def look_at(self, paths: Iterable[str], /) -> dict[str, Seen]:
+        """How the files of components stand."""
+
+    def write_identity(self, candidate: Candidate, identity: str, /) -> None:
+        """Write an identity into a component's document and save it."""
+
+    def remove_identity(self, candidate: Candidate, /) -> None:
+        """Take the identity from what is modelled in an assembly's own file, and save it."""
+
+    def unedited(self) -> list[Any]:
+        """The documents without unsaved edits, each after those that it links to."""
+
+    def save_marked(self, doc: Any, /) -> None:
+        """Save a document that was unedited, where FreeCAD has marked it for something below it."""

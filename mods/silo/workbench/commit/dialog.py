@@ -30,11 +30,8 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         self._plan = plan
         self._theirs: dict[int, Theirs] = {}
         self._choices: dict[int, Any] = {}
-        self.setObjectName("SiloCommitDialog")
-        self.setWindowTitle(translate("Silo", "Commit to Silo"))
-        self.resize(520, 380)
-        layout = QtWidgets.QVBoxLayout(self)
-        layout.setSpacing(8)
+        title = translate("Silo", "Commit to Silo")
+        layout = widgets.lay_out(self, "SiloCommitDialog", title, 520, 380, modal=True)
         layout.addWidget(widgets.label(translate("Silo", "What changed?")))
         self.comment = QtWidgets.QPlainTextEdit()
         self.comment.setObjectName("comment")
@@ -90,10 +87,7 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         return "\n".join(told)
 
     def _make_files(self) -> Any:
-        tree = QtWidgets.QTreeWidget()
-        tree.setObjectName("files")
-        tree.setRootIsDecorated(False)
-        tree.setHeaderLabels([translate("Silo", "File"), translate("Silo", "State"), ""])
+        tree = widgets.tree("files", (translate("Silo", "File"), translate("Silo", "State"), ""))
         tree.setColumnHidden(_CHOICE, True)
         tree.setWordWrap(True)
         tree.itemChanged.connect(lambda _item, _column: self._update_commit())
@@ -114,8 +108,7 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
 
     def _make_selecting(self) -> Any:
         """Which files go along, all at once."""
-        layout = QtWidgets.QHBoxLayout()
-        layout.addWidget(widgets.label(translate("Silo", "Select:"), wrap=False))
+        parts = [widgets.label(translate("Silo", "Select:"), wrap=False)]
         for name, text, wanted in (
             ("edited", translate("Silo", "edited"), lambda row: row.wanted),
             ("all", translate("Silo", "all"), lambda row: row.can_commit),
@@ -124,9 +117,8 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         ):
             button = widgets.link_button(text, partial(self.select, wanted))
             button.setObjectName(name)
-            layout.addWidget(button)
-        layout.addStretch(1)
-        return layout
+            parts.append(button)
+        return widgets.line(*parts, None)
 
     def select(self, wanted: Callable[[Row], bool]) -> None:
         """Check the files that are wanted and can be committed."""
@@ -141,13 +133,9 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         self._check(item, row.wanted)
         if not row.can_commit:
             item.setFlags(item.flags() & ~QtCore.Qt.ItemFlag.ItemIsUserCheckable)
-        if not row.can_commit:
-            shade = widgets.colour(Tone.WARNING, tree)
-            item.setForeground(1, QtGui.QBrush(QtGui.QColor(shade)))
+            item.setForeground(1, widgets.brush(Tone.WARNING, tree))
         if row.is_top:
-            font = item.font(0)
-            font.setBold(True)
-            item.setFont(0, font)
+            widgets.embolden(item)
 
     def _make_buttons(self) -> Any:
         box = QtWidgets.QDialogButtonBox()
@@ -199,8 +187,8 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         item.takeChildren()
         item.setText(1, theirs.headline)
         item.setToolTip(1, tip(theirs.headline))
-        item.setForeground(1, QtGui.QBrush(QtGui.QColor(widgets.colour(Tone.WARNING, self.files))))
-        item.setCheckState(0, QtCore.Qt.CheckState.Unchecked)
+        item.setForeground(1, widgets.brush(Tone.WARNING, self.files))
+        self._check(item, False)
         item.setFlags(item.flags() & ~QtCore.Qt.ItemFlag.ItemIsUserCheckable)
         for text, hint in self._details(theirs):
             child = QtWidgets.QTreeWidgetItem(["", text])
@@ -235,9 +223,7 @@ class CommitDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no ty
         return told + [(text, text) for text in line_texts(theirs, _MOST_LINES)]
 
     def _chose(self, number: int, box: Any) -> None:
-        mine = Choice(box.currentData()) is Choice.ON_TOP
-        state = QtCore.Qt.CheckState.Checked if mine else QtCore.Qt.CheckState.Unchecked
-        self.files.topLevelItem(number).setCheckState(0, state)
+        self._check(self.files.topLevelItem(number), Choice(box.currentData()) is Choice.ON_TOP)
         self._update_commit()
 
     def _tell_who(self) -> None:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -16,13 +16,14 @@ from silo.workbench.commit.plan import Plan
 from silo.workbench.commit.snapshot import Snapshot
 from silo.workbench.freecad import components, host, live, saving
 from silo.workbench.gui import qt
-from silo.workbench.preview import window as preview
-from silo.workbench.register import window as register
 
 if TYPE_CHECKING:
     from silo.bom.findings import Finding
     from silo.bom.model import Extraction
+    from silo.workbench.commit.theirs import Theirs
     from silo.workbench.freecad.witness import Account
+    from silo.workbench.preview.flow import PreviewFlow
+    from silo.workbench.register.flow import RegisterFlow
 
 
 class LiveDocuments:
@@ -108,22 +109,32 @@ class LiveDesk:
         from silo.workbench.commit.dialog import CommitDialog
 
         dialog = CommitDialog(planned, host.main_window(), note=note, comment=comment)
-        look(dialog.show_theirs)
-        return dialog.answer() if qt.run_dialog(dialog) else None
+        shown = [dialog]
 
-    def preview_window(self, title: str, wishes: preview.Wishes) -> preview.Window:
+        def back(found: Mapping[str, Theirs]) -> None:
+            for one in shown:  # the look at Silo may end after the person has answered
+                one.show_theirs(found)
+
+        look(back)
+        try:
+            return dialog.answer() if qt.run_dialog(dialog) else None
+        finally:
+            shown.clear()
+            dialog.deleteLater()
+
+    def preview_window(self, title: str, path: str, flow: PreviewFlow) -> Any:
         """The preview window."""
         from silo.workbench.preview.dialog import PreviewDialog
 
-        window: preview.Window = PreviewDialog(title, wishes, host.main_window())
+        window = PreviewDialog(title, path, flow, host.main_window())
         window.show()
         return window
 
-    def register_window(self, title: str, wishes: register.Wishes, *, asks: bool) -> register.Window:
+    def register_window(self, title: str, path: str, flow: RegisterFlow, *, asks: bool) -> Any:
         """The Register Parts dialog."""
         from silo.workbench.register.dialog import RegisterDialog
 
-        window: register.Window = RegisterDialog(title, wishes, host.main_window(), asks=asks)
+        window = RegisterDialog(title, path, flow, host.main_window(), asks=asks)
         window.show()
         return window
 

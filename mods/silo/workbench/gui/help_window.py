@@ -6,7 +6,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from silo.workbench.gui.qt import QtCore, QtWidgets
+from silo.workbench.gui import widgets
+from silo.workbench.gui.qt import QtWidgets
 from silo.workbench.words import translate
 
 PAGE = Path(__file__).resolve().parents[4] / "docs" / "addon.md"
@@ -17,15 +18,11 @@ class HelpWindow(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no type
 
     def __init__(self, parent: Any) -> None:
         super().__init__(parent)
-        self.setObjectName("SiloHelp")
-        self.setWindowTitle(translate("Silo", "Help on Silo"))
-        self.setAttribute(QtCore.Qt.WidgetAttribute.WA_DeleteOnClose)
-        self.resize(820, 700)
+        layout = widgets.lay_out(self, "SiloHelp", translate("Silo", "Help on Silo"), 820, 700)
         self.page = QtWidgets.QTextBrowser()
         self.page.setOpenExternalLinks(True)
         self.page.setSearchPaths([str(PAGE.parent)])
         self.page.setMarkdown(_text())
-        layout = QtWidgets.QVBoxLayout(self)
         layout.addWidget(self.page)
 
 

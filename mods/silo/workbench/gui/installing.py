@@ -65,9 +65,8 @@ class InstallWindow(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         super().__init__(parent)
         self._install = install
         self._relay = Relay()
-        self.setObjectName("SiloInstall")
-        self.setWindowTitle(translate("Silo", "Install what Silo needs"))
-        self.setMinimumWidth(460)
+        title = translate("Silo", "Install what Silo needs")
+        layout = widgets.lay_out(self, "SiloInstall", title, 460, 120)
         text = translate(
             "Silo", "Silo needs these Python packages: {names}.\nThey are installed in {folder}."
         )
@@ -76,20 +75,11 @@ class InstallWindow(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         self.bar = QtWidgets.QProgressBar()
         self.bar.setRange(0, 0)
         self.bar.hide()
-        self.button = QtWidgets.QPushButton(translate("Silo", "Install"))
-        self.button.setObjectName("install")
-        self.button.setDefault(True)
-        self.button.clicked.connect(lambda _checked=False: self.begin())
-        close = QtWidgets.QPushButton(translate("Silo", "Close"))
-        close.clicked.connect(lambda _checked=False: self.close())
-        buttons = QtWidgets.QHBoxLayout()
-        buttons.addStretch(1)
-        buttons.addWidget(self.button)
-        buttons.addWidget(close)
-        layout = QtWidgets.QVBoxLayout(self)
+        self.button = widgets.button(translate("Silo", "Install"), "install", self.begin, default=True)
+        close = widgets.button(translate("Silo", "Close"), "close", self.close)
         layout.addWidget(self.text)
         layout.addWidget(self.bar)
-        layout.addLayout(buttons)
+        layout.addLayout(widgets.line(None, self.button, close))
 
     def begin(self) -> None:
         """Install, in a thread; the window stays usable, and may be closed."""

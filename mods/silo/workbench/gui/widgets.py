@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from silo.workbench import words
@@ -93,6 +93,66 @@ def link_style(shade: str, more: str = "") -> str:
     )
 
 
+def brush(tone: Tone, widget: Any) -> Any:
+    """The colour of a tone for a cell; the theme's own where it has none."""
+    shade = colour(tone, widget)
+    return QtGui.QBrush(QtGui.QColor(shade)) if shade else QtGui.QBrush()
+
+
+def button(text: str, name: str, call: Callable[[], object], tip: str = "", *, default: bool = False) -> Any:
+    """A push button; Return presses the default one of a window only."""
+    made = QtWidgets.QPushButton(text)
+    made.setObjectName(name)
+    made.setAutoDefault(default)
+    made.setDefault(default)
+    made.setToolTip(words.tip(tip))
+    made.clicked.connect(lambda _checked=False: call())
+    return made
+
+
+def line(*parts: Any) -> Any:
+    """A layout of widgets in one line; what stands after None is at the right."""
+    layout = QtWidgets.QHBoxLayout()
+    for part in parts:
+        layout.addStretch(1) if part is None else layout.addWidget(part)
+    return layout
+
+
+def lay_out(window: Any, name: str, title: str, width: int, height: int, *, modal: bool = False) -> Any:
+    """Name and size of a window; the layout of its content.
+
+    modal
+        whoever waits for the window deletes it afterwards; others are gone once they are closed.
+    """
+    window.setObjectName(name)
+    window.setWindowTitle(title)
+    window.setAttribute(QtCore.Qt.WidgetAttribute.WA_DeleteOnClose, not modal)
+    window.resize(width, height)
+    layout = QtWidgets.QVBoxLayout(window)
+    layout.setSpacing(8)
+    return layout
+
+
+def tree(name: str, headings: Sequence[str], numbers: Sequence[int] = (), *, flat: bool = True) -> Any:
+    """A table of lines, or of lines below lines; the columns ``numbers`` are flush right."""
+    made = QtWidgets.QTreeWidget()
+    made.setObjectName(name)
+    made.setRootIsDecorated(not flat)
+    made.setHeaderLabels(list(headings))
+    for column in numbers:
+        made.headerItem().setTextAlignment(column, QtCore.Qt.AlignmentFlag.AlignRight)
+    return made
+
+
+def embolden(item: Any) -> None:
+    """The first cell of a line in bold letters."""
+    # A line of a tree has a font for each column, a cell of a table its own.
+    where = (0,) if isinstance(item, QtWidgets.QTreeWidgetItem) else ()
+    font = item.font(*where)
+    font.setBold(True)
+    item.setFont(*where, font)
+
+
 def row(*widgets: Any, gap: int = 10) -> Any:
     """A layout of widgets side by side, in several lines where the width ends."""
     layout = FlowLayout(gap)
@@ -137,20 +197,13 @@ def clear(layout: Any) -> None:
 def read(parent: Any, title: str, lines: Iterable[str]) -> None:
     """Show all lines of something long in a window that scrolls, and wait until it is closed."""
     window = QtWidgets.QDialog(parent)
-    window.setObjectName("SiloRead")
-    window.setWindowTitle(title)
-    window.resize(620, 420)
+    layout = lay_out(window, "SiloRead", title, 620, 420, modal=True)
     text = QtWidgets.QPlainTextEdit("\n".join(words.plain(line, 1000) for line in lines))
     text.setReadOnly(True)
-    close = QtWidgets.QPushButton(words.translate("Silo", "Close"))
-    close.setDefault(True)
-    close.clicked.connect(window.accept)
-    buttons = QtWidgets.QHBoxLayout()
-    buttons.addStretch(1)
-    buttons.addWidget(close)
-    layout = QtWidgets.QVBoxLayout(window)
     layout.addWidget(text)
-    layout.addLayout(buttons)
+    layout.addLayout(
+        line(None, button(words.translate("Silo", "Close"), "close", window.accept, default=True))
+    )
     run_dialog(window)
     window.deleteLater()
 

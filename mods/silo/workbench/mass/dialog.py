@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import Any
 
 from silo.workbench.gui import qt, widgets
-from silo.workbench.gui.qt import QtCore, QtGui, QtWidgets
+from silo.workbench.gui.qt import QtCore, QtWidgets
 from silo.workbench.mass.rows import Row, Shown
 from silo.workbench.pane.activity import Tone
 from silo.workbench.words import plain, tip, translate
@@ -21,12 +21,8 @@ class MassDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no type
     def __init__(self, content: Shown, parent: Any) -> None:
         super().__init__(parent)
         self._content = content
-        self.setObjectName("SiloMass")
-        self.setWindowTitle(translate("Silo", "Mass of {name}").replace("{name}", plain(content.title, 80)))
-        self.setAttribute(QtCore.Qt.WidgetAttribute.WA_DeleteOnClose)
-        self.resize(900, 520)
-        layout = QtWidgets.QVBoxLayout(self)
-        layout.setSpacing(8)
+        title = translate("Silo", "Mass of {name}").replace("{name}", plain(content.title, 80))
+        layout = widgets.lay_out(self, "SiloMass", title, 900, 520)
         self.summary = widgets.label(content.summary, bold=True)
         layout.addWidget(self.summary)
         if content.incomplete:
@@ -36,7 +32,10 @@ class MassDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no type
         if content.notes:
             notes = "\n".join(plain(note, 300) for note in content.notes[:MOST_NOTES])
             layout.addWidget(widgets.label(notes, Tone.QUIET))
-        layout.addLayout(self._make_buttons())
+        tip = translate("Silo", "Copy the table, for a spreadsheet")
+        copy = widgets.button(translate("Silo", "Copy"), "copy", self._copy, tip)
+        close = widgets.button(translate("Silo", "Close"), "close", self.close, default=True)
+        layout.addLayout(widgets.line(copy, None, close))
 
     def headings(self) -> tuple[str, ...]:
         """Of the columns."""
@@ -51,13 +50,8 @@ class MassDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no type
         )
 
     def _make_table(self) -> Any:
-        tree = QtWidgets.QTreeWidget()
-        tree.setObjectName("rows")
-        tree.setRootIsDecorated(False)
+        tree = widgets.tree("rows", self.headings(), NUMBERS)
         tree.setAlternatingRowColors(True)
-        tree.setHeaderLabels(list(self.headings()))
-        for column in NUMBERS:
-            tree.headerItem().setTextAlignment(column, QtCore.Qt.AlignmentFlag.AlignRight)
         for row in self._content.rows:
             tree.addTopLevelItem(self._item(row, tree))
         for column in range(6):
@@ -70,25 +64,10 @@ class MassDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no type
             item.setTextAlignment(column, QtCore.Qt.AlignmentFlag.AlignRight)
         if row.doubtful:
             item.setToolTip(6, tip(row.why))
-            item.setForeground(6, QtGui.QBrush(QtGui.QColor(widgets.colour(Tone.WARNING, tree))))
+            item.setForeground(6, widgets.brush(Tone.WARNING, tree))
         return item
 
-    def _make_buttons(self) -> Any:
-        copy = QtWidgets.QPushButton(translate("Silo", "Copy"))
-        copy.setObjectName("copy")
-        copy.setToolTip(translate("Silo", "Copy the table, for a spreadsheet"))
-        copy.clicked.connect(lambda _checked=False: qt.copy(self._content.table(self.copied_headings())))
-        close = QtWidgets.QPushButton(translate("Silo", "Close"))
-        close.setObjectName("close")
-        close.setDefault(True)
-        close.clicked.connect(lambda _checked=False: self.close())
-        row = QtWidgets.QHBoxLayout()
-        row.addWidget(copy)
-        row.addStretch(1)
-        row.addWidget(close)
-        return row
-
-    def copied_headings(self) -> tuple[str, ...]:
-        """Those of the table on the clipboard, which has plain numbers in kg."""
+    def _copy(self) -> None:
+        """The table on the clipboard has plain numbers in kg."""
         name, quantity, one, whole, *rest = self.headings()
-        return (name, quantity, f"{one}, kg", f"{whole}, kg", *rest)
+        qt.copy(self._content.table((name, quantity, f"{one}, kg", f"{whole}, kg", *rest)))

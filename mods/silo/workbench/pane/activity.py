@@ -8,7 +8,7 @@ fields of an entry hold no control characters and are never longer than can be r
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from silo.workbench.words import counted, plain, translate
@@ -213,7 +213,6 @@ class Activity:
     """All boxes, newest first; immutable, :meth:`add` gives the next state."""
 
     entries: tuple[Entry, ...] = ()
-    most: int = field(default=MOST_ENTRIES, repr=False)
 
     def add(self, entry: Entry) -> Activity:
         """With one more entry. One with the same key and a higher rank stays as it is."""
@@ -229,7 +228,7 @@ class Activity:
                 for e in rest
             )
         place = next((i for i, e in enumerate(rest) if e.when <= entry.when), len(rest))
-        return replace(self, entries=(*rest[:place], entry, *rest[place:])[: self.most])
+        return replace(self, entries=(*rest[:place], entry, *rest[place:])[:MOST_ENTRIES])
 
     def extend(self, entries: Iterable[Entry]) -> Activity:
         """With several more."""
@@ -249,16 +248,3 @@ class Activity:
     def get(self, key: str) -> Entry | None:
         """The entry of this key."""
         return next((e for e in self.entries if e.key == key), None)
-
-
-def entry_text(entry: Entry) -> str:
-    """A box as plain text: for the clipboard, and to read in a test."""
-    parts = [entry.title]
-    if entry.badges:
-        parts.append("  ".join(badge.text for badge in entry.badges))
-    for line in entry.lines:
-        buttons = "".join(f" [{action.text}]" for action in line.actions)
-        parts.append(line.text + buttons)
-    if entry.actions:
-        parts.append(" ".join(f"[{action.text}]" for action in entry.actions))
-    return "\n".join(parts)

@@ -4,15 +4,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from silo.bom.errors import SiloError
 from silo.workbench.gui import widgets
-from silo.workbench.gui.qt import QtCore, QtGui, QtWidgets
+from silo.workbench.gui.qt import QtCore, QtWidgets
 from silo.workbench.pane.activity import Tone
 from silo.workbench.preview.rows import MOST_CELL, MOST_ROWS, Kind, Preview, Row, rows, summary
-from silo.workbench.preview.window import Wishes
 from silo.workbench.words import counted, plain, tip, translate
+
+if TYPE_CHECKING:
+    from silo.workbench.preview.flow import PreviewFlow
 
 # Of the sentences below the table, only the first are broken into lines.
 MOST_WRAPPED = 200
@@ -38,6 +40,9 @@ _SIGNS = {
     Kind.UNCHANGED: "=",
 }
 
+# Columns.
+NUMBERS = (2, 3)
+
 # Sentences rather than lines of a BOM.
 _WIDE = (Kind.GROUP, Kind.NOT_COUNTED)
 
@@ -45,17 +50,13 @@ _WIDE = (Kind.GROUP, Kind.NOT_COUNTED)
 class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
     """Not modal: one looks at the model while one reads it."""
 
-    def __init__(self, title: str, wishes: Wishes, parent: Any) -> None:
+    def __init__(self, title: str, path: str, flow: PreviewFlow, parent: Any) -> None:
         super().__init__(parent)
-        self._wishes = wishes
-        self.finished.connect(lambda _result: wishes.closed())
+        self._path, self._flow = path, flow
+        self.finished.connect(lambda _result: flow.closed(path))
         self._preview: Preview | None = None
-        self.setObjectName("SiloPreview")
-        self.setWindowTitle(translate("Silo", "BOM in Silo: {name}").replace("{name}", plain(title, 80)))
-        self.setAttribute(QtCore.Qt.WidgetAttribute.WA_DeleteOnClose)
-        self.resize(860, 560)
-        layout = QtWidgets.QVBoxLayout(self)
-        layout.setSpacing(8)
+        text = translate("Silo", "BOM in Silo: {name}").replace("{name}", plain(title, 80))
+        layout = widgets.lay_out(self, "SiloPreview", text, 860, 560)
         self._title = widgets.label("", bold=True)
         self._summary = widgets.label(translate("Silo", "Comparing with Silo…"))
         self._problem = widgets.label("", Tone.ERROR)
@@ -73,21 +74,15 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
     # -- made once --------------------------------------------------------------------------------------
 
     def _make_table(self) -> Any:
-        tree = QtWidgets.QTreeWidget()
-        tree.setObjectName("rows")
-        tree.setAlternatingRowColors(True)
-        tree.setUniformRowHeights(False)
-        tree.setHeaderLabels(
-            [
-                translate("Silo", "Part number"),
-                translate("Silo", "Name"),
-                translate("Silo", "Assembly"),
-                translate("Silo", "In Silo"),
-                translate("Silo", "What a sync does"),
-            ]
+        headings = (
+            translate("Silo", "Part number"),
+            translate("Silo", "Name"),
+            translate("Silo", "Assembly"),
+            translate("Silo", "In Silo"),
+            translate("Silo", "What a sync does"),
         )
-        for column in (2, 3):
-            tree.headerItem().setTextAlignment(column, QtCore.Qt.AlignmentFlag.AlignRight)
+        tree = widgets.tree("rows", headings, NUMBERS, flat=False)
+        tree.setAlternatingRowColors(True)
         tree.itemDoubleClicked.connect(lambda item, _column: self._show(item))
         return tree
 
@@ -107,36 +102,35 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         self.missing.hide()
 
     def _make_buttons(self) -> Any:
-        def button(text: str, name: str, call: Callable[[], None]) -> Any:
-            made = QtWidgets.QPushButton(text)
-            made.setObjectName(name)
-            made.setAutoDefault(False)
-            made.clicked.connect(lambda _checked=False: call())
-            return made
-
+        button = widgets.button
         self.show_button = button(
-            translate("Silo", "Show"), "show", lambda: self._show(self.table.currentItem())
+            translate("Silo", "Show"),
+            "show",
+            lambda: self._show(self.table.currentItem()),
+            translate("Silo", "Select the instances in the 3D view and the tree"),
         )
-        self.show_button.setToolTip(translate("Silo", "Select the instances in the 3D view and the tree"))
-        self.refresh_button = button(translate("Silo", "Compare again"), "refresh", self._wishes.refresh)
-        self.verify_button = button(translate("Silo", "Compare with 3D view"), "verify", self._verify)
-        self.verify_button.setToolTip(
-            translate("Silo", "Does the BOM explain each solid that FreeCAD shows? Selects what it does not")
+        self.refresh_button = button(
+            translate("Silo", "Compare again"), "refresh", lambda: self._flow.again(self._path)
         )
-        self.relink_button = button(translate("Silo", "Mend links"), "relink", self._relink)
+        self.verify_button = button(
+            translate("Silo", "Compare with 3D view"),
+            "verify",
+            lambda: self._ask(self._flow.verify),
+            translate("Silo", "Does the BOM explain each solid that FreeCAD shows? Selects what it does not"),
+        )
+        self.relink_button = button(
+            translate("Silo", "Mend links"), "relink", lambda: self._ask(self._flow.relink)
+        )
         self.relink_button.hide()
-        self.view_button = button(translate("Silo", "View in Silo →"), "view", self._view)
-        self.register_button = button(translate("Silo", "Register Parts…"), "register", self._register)
-        self.sync_button = button(translate("Silo", "Sync"), "sync", self._sync)
-        self.sync_button.setDefault(True)
+        self.view_button = button(translate("Silo", "View in Silo →"), "view", lambda: self._ask(self._view))
+        self.register_button = button(
+            translate("Silo", "Register Parts…"), "register", lambda: self._flow.register(self._path)
+        )
+        self.sync_button = button(translate("Silo", "Sync"), "sync", self._sync, default=True)
         close = button(translate("Silo", "Close"), "close", self.close)
-        row = QtWidgets.QHBoxLayout()
-        for made in (self.show_button, self.refresh_button, self.verify_button, self.view_button):
-            row.addWidget(made)
-        row.addStretch(1)
-        for made in (self.relink_button, self.register_button, self.sync_button, close):
-            row.addWidget(made)
-        return row
+        left = (self.show_button, self.refresh_button, self.verify_button, self.view_button)
+        right = (self.relink_button, self.register_button, self.sync_button, close)
+        return widgets.line(*left, None, *right)
 
     # -- what is shown ----------------------------------------------------------------------------------
 
@@ -256,16 +250,13 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         item = QtWidgets.QTreeWidgetItem(texts)
         item.setData(2, QtCore.Qt.ItemDataRole.UserRole, texts[0])
         tone = Tone.ERROR if row.number == "✗" else _TONES.get(row.kind, Tone.PLAIN)
-        if shade := widgets.colour(tone, self.table):
-            brush = QtGui.QBrush(QtGui.QColor(shade))
+        if tone is not Tone.PLAIN:
             for column in range(5):
-                item.setForeground(column, brush)
-        for column in (2, 3):
+                item.setForeground(column, widgets.brush(tone, self.table))
+        for column in NUMBERS:
             item.setTextAlignment(column, QtCore.Qt.AlignmentFlag.AlignRight)
         if row.kind is Kind.GROUP:
-            font = item.font(0)
-            font.setBold(True)
-            item.setFont(0, font)
+            widgets.embolden(item)
         if row.note:
             item.setToolTip(0 if row.kind in _WIDE else 4, tip(row.note))
         item.setData(0, QtCore.Qt.ItemDataRole.UserRole, (row.document, list(row.objects)))
@@ -292,25 +283,16 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
     def _show(self, item: Any) -> None:
         data = item.data(0, QtCore.Qt.ItemDataRole.UserRole) if item is not None else None
         if data and data[1]:
-            self._wishes.show(data[0], tuple(data[1]))
+            self._flow.show(data[0], tuple(data[1]))
 
     def _sync(self) -> None:
         if self._preview is not None:
             below = self.below.isVisible() and self.below.isChecked()
-            self._wishes.sync(self._preview, below, self.missing.isChecked())
+            self._flow.sync(self._preview, below, self.missing.isChecked())
 
-    def _verify(self) -> None:
-        if self._preview is not None:
-            self._wishes.verify(self._preview)
+    def _view(self, preview: Preview) -> None:
+        self._flow.view(preview.page)
 
-    def _relink(self) -> None:
+    def _ask(self, wish: Callable[[Preview], None]) -> None:
         if self._preview is not None:
-            self._wishes.relink(self._preview)
-
-    def _register(self) -> None:
-        if self._preview is not None:
-            self._wishes.register(self._preview)
-
-    def _view(self) -> None:
-        if self._preview is not None:
-            self._wishes.view(self._preview)
+            wish(self._preview)

@@ -5,15 +5,15 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable
-from typing import Any
+from typing import Any, Protocol
 
 from silo.bom.errors import SiloError
 from silo.bom.model import BomEntry
 from silo.outbox.entry import new_key
+from silo.workbench.commit.desk import Desk
 from silo.workbench.commit.flow import CommitFlow, commit_of
 from silo.workbench.commit.snapshot import Snapshot
 from silo.workbench.preview.rows import Preview, ask, to_sync
-from silo.workbench.preview.window import PreviewDesk, Window, Wishes
 from silo.workbench.session.session import Session
 from silo.workbench.words import plain, translate
 
@@ -21,8 +21,22 @@ from silo.workbench.words import plain, translate
 _MOST_ACCOUNTS = 4
 
 
+class Window(Protocol):
+    """An open preview; :mod:`silo.workbench.preview.dialog` is the real one."""
+
+    def busy(self) -> None: ...
+
+    def fill(self, preview: Preview, /) -> None: ...
+
+    def fail(self, error: SiloError, /) -> None: ...
+
+    def tell_view(self, text: str, /, *, agrees: bool) -> None: ...
+
+    def raise_(self) -> None: ...
+
+
 class PreviewFlow:
-    """Opens previews, one per document.
+    """Opens previews, one per document, and does what their buttons ask for.
 
     register, show, view
         what the add-on does for the window: register what a preview lists, select objects, open a page.
@@ -32,7 +46,7 @@ class PreviewFlow:
         self,
         session: Session,
         commits: CommitFlow,
-        desk: PreviewDesk,
+        desk: Desk,
         *,
         register: Callable[[str], None],
         show: Callable[[str, tuple[str, ...]], None],
@@ -40,7 +54,7 @@ class PreviewFlow:
         known: Callable[[str, Iterable[BomEntry]], None] = lambda _path, _entries: None,
     ) -> None:
         self._session, self._commits, self._desk = session, commits, desk
-        self._register, self._show, self._view, self._known = register, show, view, known
+        self.register, self.show, self.view, self._known = register, show, view, known
         self._open: dict[str, Window] = {}
 
     def start(self, doc: Any) -> None:
@@ -81,17 +95,11 @@ class PreviewFlow:
         if taken.path in self._open:
             self._open[taken.path].raise_()
             return
-        wishes = Wishes(
-            refresh=lambda: self.again(taken.path),
-            sync=self._sync,
-            register=lambda preview: self._register(preview.snapshot.path),
-            show=self._show,
-            view=lambda preview: self._view(preview.page),
-            verify=self._verify,
-            relink=self._relink,
-            closed=lambda: self._open.pop(taken.path, None),
-        )
-        self._open[taken.path] = self._desk.preview_window(taken.label or name, wishes)
+        self._open[taken.path] = self._desk.preview_window(taken.label or name, taken.path, self)
+
+    def closed(self, path: str) -> None:
+        """The window of this document is gone."""
+        self._open.pop(path, None)
 
     def _ask(self, taken: Snapshot) -> None:
         self._open[taken.path].busy()
@@ -113,7 +121,7 @@ class PreviewFlow:
         if path in self._open:
             call(self._open[path])
 
-    def _verify(self, preview: Preview) -> None:
+    def verify(self, preview: Preview) -> None:
         """Compare what FreeCAD shows with the BOM as it is now, and select what no line explains."""
         path = preview.snapshot.path
         taken = self._taken_again(path)
@@ -130,9 +138,9 @@ class PreviewFlow:
         self._with_dialog(path, lambda dialog: dialog.tell_view(text, agrees=not differing))
         unexplained = next((account for account in differing if account.unexplained), None)
         if unexplained is not None:
-            self._show(unexplained.doc_path, unexplained.unexplained)
+            self.show(unexplained.doc_path, unexplained.unexplained)
 
-    def _relink(self, preview: Preview) -> None:
+    def relink(self, preview: Preview) -> None:
         """Lead broken links to the files that were meant, where one fits; then compare again."""
         try:
             mended = [label for finding in preview.movable for label in self._desk.relink(finding)]
@@ -142,7 +150,9 @@ class PreviewFlow:
         if mended:
             self.again(preview.snapshot.path)
 
-    def _sync(self, preview: Preview, below: bool, allow_missing: bool) -> None:
+    def sync(self, preview: Preview, below: bool, allow_missing: bool) -> None:
+        """Sync what is shown; ``below``: its sub-assemblies first; ``allow_missing``: with broken links."""
+
         def failed(error: SiloError) -> None:
             self._with_dialog(preview.snapshot.path, lambda dialog: dialog.fail(error))
 

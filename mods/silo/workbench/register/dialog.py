@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from silo.bom.errors import SiloError
 from silo.registering.items import Registration
@@ -13,7 +13,7 @@ from silo.registering.offer import Offer
 from silo.registering.orders import Order
 from silo.workbench.gui import widgets
 from silo.workbench.gui.choice_cell import KEY, ChoiceDelegate
-from silo.workbench.gui.qt import QtCore, QtGui, QtWidgets
+from silo.workbench.gui.qt import QtCore, QtWidgets
 from silo.workbench.pane.activity import Tone
 from silo.workbench.register.rows import (
     APART,
@@ -28,8 +28,10 @@ from silo.workbench.register.rows import (
     section_words,
     type_words,
 )
-from silo.workbench.register.window import Wishes
 from silo.workbench.words import plain, tip, told_apart, translate, visible
+
+if TYPE_CHECKING:
+    from silo.workbench.register.flow import RegisterFlow
 
 # Rows have buttons, and nobody decides on a thousand parts at once; the next ones come after these.
 MOST_ROWS = 400
@@ -56,10 +58,10 @@ class _Look:
 class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
     """Not modal: documents are opened and saved while it is there."""
 
-    def __init__(self, title: str, wishes: Wishes, parent: Any, *, asks: bool) -> None:
+    def __init__(self, title: str, path: str, flow: RegisterFlow, parent: Any, *, asks: bool) -> None:
         super().__init__(parent)
-        self._wishes = wishes
-        self.finished.connect(lambda _result: wishes.closed())
+        self._path, self._flow = path, flow
+        self.finished.connect(lambda _result: flow.closed(path))
         self._rows: list[EditedRow] = []
         self._offer = Offer((), {})
         self._types = type_words()
@@ -69,12 +71,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self._places: list[int] = []
         self._row_at: dict[int, int] = {}
         self._filling = False
-        self.setObjectName("SiloRegister")
-        self.setWindowTitle(translate("Silo", "Register Components"))
-        self.setAttribute(QtCore.Qt.WidgetAttribute.WA_DeleteOnClose)
-        self.resize(1080, 480)
-        layout = QtWidgets.QVBoxLayout(self)
-        layout.setSpacing(8)
+        layout = widgets.lay_out(self, "SiloRegister", translate("Silo", "Register Components"), 1080, 480)
         self._title = title
         self._text = widgets.label(translate("Silo", "Looking for components without a part number…"))
         layout.addWidget(self._text)
@@ -120,21 +117,12 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
     def _make_buttons(self, asks: bool) -> Any:
         self.ask_again = QtWidgets.QCheckBox(translate("Silo", "Ask after each commit"))
         self.ask_again.setChecked(asks)
-        self.ask_again.toggled.connect(lambda on: self._wishes.ask_again(bool(on)))
-        self.register_button = QtWidgets.QPushButton(translate("Silo", "Register Selected"))
-        self.register_button.setObjectName("register")
-        self.register_button.setDefault(True)
-        self.register_button.clicked.connect(lambda _checked=False: self._register_checked())
-        self.skip_button = QtWidgets.QPushButton(translate("Silo", "Skip All"))
-        self.skip_button.setObjectName("skip")
-        self.skip_button.setAutoDefault(False)
-        self.skip_button.clicked.connect(lambda _checked=False: self.close())
-        layout = QtWidgets.QHBoxLayout()
-        layout.addWidget(self.ask_again)
-        layout.addStretch(1)
-        layout.addWidget(self.register_button)
-        layout.addWidget(self.skip_button)
-        return layout
+        self.ask_again.toggled.connect(lambda on: self._flow.ask_again(bool(on)))
+        self.register_button = widgets.button(
+            translate("Silo", "Register Selected"), "register", self._register_checked, default=True
+        )
+        self.skip_button = widgets.button(translate("Silo", "Skip All"), "skip", self.close)
+        return widgets.line(self.ask_again, None, self.register_button, self.skip_button)
 
     # -- what is shown ----------------------------------------------------------------------------------
 
@@ -184,9 +172,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self.table.setRowCount(place)
         for place, text in headings.items():
             heading = QtWidgets.QTableWidgetItem(text)
-            font = heading.font()
-            font.setBold(True)
-            heading.setFont(font)
+            widgets.embolden(heading)
             heading.setFlags(QtCore.Qt.ItemFlag.ItemIsEnabled)
             self.table.setItem(place, 0, heading)
             self.table.setSpan(place, 0, 1, self.table.columnCount())
@@ -196,9 +182,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
             self.table.setItem(number, column, QtWidgets.QTableWidgetItem())
         entry = row.candidate.entry
         self.table.item(number, COMPONENT).setToolTip(tip(f"{entry.doc_path} · {entry.object_name}"))
-        button = QtWidgets.QPushButton(translate("Silo", "Register"))
-        button.setAutoDefault(False)
-        button.clicked.connect(lambda _checked=False: self._press(row))
+        button = widgets.button(translate("Silo", "Register"), "", lambda: self._press(row))
         self.table.setCellWidget(number, BUTTON, button)
 
     def fail(self, error: SiloError) -> None:
@@ -285,8 +269,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self.table.item(number, COMPONENT).setCheckState(state)
         remark = self.table.item(number, NOTE)
         remark.setToolTip(tip(look.texts[NOTE]))
-        shade = widgets.colour(look.tone, self.table)
-        remark.setForeground(QtGui.QBrush(QtGui.QColor(shade)) if shade else QtGui.QBrush())
+        remark.setForeground(widgets.brush(look.tone, self.table))
         button = self.table.cellWidget(number, BUTTON)
         button.setText(_button_text(look))
         button.setEnabled(look.can_register or look.can_keep or look.can_undeclare)
@@ -323,11 +306,11 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
 
     def _need_number(self, category: str) -> None:
         if category not in self._offer.numbers:
-            self._wishes.number(category)
+            self._flow.number(self._path, category)
 
     def _press(self, row: EditedRow) -> None:
         if row.can_undeclare:
-            self._wishes.undeclare(row)
+            self._flow.undeclare(self._path, row)
         else:
             self._carry_out([row])
 
@@ -338,7 +321,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         # Keeping is said of all files of an identity together, or it is said of none.
         kept = {id(other): other for row in rows if row.can_keep for other in group(self._rows, row)}
         if same := [row for row in kept.values() if row.can_keep]:
-            self._wishes.same(same)
+            self._flow.same(same)
             for row in same:
                 row.keep()
             self._refresh()
@@ -354,7 +337,7 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
             if row.number not in (NEW, APART) and row.order().existing is None:
                 row.number = NEW
         self._refresh()
-        self._wishes.register([row.order() for row in ready])
+        self._flow.register(self._path, [row.order() for row in ready])
 
 
 def _button_text(look: _Look) -> str:

@@ -7,7 +7,7 @@
                                        ▲                                          │ identities: GUI thread
                                        ╰─────────────── next numbers ◀── commits ◀┘
 
-FreeCAD and Qt come in through the :class:`~silo.workbench.register.window.RegisterDesk` only.
+FreeCAD and Qt come in through the :class:`~silo.workbench.commit.desk.Desk` only.
 """
 
 from __future__ import annotations
@@ -15,43 +15,58 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import Any
+from typing import Any, Protocol
 
 from silo.bom.errors import SiloError
 from silo.bom.identity import walk_entries
 from silo.bom.model import BomEntry, Extraction
 from silo.registering.items import Registration
 from silo.registering.journal import Journal
-from silo.registering.offer import Candidate, next_number, offer
+from silo.registering.offer import Candidate, Offer, next_number, offer
 from silo.registering.orders import Order, carry_out
+from silo.workbench.commit.desk import Desk
 from silo.workbench.commit.flow import CommitFlow
 from silo.workbench.commit.snapshot import Snapshot
 from silo.workbench.register.rows import EditedRow
-from silo.workbench.register.window import RegisterDesk, Window, Wishes
 from silo.workbench.session.session import Session
 from silo.workbench.settings.preferences import Preferences
 from silo.workbench.words import translate
 
 
-class RegisterFlow:
-    """Opens the dialog, one per document, and carries out what it asks for.
+class Window(Protocol):
+    """An open dialog; :mod:`silo.workbench.register.dialog` is the real one."""
 
-    changed
-        told of the path of a document whose BOM looks different now.
-    """
+    def fill(self, offer: Offer, /) -> None: ...
+
+    def fail(self, error: SiloError, /) -> None: ...
+
+    def set_number(self, category: str, number: str, /) -> None: ...
+
+    def registered(self, order: Order, result: Registration, /) -> None: ...
+
+    def undeclared(self, row: EditedRow, /) -> None: ...
+
+    def stopped(self) -> None: ...
+
+    def tell(self, text: str, /) -> None: ...
+
+    def raise_(self) -> None: ...
+
+
+class RegisterFlow:
+    """Opens the dialog, one per document, and carries out what it asks for."""
 
     def __init__(
         self,
         session: Session,
         preferences: Preferences,
         commits: CommitFlow,
-        desk: RegisterDesk,
+        desk: Desk,
         *,
         journal: Journal | None = None,
-        changed: Callable[[str], None] = lambda _path: None,
     ) -> None:
         self._session, self._preferences, self._commits = session, preferences, commits
-        self._desk, self._changed = desk, changed
+        self._desk = desk
         self._journal = journal or Journal()
         self._open: dict[str, Window] = {}
 
@@ -79,22 +94,23 @@ class RegisterFlow:
         if taken.path in self._open:
             self._open[taken.path].raise_()
             return
-        wishes = Wishes(
-            register=lambda orders: self._register(taken.path, orders),
-            same=self._same,
-            number=lambda category: self._number(taken.path, category),
-            ask_again=lambda on: self._preferences.set("AskRegister", on),
-            undeclare=lambda row: self._undeclare(taken.path, row),
-            closed=lambda: self._open.pop(taken.path, None),
-        )
         asks = self._preferences.flag("AskRegister")
-        self._open[taken.path] = self._desk.register_window(taken.label, wishes, asks=asks)
+        self._open[taken.path] = self._desk.register_window(taken.label, taken.path, self, asks=asks)
+
+    def closed(self, path: str) -> None:
+        """The dialog of this document is gone."""
+        self._open.pop(path, None)
+
+    def ask_again(self, on: bool) -> None:
+        """Whether a person wants to be asked after each commit."""
+        self._preferences.set("AskRegister", on)
 
     def _with_dialog(self, path: str, call: Callable[[Window], None]) -> None:
         if path in self._open:
             call(self._open[path])
 
-    def _number(self, path: str, category: str) -> None:
+    def number(self, path: str, category: str) -> None:
+        """Ask for the next number of a category."""
         schema = self._preferences.text("Schema")
         self._session.ask(
             translate("Silo", "Asking for the next number"),
@@ -103,7 +119,7 @@ class RegisterFlow:
             failed=lambda _error: None,
         )
 
-    def _undeclare(self, path: str, row: EditedRow) -> None:
+    def undeclare(self, path: str, row: EditedRow) -> None:
         """Take the identity back from what is modelled in the assembly's file; its item stays."""
         clean = self._desk.unedited()
         try:
@@ -115,7 +131,7 @@ class RegisterFlow:
         self._with_dialog(path, lambda dialog: dialog.undeclared(row))
         self._save_parents(clean, lambda: self._send(path, [row.candidate]))
 
-    def _same(self, rows: Sequence[EditedRow]) -> None:
+    def same(self, rows: Sequence[EditedRow]) -> None:
         """The person leaves these as they are: files that are one part on purpose."""
         files: dict[str, list[str]] = {}
         for row in rows:
@@ -127,7 +143,8 @@ class RegisterFlow:
 
     # -- registering ------------------------------------------------------------------------------------
 
-    def _register(self, path: str, orders: Sequence[Order]) -> None:
+    def register(self, path: str, orders: Sequence[Order]) -> None:
+        """Give these components their numbers, one after another."""
         schema = self._preferences.text("Schema")
         registered: list[Candidate] = []
         clean = self._desk.unedited()
@@ -154,7 +171,7 @@ class RegisterFlow:
             self._with_dialog(path, lambda dialog: dialog.stopped())
             # The numbers that were foretold are taken now.
             for category in sorted({order.category for order in orders}):
-                self._number(path, category)
+                self.number(path, category)
             self._save_parents(clean if registered else [], lambda: self._send(path, registered))
 
         def failed(error: SiloError) -> None:
@@ -200,7 +217,6 @@ class RegisterFlow:
             self._commits.send(top, comment(path))
         else:
             self._commits.sync_only(top)
-        self._changed(path)
 
 
 def whole(taken: Snapshot) -> Extraction:

@@ -302,7 +302,7 @@ def number_texts(rows: list[EditedRow], numbers: Mapping[str, str]) -> list[str]
 
 
 def notices(offer: Offer) -> str:
-    """What a person should know of the whole offer: mistakes in the site's rules, look-alikes not looked for."""
+    """About the whole offer: mistakes in the site's rules, and that nobody looked for look-alikes."""
     told = [rules_text(getattr(offer.categories, "problem", ""), translate)]
     if offer.unsearched:
         text = translate("Silo", "Silo was not searched for parts that look alike: {problem}")

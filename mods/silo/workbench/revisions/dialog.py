@@ -39,15 +39,6 @@ def revision_texts(revision: Revision) -> list[str]:
     ]
 
 
-def _table(name: str, headings: Sequence[str]) -> Any:
-    tree = QtWidgets.QTreeWidget()
-    tree.setObjectName(name)
-    tree.setRootIsDecorated(False)
-    tree.setHeaderLabels(list(headings))
-    tree.header().setStretchLastSection(True)
-    return tree
-
-
 def _revisions_table() -> Any:
     headings = (
         translate("Silo", "Revision"),
@@ -55,39 +46,36 @@ def _revisions_table() -> Any:
         translate("Silo", "Who"),
         translate("Silo", "Comment"),
     )
-    return _table("revisions", headings)
-
-
-def _buttons(texts: Sequence[tuple[str, str, Callable[[], None]]]) -> tuple[Any, list[Any]]:
-    box, made = QtWidgets.QHBoxLayout(), []
-    box.addStretch(1)
-    for name, text, call in texts:
-        button = QtWidgets.QPushButton(text)
-        button.setObjectName(name)
-        button.setAutoDefault(False)
-        button.clicked.connect(lambda _checked=False, call=call: call())
-        box.addWidget(button)
-        made.append(button)
-    return box, made
+    return widgets.tree("revisions", headings)
 
 
 class _Window(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
-    """What both have: a line of news below, and fetching into a folder."""
+    """What both have: a line of news below, and fetching into a folder. ``layout``: for the content."""
 
-    def __init__(self, flow: RevisionFlow, parent: Any, name: str, title: str) -> None:
+    def __init__(self, flow: RevisionFlow, parent: Any, name: str, title: str, size: tuple[int, int]) -> None:
         super().__init__(parent)
         self._flow = flow
         self._closed = False
         self._again: Callable[[], None] = lambda: None
-        self.setObjectName(name)
-        self.setWindowTitle(title)
-        self.setAttribute(QtCore.Qt.WidgetAttribute.WA_DeleteOnClose)
+        self._layout = widgets.lay_out(self, name, title, *size)
         self.finished.connect(self._end)
         self.news = widgets.label("", Tone.QUIET)
         self._all: Sequence[str] = ()
         self.more = widgets.link_button("", lambda: widgets.read(self, self.windowTitle(), self._all))
         self.more.setObjectName("more")
         self.more.hide()
+
+    def _finish(self, action: Any) -> None:
+        """The lower end of the window. Replacing edited files takes a press of its own."""
+        self.replace = widgets.button(
+            translate("Silo", "Replace edited files (copies are kept)"), "replace", lambda: self._again()
+        )
+        self.replace.hide()
+        action.setEnabled(False)
+        close = widgets.button(translate("Silo", "Close"), "close", self.reject)
+        self._layout.addWidget(self.news)
+        self._layout.addWidget(self.more)
+        self._layout.addLayout(widgets.line(self.replace, None, action, close))
 
     def _first(self, lines: Sequence[str], most: int) -> Sequence[str]:
         """The first lines; a button shows all of them."""
@@ -133,41 +121,21 @@ class _Window(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
         self.replace.setVisible(any(one.state.value == "edited" for one in pulled.files))
         self._again = lambda: self.fetch(part_number, revision, folder, overwrite=True)
 
-    def _make_replace(self) -> Any:
-        """Replacing edited files takes a press of its own."""
-        self.replace = QtWidgets.QPushButton(translate("Silo", "Replace edited files (copies are kept)"))
-        self.replace.setObjectName("replace")
-        self.replace.setAutoDefault(False)
-        self.replace.hide()
-        self.replace.clicked.connect(lambda _checked=False: self._again())
-        return self.replace
-
 
 class OpenDialog(_Window):
     """Search as you type, choose an item and a revision, open it with all that it links to."""
 
     def __init__(self, flow: RevisionFlow, parent: Any, folder: str) -> None:
-        super().__init__(flow, parent, "SiloOpen", translate("Silo", "Open from Silo"))
-        self.resize(820, 520)
-        layout = QtWidgets.QVBoxLayout(self)
+        super().__init__(flow, parent, "SiloOpen", translate("Silo", "Open from Silo"), (820, 520))
         self.words = QtWidgets.QLineEdit()
         self.words.setObjectName("words")
         self.words.setPlaceholderText(translate("Silo", "Part number, name or description"))
         self.words.setClearButtonEnabled(True)
-        layout.addWidget(self.words)
-        layout.addLayout(self._make_middle(), 1)
-        layout.addLayout(self._make_folder(folder))
-        layout.addWidget(self.news)
-        layout.addWidget(self.more)
-        row, (self.open_button, _) = _buttons(
-            (
-                ("open", translate("Silo", "Open"), self._open),
-                ("close", translate("Silo", "Close"), self.reject),
-            )
-        )
-        row.insertWidget(0, self._make_replace())
-        layout.addLayout(row)
-        self.open_button.setEnabled(False)
+        self._layout.addWidget(self.words)
+        self._layout.addLayout(self._make_middle(), 1)
+        self._layout.addLayout(self._make_folder(folder))
+        self.open_button = widgets.button(translate("Silo", "Open"), "open", self._open)
+        self._finish(self.open_button)
         self._asked = 0
         self._typing = QtCore.QTimer(self)
         self._typing.setSingleShot(True)
@@ -178,7 +146,7 @@ class OpenDialog(_Window):
 
     def _make_middle(self) -> Any:
         layout = QtWidgets.QHBoxLayout()
-        self.items = _table("items", (translate("Silo", "Part number"), translate("Silo", "Name")))
+        self.items = widgets.tree("items", (translate("Silo", "Part number"), translate("Silo", "Name")))
         self.items.currentItemChanged.connect(lambda _now, _before: self._chosen())
         layout.addWidget(self.items, 3)
         right = QtWidgets.QVBoxLayout()
@@ -192,16 +160,10 @@ class OpenDialog(_Window):
         return layout
 
     def _make_folder(self, folder: str) -> Any:
-        layout = QtWidgets.QHBoxLayout()
-        layout.addWidget(widgets.label(translate("Silo", "Project folder:"), wrap=False))
         self.folder = QtWidgets.QLineEdit(folder)
         self.folder.setObjectName("folder")
-        layout.addWidget(self.folder, 1)
-        choose = QtWidgets.QPushButton("…")
-        choose.setAutoDefault(False)
-        choose.clicked.connect(lambda _checked=False: self._choose_folder())
-        layout.addWidget(choose)
-        return layout
+        text = widgets.label(translate("Silo", "Project folder:"), wrap=False)
+        return widgets.line(text, self.folder, widgets.button("…", "choose", self._choose_folder))
 
     def _choose_folder(self) -> None:
         found = ask_folder(self, self.folder.text())
@@ -285,28 +247,18 @@ class HistoryDialog(_Window):
 
     def __init__(self, flow: RevisionFlow, parent: Any, path: str) -> None:
         title = translate("Silo", "History of {name}").replace("{name}", plain(os.path.basename(path), 80))
-        super().__init__(flow, parent, "SiloHistory", title)
+        super().__init__(flow, parent, "SiloHistory", title, (680, 460))
         self._path = path
         self._history: History | None = None
-        self.resize(680, 460)
-        layout = QtWidgets.QVBoxLayout(self)
         self.revisions = _revisions_table()
         self.revisions.currentItemChanged.connect(lambda _now, _before: self._chosen())
-        layout.addWidget(self.revisions, 1)
+        self._layout.addWidget(self.revisions, 1)
         self.change = widgets.label("")
         self.change.setObjectName("change")
-        layout.addWidget(self.change)
-        layout.addWidget(self.news)
-        layout.addWidget(self.more)
-        row, (self.get_button, _) = _buttons(
-            (
-                ("get", translate("Silo", "Get This Revision as a Copy…"), self._get),
-                ("close", translate("Silo", "Close"), self.reject),
-            )
-        )
-        row.insertWidget(0, self._make_replace())
-        layout.addLayout(row)
-        self.get_button.setEnabled(False)
+        self._layout.addWidget(self.change)
+        text = translate("Silo", "Get This Revision as a Copy…")
+        self.get_button = widgets.button(text, "get", self._get)
+        self._finish(self.get_button)
         self.say(translate("Silo", "Asking Silo…"))
 
     def fill(self, history: History) -> None:

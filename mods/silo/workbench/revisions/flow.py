@@ -14,11 +14,12 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING
 
 from silo.bom.errors import DocumentError, SiloError
 from silo.folders import cache_folder
 from silo.outbox.database import KEPT_ASIDE_DAYS
+from silo.workbench.commit.desk import Desk
 from silo.workbench.commit.opened import Base
 from silo.workbench.commit.theirs import Choice, Theirs
 from silo.workbench.pane.activity import Entry, Line, Tone
@@ -29,29 +30,9 @@ if TYPE_CHECKING:
     from silo.api.client import SiloClient
     from silo.api.wire import Item, Revision
     from silo.vault.pull import Pulled
-    from silo.workbench.commit.plan import Documents
     from silo.workbench.session.jobs import Control
 
 MOST_FOUND = 60
-
-
-class Desk(Protocol):
-    """What is needed of FreeCAD (:class:`silo.workbench.freecad.live_desk.LiveDesk`)."""
-
-    @property
-    def documents(self) -> Documents: ...
-
-    def find(self, path: str, /) -> Any | None: ...
-
-    def open(self, path: str, /) -> Any: ...
-
-    def close(self, doc: Any, /) -> None: ...
-
-    def save_copy(self, doc: Any, path: Path, /) -> None: ...
-
-    def open_paths(self) -> tuple[str, ...]: ...
-
-    def is_open_elsewhere(self, path: str, /) -> bool: ...
 
 
 @dataclass(frozen=True)
