@@ -131,7 +131,8 @@ def settled() -> bool:
 
 def pane() -> list[str]:
     """The boxes of the pane as text, newest first."""
-    from silo.workbench.pane.activity import entry_text
+    sys.path.append(str(Path(__file__).resolve().parents[2] / "support"))
+    from activities import entry_text
 
     return [entry_text(entry) for entry in addon().session.shown.activity.entries]
 
