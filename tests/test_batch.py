@@ -219,10 +219,9 @@ def test_an_error_of_the_file_itself_does_not_stop_the_run() -> None:
 
 def test_no_token_is_shown_in_a_repr() -> None:
     """A log or a traceback shows objects."""
-    from silo.workbench.settings.page_work import Wanted
     from silo.workbench.settings.server import Known, Server
 
-    values: list[Any] = [Known("u", "silo_x"), Server("u", "silo_x"), Wanted("u", "silo_x", True)]
+    values: list[Any] = [Known("u", "silo_x"), Server("u", "silo_x")]
     assert all("silo_x" not in repr(value) for value in values)
 
 

@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 import threading
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 import pytest
 from desk import Office
 
+from silo.outbox.entry import Commit
 from silo.outbox.store import Store
 from silo.registering.journal import Journal
 from silo.registering.orders import Order
@@ -222,3 +224,26 @@ def test_a_second_commit_before_the_first_is_copied_is_made_from_it(office: Offi
     disk.gate.set()
     office.settle()
     assert (office.files("Plate"), office.session.shown.waiting) == ([b"one", b"two", b"three"], ())
+
+
+def test_a_bom_names_the_files_content_where_the_document_is_as_saved(
+    office: Office, flow: CommitFlow
+) -> None:
+    """A recompute is no edit; what somebody else has written meanwhile is not this document's content."""
+    doc = office.document("Top", b"top")
+    path = Path(doc.FileName)
+    path.write_bytes(b"top")
+    office.desk.documents.base(doc)
+    commit = Commit(doc.FileName, 0.0, "Top")
+
+    def named() -> bool:
+        made = flow.made_from(commit, doc)
+        assert made.sha256 in ("", sha256(path.read_bytes()).hexdigest())
+        return bool(made.sha256)
+
+    told = []
+    for doc.changed, doc.recomputed in ((False, False), (True, True), (True, False)):
+        told.append(named())
+    doc.changed = False
+    office.desk.documents.base(doc).stamp = (0, 0, 0)  # type: ignore[assignment]
+    assert (*told, named()) == (True, True, False, False)

@@ -12,9 +12,9 @@ from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QtCore, QtWidgets
 from silo.workbench.pane.activity import Tone
 from silo.workbench.session.session import Session
-from silo.workbench.settings.page_work import Findings, Wanted, in_use, keep_token, look, test
+from silo.workbench.settings.page_work import in_use, keep_token, look, test
 from silo.workbench.settings.preferences import ALLOW, HOLD, Preferences
-from silo.workbench.settings.server import read_known
+from silo.workbench.settings.server import Known, Server, read_known
 from silo.workbench.settings.tokens import Keyring
 from silo.workbench.words import translate
 
@@ -31,6 +31,7 @@ class PreferencePage:
     def __init__(self, preferences: Preferences, session: Session, changed: Callable[[], None]) -> None:
         self._preferences, self._session, self._changed = preferences, session, changed
         self._keyring = Keyring()
+        self.flags: dict[str, Any] = {}
         self._alive = True
         self._waiting = 0
         self.form = QtWidgets.QWidget()
@@ -69,7 +70,9 @@ class PreferencePage:
         form.addRow("", self.verify)
         self.certificate = QtWidgets.QLineEdit()
         self.certificate.setPlaceholderText(translate("Silo", "the system's own, unless a file is given"))
-        form.addRow(translate("Silo", "Certificate authorities"), self._with_browse())
+        browse = widgets.button("…", "browse", self._browse)
+        browse.setMaximumWidth(36)
+        form.addRow(translate("Silo", "Certificate authorities"), widgets.line(self.certificate, browse))
         self.in_use = widgets.label("", Tone.QUIET)
         self.in_use.setObjectName("in_use")
         layout.addWidget(self.in_use)
@@ -79,22 +82,9 @@ class PreferencePage:
     def _test_row(self) -> Any:
         self.result = widgets.label("")
         self.result.setObjectName("result")
-        button = QtWidgets.QPushButton(translate("Silo", "Test the connection"))
-        button.setObjectName("test")
-        button.clicked.connect(lambda _checked=False: self.test())
-        row = QtWidgets.QHBoxLayout()
-        row.addWidget(button)
+        row = widgets.line(widgets.button(translate("Silo", "Test the connection"), "test", self.test))
         row.addWidget(self.result, 1)
         return row
-
-    def _with_browse(self) -> Any:
-        browse = QtWidgets.QPushButton("…")
-        browse.setMaximumWidth(36)
-        browse.clicked.connect(lambda _checked=False: self._browse())
-        layout = QtWidgets.QHBoxLayout()
-        layout.addWidget(self.certificate, 1)
-        layout.addWidget(browse)
-        return layout
 
     def _browse(self) -> None:
         title = translate("Silo", "Certificate authorities")
@@ -105,16 +95,13 @@ class PreferencePage:
     def _commit_box(self) -> Any:
         box = QtWidgets.QGroupBox(translate("Silo", "Commit"))
         form = QtWidgets.QFormLayout(box)
-        self.flags: dict[str, Any] = {}
         for name, text in (
             ("AskComment", translate("Silo", "Ask for a comment")),
             ("SyncBom", translate("Silo", "Sync the BOM of an assembly after its file is committed")),
             ("AskRegister", translate("Silo", "Then ask about components without a part number")),
             ("CountHardware", translate("Silo", "Count standard parts (screws, nuts, washers) in the BOM")),
         ):
-            self.flags[name] = QtWidgets.QCheckBox(text)
-            self.flags[name].setObjectName(name)
-            form.addRow(self.flags[name])
+            self._flag(form, name, text)
         self.missing = QtWidgets.QComboBox()
         self.missing.setObjectName("missing")
         self.missing.addItem(translate("Silo", "hold the BOM back until they are mended"), HOLD)
@@ -132,10 +119,13 @@ class PreferencePage:
             ("LiveActivity", translate("Silo", "Show what happens in Silo as it happens")),
             ("ShowEverywhere", translate("Silo", "Commit in the File menu of every workbench")),
         ):
-            self.flags[name] = QtWidgets.QCheckBox(text)
-            self.flags[name].setObjectName(name)
-            form.addRow(self.flags[name])
+            self._flag(form, name, text)
         return box
+
+    def _flag(self, form: Any, name: str, text: str) -> None:
+        self.flags[name] = QtWidgets.QCheckBox(text)
+        self.flags[name].setObjectName(name)
+        form.addRow(self.flags[name])
 
     # -- FreeCAD's two calls ----------------------------------------------------------------------------
 
@@ -173,15 +163,16 @@ class PreferencePage:
             failed=lambda error: finished(lambda: self._tell(str(error), Tone.ERROR)),
         )
 
-    def _looked(self, found: Findings) -> None:
-        self.in_use.setText(in_use(found.server, dict(os.environ)))
-        if found.keyring and self.place.findData(KEYRING) < 0:
-            text = translate("Silo", "the keyring of the system ({name})").replace("{name}", found.keyring)
+    def _looked(self, found: tuple[Server, str]) -> None:
+        server, keyring = found
+        self.in_use.setText(in_use(server, dict(os.environ)))
+        if keyring and self.place.findData(KEYRING) < 0:
+            text = translate("Silo", "the keyring of the system ({name})").replace("{name}", keyring)
             self.place.insertItem(0, text, KEYRING)
             self.place.setCurrentIndex(0)
         kept = translate("Silo", "unchanged; enter another one to replace it")
         missing = translate("Silo", "none yet: make one on the server's page")
-        self.token.setPlaceholderText(kept if found.server.token else missing)
+        self.token.setPlaceholderText(kept if server.token else missing)
 
     def saveSettings(self) -> None:
         """Keep what the user entered; FreeCAD calls this for every page, changed or not."""
@@ -222,11 +213,8 @@ class PreferencePage:
         """Ask the server who we are, with what is entered now."""
         self._tell(translate("Silo", "Asking the server…"), Tone.QUIET)
         certificate = self.certificate.text().strip()
-        wanted = Wanted(
-            url=self.url.text().strip(),
-            token=self.token.text().strip(),
-            verify=(certificate or True) if self.verify.isChecked() else False,
-        )
+        verify = (certificate or True) if self.verify.isChecked() else False
+        wanted = Known(self.url.text().strip(), self.token.text().strip(), verify)
         known, keyring = read_known(self._preferences), self._keyring
         self._ask(
             translate("Silo", "Testing the connection"),

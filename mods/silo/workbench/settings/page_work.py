@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 from silo.bom.errors import ConfigError
 from silo.workbench.settings.server import Known, Origin, Server, choose_server
@@ -12,28 +12,11 @@ from silo.workbench.settings.tokens import Keyring
 from silo.workbench.words import plain, translate
 
 
-@dataclass(frozen=True)
-class Findings:
-    """What the page shows beside the settings: the server in use, and the keyring's name ("" for none)."""
-
-    server: Server
-    keyring: str = ""
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """What is entered on the page, saved or not."""
-
-    url: str
-    token: str = field(repr=False)
-    verify: bool | str
-
-
-def look(known: Known, keyring: Keyring) -> Findings:
-    """Look at keyring and configuration file. Worker: a keyring may take its time."""
+def look(known: Known, keyring: Keyring) -> tuple[Server, str]:
+    """The server in use, and the keyring's name ("" for none). Worker: a keyring may take its time."""
     from silo.workbench.session.online import file_server
 
-    return Findings(choose_server(known, keyring, file_server=file_server()), keyring.name())
+    return choose_server(known, keyring, file_server=file_server()), keyring.name()
 
 
 def keep_token(keyring: Keyring, url: str, token: str) -> None:
@@ -43,8 +26,12 @@ def keep_token(keyring: Keyring, url: str, token: str) -> None:
     keyring.set(url, token)
 
 
-def test(wanted: Wanted, known: Known, keyring: Keyring) -> str:
-    """Ask the server who we are; the answer in words, or the error that explains what is wrong. Worker."""
+def test(wanted: Known, known: Known, keyring: Keyring) -> str:
+    """Ask the server who we are; the answer in words, or the error that explains what is wrong. Worker.
+
+    wanted, known
+        what is entered on the page, and what was saved before.
+    """
     from silo.api.client import SiloClient
     from silo.workbench.session.online import file_server
 
