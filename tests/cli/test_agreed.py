@@ -71,11 +71,51 @@ IDLE = [
 @pytest.mark.parametrize(("command", "option", "needed"), IDLE)
 def test_an_option_that_would_do_nothing_is_refused(run: Any, command: str, option: str, needed: str) -> None:
     """Who wrote --dry-run, and got a run that sends nothing anyway, learns it the next time with --push."""
-    action = parsers()[command]._option_string_actions[option]
-    value = [] if action.nargs == 0 else [next((c for c in action.choices or () if c != action.default), "1")]
-    done = run(command, "x.FCStd", option, *value)
+    done = run(command, "x.FCStd", *_words(command, option))
     assert (done.code, done.out) == (Exit.BAD_INPUT, "")
     assert f"{option} does nothing without {needed}" in done.err
+
+
+BESIDE = [
+    (name, option, other)
+    for name, parser in parsers().items()
+    for option, other in parser.get_default("excludes") or ()
+]
+
+
+def _words(command: str, option: str) -> list[str]:
+    action = parsers()[command]._option_string_actions[option]
+    if action.nargs == 0:
+        return [option]
+    return [option, next((choice for choice in action.choices or () if choice != action.default), "1")]
+
+
+@pytest.mark.parametrize(("command", "option", "other"), BESIDE)
+def test_an_option_that_another_one_makes_useless_is_refused(
+    run: Any, command: str, option: str, other: str
+) -> None:
+    """A flat list was asked for, and --verify printed the tree."""
+    done = run(command, "x.FCStd", *_words(command, option), *_words(command, other))
+    assert (done.code, done.out) == (Exit.BAD_INPUT, "")
+    assert f"{option} does nothing with {other}" in done.err
+
+
+def test_which_options_exclude_another() -> None:
+    reading = ("--index", "--no-index", "--jobs", "--dask")
+    assert {(command, other, option) for command, option, other in BESIDE} == {
+        *(("bom", "--verify", option) for option in ("--flat", "--resolve", *reading)),
+        *(("sync", "--via", option) for option in reading),
+        *(("register", "--undeclare", option) for option in ("--declare", "--category")),
+        ("register", "--apply", "--category"),
+        *(("restore", "--verify", option) for option in ("--replace", "--database", "--files")),
+    }
+
+
+def test_the_witness_is_for_one_file(run: Any, tmp_path: Path) -> None:
+    """A folder ended in a stack trace."""
+    done = run("bom", tmp_path, "--verify")
+    assert (done.code, done.out) == (Exit.BAD_INPUT, "")
+    assert "name its file" in done.err
 
 
 def test_which_options_need_another() -> None:
@@ -85,7 +125,13 @@ def test_which_options_need_another() -> None:
         ("register", "--yes", "--duplicates"),
         ("register", "--declare", "--apart"),
         *((command, "--strict", "--allow") for command in weighing),
-        *((command, "--push", option) for command in weighing for option in ("--dry-run", "--item")),
+        *(
+            (command, "--push", option)
+            for command in weighing
+            for option in ("--dry-run", "--item", "--server", "--token")
+        ),
+        ("bom", "--resolve", "--server"),
+        ("bom", "--resolve", "--token"),
         *(
             (command, "--bom", option)
             for command in weighing

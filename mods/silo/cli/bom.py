@@ -48,6 +48,8 @@ def _add_bom(commands: Commands) -> None:
     parser.add_argument("--resolve", action="store_true", help="ask the server for part numbers and names")
     common.add_json_option(parser)
     common.add_server_options(parser)
+    common.only_with(parser, "--resolve", "--server", "--token")
+    common.not_with(parser, "--verify", "--flat", "--resolve", *common.READING)
     parser.set_defaults(run=run_bom)
 
 
@@ -111,6 +113,8 @@ def _verify(args: argparse.Namespace) -> int:
     """The geometry as witness: the BOM as live FreeCAD has it, against the solids shown."""
     from silo.freecadcmd.run import verify_in_freecad
 
+    if os.path.isdir(args.top):
+        raise InputError("--verify is for one assembly; name its file.")
     ((_, found),) = verify_in_freecad([args.top], args.assembly, hardware=not args.no_hardware)
     if isinstance(found, SiloError):
         raise found

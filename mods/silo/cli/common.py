@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from silo.vault.reading import Reading
 
 Commands = Any  # argparse keeps the type of its sub-parsers to itself
+READING = ("--index", "--no-index", "--jobs", "--dask")
 
 
 def add_command(commands: Commands, name: str, help_text: str, example: str) -> argparse.ArgumentParser:
@@ -52,8 +53,14 @@ def only_with(parser: argparse.ArgumentParser, needed: str, *options: str) -> No
     parser.set_defaults(needs=(*needs, *((option, needed) for option in options)))
 
 
+def not_with(parser: argparse.ArgumentParser, other: str, *options: str) -> None:
+    """Refuse ``options`` beside the option ``other``, with which they do nothing."""
+    excludes = parser.get_default("excludes") or ()
+    parser.set_defaults(excludes=(*excludes, *((option, other) for option in options)))
+
+
 def refuse_idle_options(parser: argparse.ArgumentParser, args: argparse.Namespace) -> None:
-    """Raise InputError for an option that would do nothing (:func:`only_with`)."""
+    """Raise InputError for an option that would do nothing (:func:`only_with`, :func:`not_with`)."""
 
     def given(option: str) -> bool:
         name = option.strip("-").replace("-", "_")
@@ -62,6 +69,9 @@ def refuse_idle_options(parser: argparse.ArgumentParser, args: argparse.Namespac
     for option, needed in getattr(args, "needs", ()):
         if given(option) and not any(map(given, needed.split())):
             raise InputError(f"{option} does nothing without {' or '.join(needed.split())}")
+    for option, other in getattr(args, "excludes", ()):
+        if given(option) and given(other):
+            raise InputError(f"{option} does nothing with {other}; leave one of them out")
 
 
 def add_server_options(parser: argparse.ArgumentParser) -> None:

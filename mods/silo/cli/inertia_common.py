@@ -123,8 +123,8 @@ def add_push_options(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument("--dry-run", action="store_true", help="with --push: only show what would be written")
     group.add_argument("--item", metavar="NUMBER", help="with --push: part number of the whole assembly")
-    common.only_with(parser, "--push", "--dry-run", "--item")
     common.add_server_options(parser)
+    common.only_with(parser, "--push", "--dry-run", "--item", "--server", "--token")
 
 
 def need_inertia_extra(via: str = "files") -> None:

@@ -97,6 +97,8 @@ def register(commands: Commands) -> None:
     common.add_server_options(parser)
     common.only_with(parser, "--yes", "--duplicates")
     common.only_with(parser, "--declare", "--apart")
+    common.not_with(parser, "--undeclare", "--declare", "--category")
+    common.not_with(parser, "--apply", "--category")
     parser.set_defaults(run=run)
 
 
@@ -109,8 +111,6 @@ def run(args: argparse.Namespace) -> int:
         )
     if args.plan and args.json:
         raise InputError("--plan writes a table and no JSON; leave out --json")
-    if args.category and (args.apply or args.undeclare):
-        raise InputError("--category does nothing here: the table, or the item, has its category")
     if (args.declare or args.undeclare) and (args.plan or args.apply or os.path.isdir(args.top)):
         raise InputError("--declare and --undeclare are for one file, and not for a table")
     if args.undeclare:

@@ -104,6 +104,7 @@ def _add_backup(commands: Commands) -> None:
         "--verify", action="store_true", help="only check that the backup is whole; change nothing"
     )
     _add_place(restore)
+    common.not_with(restore, "--verify", "--replace", "--database", "--files")
     restore.set_defaults(run=run_restore)
 
 

@@ -65,6 +65,7 @@ def register(commands: Commands) -> None:
     common.add_json_option(parser)
     common.add_reading_options(parser)
     common.add_server_options(parser)
+    common.not_with(parser, "--via", *common.READING)
     parser.set_defaults(run=run)
 
 
