@@ -126,7 +126,7 @@ def refuse_workbook(data: bytes) -> None:
 
 
 def first_lines(data: bytes, delimiter: str, count: int = 8) -> list[list[str]]:
-    """The first lines of a file as cells, those that can be read; for a person who says what each column is."""
+    """The first lines of a file as cells, as far as they can be read; for a person to say what each is."""
     lines: list[list[str]] = []
     with suppress(csv.Error):
         lines.extend(row[:MAX_COLUMNS] for row in islice(_rows(_decode(data), delimiter), count))
