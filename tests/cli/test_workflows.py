@@ -19,6 +19,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from threading import Thread
 from typing import Any
+from urllib.parse import parse_qsl
 
 import pytest
 import yaml
@@ -35,7 +36,7 @@ GH = """#!/bin/bash
 shift
 while [ $# -gt 0 ]; do
   case $1 in
-    --paginate) ;;
+    --paginate) all="?all" ;;
     -X) method=$2; shift ;;
     --jq) filter=$2; shift ;;
     -F) body=${2#body=@}; shift ;;
@@ -45,7 +46,7 @@ while [ $# -gt 0 ]; do
 done
 if [ -n "$body" ]; then jq -n --rawfile body "$body" '{body: $body}' > "$body.json"; fi
 curl -sS --fail-with-body -H "Authorization: token $GH_TOKEN" -X "${method:-GET}" ${body:+-d @$body.json} \\
-  "$SERVICE/$path" | jq -r "${filter:-.}"
+  "$SERVICE/$path$all" | jq -r "${filter:-.}"
 """
 
 
@@ -66,7 +67,8 @@ def service() -> Iterator[Service]:
         def answer(self) -> None:
             length = int(self.headers.get("Content-Length") or 0)
             body = json.loads(self.rfile.read(length))["body"] if length else ""
-            steps = self.path.removeprefix("/repos/our/cad/issues").strip("/").split("/")
+            path, _, query = self.path.removeprefix("/repos/our/cad/issues").partition("?")
+            steps, link = path.strip("/").split("/"), ""
             data: Any = {}
             if self.headers["Authorization"] != "token t0k":
                 code = 401
@@ -75,11 +77,13 @@ def service() -> Iterator[Service]:
             elif steps == ["7", "comments"]:
                 code, data = (
                     200,
-                    [
-                        {"id": number, "body": text, "user": {"type": "Bot"}}
-                        for number, text in kept.comments.items()
-                    ],
+                    [{"id": n, "body": b, "user": {"type": "Bot"}} for n, b in kept.comments.items()],
                 )
+                if query != "all":  # a service that gives pages has its own idea of their length
+                    at = int(dict(parse_qsl(query)).get("page", "1"))
+                    data, left = data[at - 1 : at], data[at:]
+                    url = f"{kept.url}{self.path.partition('?')[0]}?limit=50&page="
+                    link = f'<{url}1>; rel="first"' + (f', <{url}{at + 1}>; rel="next"' if left else "")
             elif steps[0] == "comments" and self.command == "PATCH":
                 code, kept.comments[int(steps[1])] = 200, body
             else:
@@ -87,6 +91,8 @@ def service() -> Iterator[Service]:
             content = json.dumps(data).encode()
             self.send_response(code)
             self.send_header("Content-Length", str(len(content)))
+            if link:
+                self.send_header("Link", link)
             self.end_headers()
             self.wfile.write(content)
 
