@@ -103,7 +103,8 @@ STAGES = """
 import json, sys, time
 sys.path.insert(0, sys.argv[3])
 from pathlib import Path
-from silo.fcstd.library import Library, facts_of
+from silo.fcstd.facts import facts_of
+from silo.fcstd.library import Library
 from silo.files import documents_in
 from silo.vault.index import Index
 from silo.vault.reading import Question, Session

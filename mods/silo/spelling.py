@@ -58,19 +58,12 @@ class Spelling:
         listed = self._listed(real_folder, name, status)
         return Spelt(os.path.join(real_folder, listed), os.path.join(plain, name), True)
 
-    def is_plain(self, path: str, known: bool = False) -> bool:
-        """True for the one path of what is there, in a folder that was looked into before; else maybe.
-
-        known
-            it is known to be there, and no symlink.
-        """
+    def is_plain(self, path: str) -> bool:
+        """True for the one path of what is there and is no symlink."""
         folder, _, name = path.rpartition(os.sep)
-        if folder not in self._exact or self._folders.get(folder) != (folder, folder) or not name.isascii():
-            return False
-        try:
-            return known or not stat.S_ISLNK(os.lstat(path).st_mode)
-        except (OSError, ValueError):
-            return False
+        if name.isascii() and folder in self._exact and self._folders.get(folder) == (folder, folder):
+            return True
+        return self.look(path).path == path
 
     def _as_listed(self, real: str) -> str:
         """A path without symlinks, each name as its folder lists it."""

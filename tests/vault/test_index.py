@@ -367,16 +367,20 @@ def test_a_file_that_was_only_touched_is_known_by_its_content(vault: Path, tmp_p
         assert reading.asked == len(questions(vault)) - 8, "only the files that are not there"
 
 
-def test_a_part_that_became_a_symlink_is_the_file_that_it_leads_to(vault: Path, tmp_path: Path) -> None:
-    """The content is the same; the component is not."""
-    index, asked = tmp_path / "index", Question(str(vault / "d.FCStd"))
+@pytest.mark.parametrize("moved", ["part", "folder"])
+def test_what_became_a_symlink_is_what_it_leads_to(vault: Path, tmp_path: Path, moved: str) -> None:
+    """The content is the same; the components are not. People move a folder to a larger disk like this."""
+    index, asked = tmp_path / "index", [Question(str(vault / f"{name}.FCStd")) for name in "ad"]
     indexed(vault, index)
-    (vault / "a.FCStd").rename(vault / "moved.FCStd")
-    os.symlink("moved.FCStd", vault / "a.FCStd")
+    before, after = (
+        (vault / "a.FCStd", vault / "moved.FCStd") if moved == "part" else (vault, tmp_path / "moved")
+    )
+    before.rename(after)
+    os.symlink(after, before)
     with Index(index, contents=Contents(clock=later)) as memory:
-        found = next(Reading(memory).ask_many([asked]))
-    assert found.plain == json.loads(Session().ask(asked).answer)
-    assert "moved.FCStd" in found.known.answer
+        found = list(Reading(memory).ask_many(asked))
+    assert [one.plain for one in found] == [json.loads(Session().ask(one).answer) for one in asked]
+    assert all("moved" in one.known.answer for one in found)
 
 
 def test_another_current_folder_is_another_file(

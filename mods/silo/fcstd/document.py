@@ -25,7 +25,8 @@ from silo.fcstd.values import ABSENT, LocalList, Ref, Vector
 from silo.fcstd.xmltext import XmlText
 
 if TYPE_CHECKING:
-    from silo.fcstd.library import Content, Library, Remembered
+    from silo.fcstd.facts import Remembered
+    from silo.fcstd.library import Content, Library
 
 # Objects of these types are read together with the rest of their file, for a walker looks at what they hold.
 _CONTAINERS = frozenset({"App::Part", "App::LinkGroup", "App::DocumentObjectGroup"})

@@ -3,33 +3,27 @@
 
 from __future__ import annotations
 
-import json
 import os
 import time
 from collections import OrderedDict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 from silo.bom.document import LinkProblem
 from silo.bom.findings import FindingCode
-from silo.bom.walk.kinds import Kind
 from silo.fcstd.container import DOCUMENT_XML, ContainerFile, Directory, FileState
 from silo.fcstd.document import FcstdDocument
+from silo.fcstd.facts import Remembered
 from silo.fcstd.limits import FcstdError, Limits
 from silo.fcstd.locate import Found, Locator, NotFound
 from silo.fcstd.objects import FcstdObject
-from silo.fcstd.properties import KnownTables, to_keep
 from silo.fcstd.values import Ref
 from silo.fcstd.xmltext import Shared, XmlText
 
-# Which objects of a file its facts describe: what may be a component, but no features of a body.
-_TARGETS = frozenset(Kind) - {Kind.NOTHING, Kind.FOLDER, Kind.LINK, Kind.ASSEMBLY_LINK, Kind.ELEMENT}
-_TARGETS_AT_MOST = 24
-_ENCODER = json.JSONEncoder(separators=(",", ":"))
-# Files of which facts are kept as values; each takes some kB.
-_REMEMBERED_AT_MOST = 2000
+# Files of which facts are kept as values: as many as a large vault asks for at one time.
+_REMEMBERED_AT_MOST = 20_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,78 +53,6 @@ class Content:
     def size(self) -> int:
         """Bytes that stay in memory, about; unpacked text is counted elsewhere."""
         return self.xml.packed_size + 2 * len(self.directory.raw) + 300 * self.directory.entry_count
-
-
-class Facts(NamedTuple):
-    """What a file was found to say of itself: enough for most links to it. Goes through JSON.
-
-    document
-        names and kept pieces of the document's own properties.
-    objects
-        name → (type, names, kept pieces), of those that links most likely mean.
-    """
-
-    digest: str
-    state: FileState
-    changed_ns: int
-    read_ns: int
-    document: tuple[Sequence[str], Mapping[str, str]]
-    objects: Mapping[str, tuple[str, Sequence[str], Mapping[str, str]]]
-
-
-class Remembered:
-    """The content of a file of which facts are known. It is read where they say too little.
-
-    Several sessions may share it. Raises FcstdError where the file that is read is another one by now.
-
-    known
-        the tables of properties that the facts hold.
-    """
-
-    def __init__(self, path: str, facts: str, contents: Contents) -> None:
-        self._path, self._contents = path, contents
-        known = Facts(*json.loads(facts))
-        self.digest, self.changed_ns, self.read_ns = known.digest, known.changed_ns, known.read_ns
-        self.state = FileState(*known.state)
-        self.known = KnownTables(known.document, known.objects, lambda: self.xml)
-
-    def _content(self) -> Content:
-        found = self._contents.read(self._path)
-        if found.digest != self.digest:
-            raise FcstdError(self._path, "it is being written just now; try again", state=self.state)
-        return found
-
-    @property
-    def xml(self) -> XmlText:
-        """The text."""
-        return self._content().xml
-
-    @property
-    def directory(self) -> Directory:
-        """The directory of the container."""
-        return self._content().directory
-
-
-def facts_of(document: FcstdDocument) -> str:
-    """The facts of a document that was read to its end, as JSON; "" where none can be given."""
-    content = document.content
-    if not isinstance(content, Content) or content.xml.is_careful:
-        return ""
-    try:
-        survey = document.survey
-        targets = survey.of(_TARGETS, survey.grouped({Kind.LOCAL}))[:_TARGETS_AT_MOST]
-        objects = {obj.Name: (obj.TypeId, *to_keep(obj.properties)) for obj, _ in targets}
-        facts = Facts(
-            content.digest,
-            content.state,
-            content.changed_ns,
-            content.read_ns,
-            to_keep(document.properties),
-            objects,
-        )
-    except (FcstdError, UnicodeDecodeError):  # who asks for it gets the error
-        return ""
-    return _ENCODER.encode(facts)
 
 
 class Contents:
@@ -215,7 +137,7 @@ class Library:
     contents
         what was read before, by other sessions.
     facts
-        path → the :class:`Facts` of a file as it is now, as JSON; "" where they are not known.
+        path → what :func:`~silo.fcstd.facts.facts_of` gave for a file as it is now; "" where none is known.
     notes
         what was taken in another way than recorded (a file name in other case), in plain words.
     documents, lookups

@@ -36,6 +36,11 @@ class Found(NamedTuple):
     real: str
     respelt: bool = False
 
+    def is_straight(self, recorded: str, folder: str) -> bool:
+        """True where the path itself leads to the file: it is found so for as long as it lies there."""
+        plain = self.opened == self.real and not self.respelt
+        return plain and self.real == os.path.normpath(os.path.join(folder, recorded))
+
 
 class NotFound(NamedTuple):
     """Why there is no file to open."""
@@ -100,14 +105,9 @@ class Locator:
             return NotFound(FindingCode.MISSING_FILE)
         return self._respelt(recorded, folders)
 
-    def leads_plainly(self, recorded: str, folders: tuple[str, ...], path: str, is_plain: bool) -> bool:
-        """True where :meth:`find` gives this very path, of a link that it followed before; else maybe.
-
-        is_plain
-            it is known to be there, and no symlink.
-        """
-        plain = os.path.normpath(os.path.join(folders[0], recorded))
-        return plain == path and self.inside(path) and self._spelling.is_plain(path, is_plain)
+    def lies_straight(self, path: str) -> bool:
+        """True where what is there has this very path: no folder is a symlink, names are as listed."""
+        return self._spelling.is_plain(path)
 
     def _respelt(self, recorded: str, folders: tuple[str, ...]) -> Found | NotFound:
         """Written on Windows or macOS, where ``Part.FCStd`` opens ``part.FCStd``: taken if only one fits."""

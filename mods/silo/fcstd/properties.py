@@ -9,7 +9,7 @@ first.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from silo.fcstd import careful
@@ -25,7 +25,7 @@ _PROPERTIES = b'<Properties Count="'
 # that a BOM asks for. Nothing that expat would read in another way: no references, no white space to
 # normalise.
 _ATTRIBUTES = rb'((?: [\w:.-]+="[^"<&\r\n\t]*")*)'
-_CANONICAL = re.compile(
+CANONICAL = re.compile(
     rb'([^"&]+)" type="([^"&]+)"[^<]*<(\w+)' + _ATTRIBUTES + rb"(?:/>|>\s*"
     rb'((?:<\w+(?: [\w:.-]+="[^"<&\r\n\t]*")*/>\s*)*)</\3>)'
     rb"\s*</Property>\s*(?:</Properties>\s*(?:</Object>)?)?\Z"
@@ -49,9 +49,6 @@ _KEPT = frozenset(
         *("SiloBomExclude", "SiloItemId", "SiloUUID", "Suppressed", "Type"),
     }
 )
-
-# What lies in a target is asked for only where a link names an object inside it.
-_NOT_OF_TARGETS = frozenset({"ElementList", "Group"})
 
 
 class Shape(NamedTuple):
@@ -151,7 +148,7 @@ class Properties:
         return Shape.of(spans, b""), [b"", *(element[first:last] for first, last in spans.values())]
 
     def _node(self, piece: bytes) -> Node:
-        if (found := _CANONICAL.match(piece)) is not None:
+        if (found := CANONICAL.match(piece)) is not None:
             name, kind, tag, attributes, inner = (self._decode(part or b"") for part in found.groups())
             children = [Node(child, dict(_ATTRIBUTE.findall(own))) for child, own in _CHILD.findall(inner)]
             value = Node(tag, dict(_ATTRIBUTE.findall(attributes)), children)
@@ -165,92 +162,9 @@ class Properties:
             raise self._xml.malformed(error) from error
 
 
-def _utf8(raw: bytes) -> str:
-    return raw.decode()
-
-
 def table_of(xml: XmlText, name: str, type_id: str) -> Properties:
     """The table of an object. Raises FcstdError."""
     span = xml.span(name)
     if span is None:
         raise xml.error(f"does not hold the data of the object {name!r}")
     return Properties(xml, span, type_id)
-
-
-class Kept(Properties):
-    """The table of an object in a file that was read before; the file is read where it says too little.
-
-    pieces
-        of the properties that a walker asks of a link's target.
-    whole
-        reads the file.
-    """
-
-    __slots__ = ("_values", "_whole")
-
-    def __init__(
-        self, names: Sequence[str], pieces: Mapping[str, str], whole: Callable[[], Properties]
-    ) -> None:
-        self._careful, self._decode, self._whole = False, _utf8, whole
-        self._begin = self._end = 0
-        self._values: dict[str, Any] = {}
-        self.names = tuple(names)
-        self.numbers = dict.fromkeys(self.names, 0)
-        self.kept = {name: piece.encode() for name, piece in pieces.items()}
-
-    def piece(self, name: str) -> bytes:
-        piece = self.kept.get(name)
-        return self._whole().piece(name) if piece is None else piece
-
-    def value(self, name: str) -> Any:
-        if name not in self.numbers:
-            return ABSENT
-        if name not in self._values:
-            if not _CANONICAL.match(self.kept.get(name, b"")):
-                return self._whole().value(name)
-            self._values[name] = super().value(name)
-        return self._values[name]
-
-
-class KnownTables:
-    """The tables of a file that was read before, each made once.
-
-    objects
-        name → type, names of properties, kept pieces.
-    xml
-        reads the file.
-    sound
-        names of the objects of which all that a walker asks can be read.
-    """
-
-    def __init__(
-        self,
-        document: tuple[Sequence[str], Mapping[str, str]],
-        objects: Mapping[str, tuple[str, Sequence[str], Mapping[str, str]]],
-        xml: Callable[[], XmlText],
-    ) -> None:
-        self._objects, self._xml = objects, xml
-        self._tables: dict[str, Kept] = {}
-        self.document = Kept(*document, lambda: Properties(xml(), xml().head.properties, ""))
-        self.sound: set[str] = set()
-
-    def type_of(self, name: str) -> str | None:
-        """The type of an object, None where nothing is known of it."""
-        known = self._objects.get(name)
-        return None if known is None else known[0]
-
-    def table(self, name: str) -> Kept | None:
-        """The table of an object, None where nothing is known of it."""
-        table = self._tables.get(name)
-        if table is None and (known := self._objects.get(name)) is not None:
-            kind, names, pieces = known
-            table = Kept(names, pieces, lambda: table_of(self._xml(), name, kind))
-            self._tables[name] = table
-        return table
-
-
-def to_keep(table: Properties) -> tuple[tuple[str, ...], dict[str, str]]:
-    """What :class:`Kept` is made of. Raises UnicodeDecodeError."""
-    return table.names, {
-        name: piece.decode() for name, piece in table.kept.items() if name not in _NOT_OF_TARGETS
-    }

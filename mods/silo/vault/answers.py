@@ -14,11 +14,12 @@ from typing import Any, NamedTuple
 import silo.bom
 import silo.fcstd
 from silo.fcstd.container import FileState
-from silo.fcstd.library import Content, Library, Remembered
+from silo.fcstd.facts import Remembered
+from silo.fcstd.library import Content, Library
 from silo.fcstd.limits import FcstdError
 from silo.fcstd.locate import Found, NotFound
 
-FORMAT = 3
+FORMAT = 4
 _ENCODER = json.JSONEncoder(separators=(",", ":"))
 _SETTLED_NS = 2_500_000_000  # FAT has ticks of 2 s, the coarsest in use
 
@@ -89,8 +90,9 @@ class Known(NamedTuple):
     answer
         JSON.
     trail
-        JSON: [{path: content}, [[folders in which links' paths begin, {recorded path: where it leads}], …]];
-        only the content where nothing was read but the very file that was asked about.
+        JSON: [{path: content}, [[folders in which links' paths begin, {recorded path: where it leads}], …]].
+        Left out are links that lead straight to one of the files: they do as long as it lies there. Only the
+        content where nothing was read but the very file that was asked about.
     seen
         path → the file when it was read; empty where the answer comes from the index.
     lasting
@@ -116,6 +118,8 @@ class Known(NamedTuple):
                 lasting = False
         led: dict[tuple[str, ...], dict[str, str]] = {}
         for (folders, recorded), found in library.lookups.items():
+            if isinstance(found, Found) and found.real in seen and found.is_straight(recorded, folders[0]):
+                continue
             led.setdefault(folders, {})[recorded] = led_to(found)
         if len(seen) == 1 and not led:
             return cls(json_of(answer), next(iter(seen.values())).content, seen, lasting)
@@ -133,12 +137,12 @@ class Known(NamedTuple):
         if self.is_of_one_file:
             return frozenset()
         files, lookups = json.loads(self.trail)
-        found = {
+        found = frozenset(
             _target(to) or os.path.normpath(os.path.join(folders[-1], recorded))
             for folders, led in lookups
             for recorded, to in led.items()
-        }
-        return frozenset(found) - {next(iter(files), "")}
+        )
+        return found.union(files) - {next(iter(files), "")}
 
 
 def led_to(found: Found | NotFound) -> str:

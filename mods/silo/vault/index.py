@@ -29,7 +29,8 @@ from hashlib import blake2b
 from pathlib import Path
 from zlib import crc32
 
-from silo.fcstd.library import Contents, Facts
+from silo.fcstd.facts import Facts
+from silo.fcstd.library import Contents
 from silo.fcstd.limits import FcstdError
 from silo.fcstd.locate import Locator
 from silo.folders import cache_folder
@@ -73,7 +74,6 @@ class Index:
         self.contents = contents or Contents()
         self._database = Database(path, given)
         self._now: dict[str, Seen | None] = {}
-        self._plain: set[str] = set()  # looked at, and no symlinks
         self._led: dict[tuple[tuple[str, ...], str], str] = {}
         self._locator = Locator()
         self._unsaved: dict[tuple[str, str], Known] = {}
@@ -129,7 +129,7 @@ class Index:
         for folders, led in lookups:
             start = tuple(folders)
             for recorded, to in led.items():
-                if self._leads(start, recorded, to) != to:
+                if self._leads(start, recorded) != to:
                     return False
         return True
 
@@ -176,7 +176,7 @@ class Index:
         return {path: text for path, text in found.items() if text.startswith(f'["{self.content(path)}"')}
 
     def content(self, path: str) -> str | None:
-        """What a file holds now, as the trails name it; None where nobody can say."""
+        """What lies at a path without symlinks now, as the trails name it; None where nobody can say."""
         if path not in self._now:
             self._now[path] = self._look(path)
         seen = self._now[path]
@@ -185,12 +185,10 @@ class Index:
     def _look(self, path: str) -> Seen | None:
         try:
             status = os.lstat(path)
-            if stat.S_ISLNK(status.st_mode):
-                status = os.stat(path)
-            else:
-                self._plain.add(path)
         except (OSError, ValueError):
             return None
+        if stat.S_ISLNK(status.st_mode) or not self._locator.lies_straight(path):
+            return None  # the file has another path by now
         known = self._known_file(path)
         if known is not None and known.still(status):
             return known
@@ -201,13 +199,11 @@ class Index:
         self._files[path] = seen
         return seen
 
-    def _leads(self, folders: tuple[str, ...], recorded: str, before: str) -> str:
-        """Where a link leads now; ``before`` is where it led."""
+    def _leads(self, folders: tuple[str, ...], recorded: str) -> str:
+        """Where a link leads now."""
         key = (folders, recorded)
         if (now := self._led.get(key)) is None:
-            plain = self._locator.leads_plainly(recorded, folders, before, before in self._plain)
-            now = before if plain else led_to(self._locator.find(recorded, folders))
-            self._led[key] = now
+            now = self._led[key] = led_to(self._locator.find(recorded, folders))
         return now
 
     def untouched(self, path: str) -> bool:

@@ -21,7 +21,7 @@ from silo.bom.report import whole_row
 from silo.bom.walk.rings import Rings
 from silo.bom.walk.standard import standard_uuid
 from silo.fcstd.suggest import with_suggestions
-from silo.vault.reading import Answer, Question, Reading
+from silo.vault.reading import Answer, Question, Reading, collecting_seldom
 
 Key = tuple[str, str]
 
@@ -100,6 +100,7 @@ class Plan:
         return replace(found, entries=entries, findings=tuple(told))
 
 
+@collecting_seldom()
 def make_plan(
     tops: Sequence[str],
     reading: Reading,

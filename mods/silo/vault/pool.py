@@ -14,7 +14,7 @@ from typing import Any
 from uuid import uuid4
 
 from silo.bom.errors import InputError
-from silo.vault.reading import CHUNK, Done, Question, Supplies, work
+from silo.vault.reading import CHUNK, Done, Question, Supplies, collect_seldom, work
 
 # A worker process costs some 0.3 s to start; reading a file some milliseconds.
 _WORTH_A_POOL = 128
@@ -84,6 +84,7 @@ def _processes(jobs: int) -> ProcessPoolExecutor:
 def _begin_worker() -> None:
     """Ctrl-C is the parent's affair; and no worker outlives a parent that was killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    collect_seldom()
     if (parent := parent_process()) is not None:
 
         def watch() -> None:

@@ -11,6 +11,7 @@ what they link to in place of the files. Answers come back in the order of the q
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import threading
@@ -19,6 +20,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError, Future
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import islice
@@ -31,7 +33,8 @@ from silo.bom.links import extract
 from silo.bom.model import Extraction
 from silo.bom.report import from_plain, to_plain
 from silo.bom.roots import choose_assembly
-from silo.fcstd.library import Content, Contents, Library, facts_of
+from silo.fcstd.facts import facts_of
+from silo.fcstd.library import Content, Contents, Library
 from silo.fcstd.locate import Found, Locator
 from silo.vault.answers import Known, engine
 from silo.vault.index import Index
@@ -109,6 +112,26 @@ class Answer:
         if "input" in self.plain:
             return InputError(self.plain["input"])
         return from_plain(self.plain)
+
+
+def collect_seldom() -> None:
+    """Let Python search for rings of objects seldom.
+
+    A session takes its own rings apart. Each search goes through all that is remembered of a vault, so that
+    a document of a large vault would cost more than one of a small vault.
+    """
+    gc.set_threshold(100_000, *gc.get_threshold()[1:])
+
+
+@contextmanager
+def collecting_seldom() -> Iterator[None]:
+    """:func:`collect_seldom`, for a while."""
+    before = gc.get_threshold()
+    collect_seldom()
+    try:
+        yield
+    finally:
+        gc.set_threshold(*before)
 
 
 # --- in the worker --------------------------------------------------------------------------------------

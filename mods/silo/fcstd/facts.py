@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: LGPL-2.1-or-later
+"""What a file was found to say of itself, in place of the file: enough for most links to it.
+
+A vault has tens of thousands of these in memory at one time, so each is made of few objects.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from silo.bom.walk.kinds import Kind
+from silo.fcstd.container import Directory, FileState
+from silo.fcstd.limits import FcstdError
+from silo.fcstd.properties import CANONICAL, Properties, table_of
+from silo.fcstd.values import ABSENT
+from silo.fcstd.xmltext import XmlText
+
+if TYPE_CHECKING:
+    from silo.fcstd.document import FcstdDocument
+    from silo.fcstd.library import Content, Contents
+
+# Which objects of a file its facts describe: what may be a component, but no features of a body.
+_TARGETS = frozenset(Kind) - {Kind.NOTHING, Kind.FOLDER, Kind.LINK, Kind.ASSEMBLY_LINK, Kind.ELEMENT}
+_TARGETS_AT_MOST = 24
+# What lies in a target is asked for only where a link names an object inside it.
+_NOT_OF_TARGETS = frozenset({"ElementList", "Group"})
+_ENCODER = json.JSONEncoder(separators=(",", ":"))
+
+
+class Facts(NamedTuple):
+    """The facts of a file. Goes through JSON.
+
+    document
+        names and kept pieces of the document's own properties.
+    objects
+        name → (type, names, kept pieces), of those that links most likely mean.
+    """
+
+    digest: str
+    state: FileState
+    changed_ns: int
+    read_ns: int
+    document: tuple[Sequence[str], Mapping[str, str]]
+    objects: Mapping[str, tuple[str, Sequence[str], Mapping[str, str]]]
+
+
+def facts_of(document: FcstdDocument) -> str:
+    """The facts of a document that was read to its end, as JSON; "" where none can be given."""
+    content = document.content
+    if isinstance(content, Remembered) or content.xml.is_careful:
+        return ""
+    try:
+        survey = document.survey
+        targets = survey.of(_TARGETS, survey.grouped({Kind.LOCAL}))[:_TARGETS_AT_MOST]
+        objects = {obj.Name: (obj.TypeId, *_to_keep(obj.properties)) for obj, _ in targets}
+        own = _to_keep(document.properties)
+        facts = Facts(content.digest, content.state, content.changed_ns, content.read_ns, own, objects)
+    except (FcstdError, UnicodeDecodeError):  # who asks for it gets the error
+        return ""
+    return _ENCODER.encode(facts)
+
+
+def _to_keep(table: Properties) -> tuple[tuple[str, ...], dict[str, str]]:
+    pieces = {name: piece.decode() for name, piece in table.kept.items() if name not in _NOT_OF_TARGETS}
+    return table.names, pieces
+
+
+class Remembered:
+    """The content of a file of which facts are known. It is read where they say too little.
+
+    Several sessions may share it. Raises FcstdError where the file that is read is another one by now.
+
+    document
+        the table of the document's own properties.
+    sound
+        names of the objects of which all that a walker asks can be read.
+    """
+
+    __slots__ = (
+        *("_contents", "_objects", "_path", "_tables", "changed_ns", "digest", "document", "read_ns"),
+        *("sound", "state"),
+    )
+
+    def __init__(self, path: str, facts: str, contents: Contents) -> None:
+        self._path, self._contents = path, contents
+        known = Facts(*json.loads(facts))
+        self.digest, self.changed_ns, self.read_ns = known.digest, known.changed_ns, known.read_ns
+        self.state = FileState(*known.state)
+        self._objects = dict(known.objects)
+        self._tables: dict[str, _Kept] = {}
+        self.document: Properties = _Kept(self, "", "", *known.document)
+        self.sound: set[str] = set()
+
+    @property
+    def known(self) -> Remembered:
+        """What spares reading the file."""
+        return self
+
+    def type_of(self, name: str) -> str | None:
+        """The type of an object, None where nothing is known of it."""
+        table = self.table(name)
+        return None if table is None else table.kind
+
+    def table(self, name: str) -> _Kept | None:
+        """The table of an object, made once; None where nothing is known of it."""
+        table = self._tables.get(name)
+        if table is None and (known := self._objects.pop(name, None)) is not None:
+            table = self._tables[name] = _Kept(self, name, *known)
+        return table
+
+    def _content(self) -> Content:
+        found = self._contents.read(self._path)
+        if found.digest != self.digest:
+            raise FcstdError(self._path, "it is being written just now; try again", state=self.state)
+        return found
+
+    @property
+    def xml(self) -> XmlText:
+        """The text."""
+        return self._content().xml
+
+    @property
+    def directory(self) -> Directory:
+        """The directory of the container."""
+        return self._content().directory
+
+
+class _Kept(Properties):
+    """The table of an object, "" for the document itself; ``pieces`` of what a walker asks of a target."""
+
+    __slots__ = ("_file", "_name", "_values", "kind")
+
+    def __init__(
+        self, file: Remembered, name: str, kind: str, names: Sequence[str], pieces: Mapping[str, str]
+    ) -> None:
+        self._file, self._name, self.kind = file, name, kind
+        self._careful, self._decode = False, _utf8
+        self._begin = self._end = 0
+        self._values: dict[str, Any] | None = None
+        self.names, self.numbers = _shared(tuple(names))
+        self.kept = {name: piece.encode() for name, piece in pieces.items()}
+
+    def _whole(self) -> Properties:
+        xml = self._file.xml
+        return (
+            table_of(xml, self._name, self.kind) if self._name else Properties(xml, xml.head.properties, "")
+        )
+
+    def piece(self, name: str) -> bytes:
+        piece = self.kept.get(name)
+        return self._whole().piece(name) if piece is None else piece
+
+    def value(self, name: str) -> Any:
+        if name not in self.numbers:
+            return ABSENT
+        if self._values is None:
+            self._values = {}
+        if name not in self._values:
+            if not CANONICAL.match(self.kept.get(name, b"")):
+                return self._whole().value(name)
+            self._values[name] = super().value(name)
+        return self._values[name]
+
+
+@lru_cache(maxsize=4096)
+def _shared(names: tuple[str, ...]) -> tuple[tuple[str, ...], dict[str, int]]:
+    """Objects of one type mostly have the same properties."""
+    return names, dict.fromkeys(names, 0)
+
+
+def _utf8(raw: bytes) -> str:
+    return raw.decode()
