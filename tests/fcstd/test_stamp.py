@@ -17,7 +17,7 @@ from other_disk import other_disk
 
 from silo.bom.errors import DocumentError
 from silo.bom.identity import identity_of
-from silo.fcstd import check_stampable, open_document, stamp
+from silo.fcstd import check_stampable, open_document, stamp, unstamp
 from silo.fcstd.container import ContainerFile, FileState
 from silo.fcstd.edit import replace_file, replaced_entry
 from silo.fcstd.limits import Limits
@@ -62,6 +62,24 @@ def test_one_object_of_several(tmp_path: Path) -> None:
     document = open_document(path)
     assert document.Meta == {"SiloUUID": "u-1", "SiloUUID/Other": "u-2"}
     assert [identity_of(obj) for obj in document.Objects] == ["u-1", "u-2"]
+
+
+def test_an_identity_that_is_taken_back_leaves_no_trace_on_the_object(tmp_path: Path) -> None:
+    """FreeCAD reads as many properties as are counted: a wrong count takes those of the next object."""
+    path = part().add("Part::Box", "Other").save(tmp_path / "part.FCStd")
+    before = objects_in(path)
+    assert stamp(path, "u-1", object_name="Box", item_object="Box")
+    assert objects_in(path) != before
+    assert unstamp(path, "Box")
+    assert objects_in(path) == before
+    assert open_document(path).Meta == {}
+    assert unstamp(path, "Box") is False
+
+
+def objects_in(path: Path) -> list[bytes]:
+    """The data of the objects, without the space between elements."""
+    with zipfile.ZipFile(path) as archive:
+        return archive.read("Document.xml").partition(b"<ObjectData")[2].split()
 
 
 def test_nothing_else_changes(tmp_path: Path) -> None:

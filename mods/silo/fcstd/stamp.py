@@ -14,14 +14,14 @@ from __future__ import annotations
 import os
 import re
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from xml.sax.saxutils import escape
 
 from silo.bom.errors import DocumentError
 from silo.bom.identity import META_KEY, meta_key, own_identity
 from silo.fcstd import careful
-from silo.fcstd.careful import Malformed, Node
+from silo.fcstd.careful import Malformed, Node, Span
 from silo.fcstd.container import ContainerFile, Entry, FileState
 from silo.fcstd.edit import changed, check_writable, edited_xml, replace_file, replaced_entry
 from silo.fcstd.library import Library
@@ -105,7 +105,8 @@ def unstamp(path: Path | str, object_name: str, *, limits: Limits | None = None)
         check_writable(real)
 
         def edit(text: bytes) -> bytes:
-            return without_identity(text, object_name, [meta_key(object_name)], limits.depth)
+            gone = dict.fromkeys(("SiloItemId", "SiloUUID"))
+            return _edited(text, {meta_key(object_name): None}, object_name, gone, limits.depth)
 
         content = replaced_entry(container, *edited_xml(container, edit, limits))
 
@@ -171,8 +172,8 @@ def _stamped_xml(
     """The entry Document.xml, and its content as it is to become."""
 
     def edit(text: bytes) -> bytes:
-        stamped = with_meta(text, key, identity, limits.depth)
-        return with_item_id(stamped, item_object, identity, limits.depth) if item_object else stamped
+        own = {"SiloItemId": _ITEM_ID % escape(identity, _MORE).encode()}
+        return _edited(text, {key: identity}, item_object, own, limits.depth)
 
     return edited_xml(container, edit, limits)
 
@@ -194,97 +195,86 @@ _ITEM_ID = (
     b'<Property name="SiloItemId" type="App::PropertyString" group="Silo" doc="Identity of the item in Silo"'
     b' attr="8" ro="1" hide="0">\n                    <String value="%s"/>\n                </Property>'
 )
+_META = b'<Property name="Meta" type="App::PropertyMap">'
 _COUNT = re.compile(rb"""(<Properties\b[^<>]*?\sCount\s*=\s*["'])(\d+)(["'])""")
 
 
-def with_meta(text: bytes, key: str, value: str, depth_limit: int) -> bytes:
-    """The text with ``Meta[key] = value``. Raises ValueError where it cannot be edited (says why)."""
-    if careful.as_utf8(text) is not text:
-        raise Malformed("is not in UTF-8")
-    head, _ = careful.index_document(text, depth_limit)
-    if head.properties is None:
-        raise Malformed("has no document properties")
-    begin, end = head.properties
-    element = text[begin:end]
-    spans = careful.index_properties(element, depth_limit)
-    if "Meta" in spans:
-        first, last = spans["Meta"]
-        items = _items(careful.parse_value(element[first:last], depth_limit))
-        items[key] = value
-        element = element[:first] + _property(element[first:last], items) + element[last:]
-    else:
-        element = _with_property(element, {key: value})
-    return text[:begin] + element + text[end:]
-
-
-def with_item_id(text: bytes, object_name: str, value: str, depth_limit: int) -> bytes:
-    """The text with the property ``SiloItemId`` on an object, as the add-on writes it there.
+def _edited(
+    text: bytes,
+    meta: Mapping[str, str | None],
+    object_name: str | None,
+    properties: Mapping[str, bytes | None],
+    depth_limit: int,
+) -> bytes:
+    """The text with these keys in ``Meta``, and these properties on the object; None takes one away.
 
     Raises ValueError where it cannot be edited (says why).
     """
-    _, data = careful.index_document(text, depth_limit)
-    if object_name not in data:
-        raise Malformed(f"has no data of the object {object_name!r}")
-    begin, end = data[object_name]
-    element = text[begin:end]
-    spans = careful.index_properties(element, depth_limit)
-    if not spans:
-        raise Malformed(f"has no properties of the object {object_name!r}")
-    prop = _ITEM_ID % escape(value, _MORE).encode()
-    if "SiloItemId" in spans:
-        first, last = spans["SiloItemId"]
-        element = element[:first] + prop + element[last:]
-    else:
-        # Before the first property stands the start of their list, whatever stood before that.
-        start = element.rindex(b"<Properties", 0, min(span[0] for span in spans.values()))
-        close = max(span[1] for span in spans.values())
-        head = _COUNT.sub(lambda m: m[1] + b"%d" % (int(m[2]) + 1) + m[3], element[start:close], count=1)
-        element = element[:start] + head + b"\n                " + prop + element[close:]
-    return text[:begin] + element + text[end:]
-
-
-def without_identity(text: bytes, object_name: str, keys: Iterable[str], depth_limit: int) -> bytes:
-    """The text without these keys in ``Meta``, and without an identity on the object."""
+    if careful.as_utf8(text) is not text:
+        raise Malformed("is not in UTF-8")
     head, data = careful.index_document(text, depth_limit)
-    if head.properties is None or object_name not in data:
-        raise Malformed(f"has no data of the object {object_name!r}")
-    begin, end = data[object_name]
-    text = text[:begin] + _without_properties(text[begin:end], depth_limit) + text[end:]
-    begin, end = head.properties  # stands before all objects
-    element = text[begin:end]
-    spans = careful.index_properties(element, depth_limit)
-    if "Meta" in spans:
-        first, last = spans["Meta"]
-        items = _items(careful.parse_value(element[first:last], depth_limit))
-        kept = {key: value for key, value in items.items() if key not in set(keys)}
-        if kept != items:
-            element = element[:first] + _property(element[first:last], kept) + element[last:]
-    return text[:begin] + element + text[end:]
+    if head.properties is None:
+        raise Malformed("has no document properties")
+    edits: list[tuple[Span, Callable[[bytes], bytes]]]
+    edits = [(head.properties, lambda element: _with_meta(element, meta, depth_limit))]
+    if object_name is not None:
+        if object_name not in data:
+            raise Malformed(f"has no data of the object {object_name!r}")
+        edits.append((data[object_name], lambda element: _with_all(element, properties, depth_limit)))
+    for (begin, end), edit in sorted(edits, key=lambda one: one[0], reverse=True):
+        text = text[:begin] + edit(text[begin:end]) + text[end:]
+    return text
 
 
-def _without_properties(element: bytes, depth_limit: int) -> bytes:
-    spans = careful.index_properties(element, depth_limit)
-    for name in ("SiloItemId", "SiloUUID"):
-        if name not in spans:
-            continue
-        start = element.rindex(b"<Properties", 0, min(span[0] for span in spans.values()))
-        first, last = spans[name]
-        head = _COUNT.sub(lambda m: m[1] + b"%d" % (int(m[2]) - 1) + m[3], element[start:first], count=1)
-        element = element[:start] + head.rstrip() + element[last:]
-        spans = careful.index_properties(element, depth_limit)
+def _with_meta(element: bytes, changes: Mapping[str, str | None], depth_limit: int) -> bytes:
+    span = careful.index_properties(element, depth_limit).get("Meta")
+    old = element[slice(*span)] if span else b""
+    known = _items(careful.parse_value(old, depth_limit)) if span else {}
+    items = {key: value for key, value in {**known, **changes}.items() if value is not None}
+    if items == known:
+        return element
+    start = _start_tag(old).rstrip(b"/> \t\r\n") + b">" if span else _META
+    prop = start + _map(items) + b"\n        </Property>"
+    return _with_property(element, "Meta", prop, b"\n        ", depth_limit)
+
+
+def _with_all(element: bytes, properties: Mapping[str, bytes | None], depth_limit: int) -> bytes:
+    for name, prop in properties.items():
+        element = _with_property(element, name, prop, b"\n                ", depth_limit)
     return element
+
+
+def _with_property(element: bytes, name: str, prop: bytes | None, indent: bytes, depth_limit: int) -> bytes:
+    """A ``<Properties>`` element, or the ``<Object>`` around it, with a property or, for None, without it."""
+    spans = careful.index_properties(element, depth_limit)
+    here = spans.get(name)
+    if here is not None and prop is not None:
+        return element[: here[0]] + prop + element[here[1] :]
+    if here is None and prop is None:
+        return element
+    # Before the first property stands the start of their list, whatever stood before that.
+    start = element.rfind(b"<Properties", 0, min((span[0] for span in spans.values()), default=len(element)))
+    if start < 0:
+        raise Malformed("has an object without properties")
+    tag = _start_tag(element[start:])
+    step = 1 if here is None else -1
+    counted = _COUNT.sub(lambda found: found[1] + b"%d" % (int(found[2]) + step) + found[3], tag, count=1)
+    begin = start + len(tag)
+    if here is not None:
+        rest = element[begin : here[0]].rstrip() + element[here[1] :]
+    elif tag.endswith(b"/>"):
+        counted = counted[:-2].rstrip() + b">"
+        rest = indent + (prop or b"") + indent[:-4] + b"</Properties>" + element[begin:]
+    else:
+        at = max((span[1] for span in spans.values()), default=begin)
+        rest = element[begin:at] + indent + (prop or b"") + element[at:]
+    return element[:start] + counted + rest
 
 
 def _items(prop: Node) -> dict[str, str]:
     maps = [child for child in prop.children if child.tag == "Map"]
     items = (child.attributes for child in (maps[0].children if maps else ()) if child.tag == "Item")
     return {item["key"]: item.get("value", "") for item in items if "key" in item}
-
-
-def _property(old: bytes, items: dict[str, str]) -> bytes:
-    """The property with other items; its own start tag is kept."""
-    start = _start_tag(old)
-    return start.rstrip(b"/> \t\r\n") + b">" + _map(items) + b"\n        </Property>"
 
 
 def _start_tag(element: bytes) -> bytes:
@@ -303,16 +293,3 @@ def _map(items: dict[str, str]) -> bytes:
             f'\n                <Item key="{escape(key, _MORE)}" value="{escape(items[key], _MORE)}"/>'
         )
     return "".join((*lines, "\n            </Map>")).encode()
-
-
-def _with_property(element: bytes, items: dict[str, str]) -> bytes:
-    """The ``<Properties>`` element with a ``Meta`` at its end, and counted."""
-    start = _start_tag(element)
-    counted = _COUNT.sub(lambda m: m[1] + b"%d" % (int(m[2]) + 1) + m[3], start, count=1)
-    prop = (
-        b'    <Property name="Meta" type="App::PropertyMap">' + _map(items) + b"\n        </Property>\n    "
-    )
-    if start.endswith(b"/>"):
-        return counted[:-2].rstrip() + b">\n    " + prop + b"</Properties>"
-    close = element.rindex(b"</")
-    return counted + element[len(start) : close] + prop + element[close:]

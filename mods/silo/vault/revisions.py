@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
-from silo.api.revisions import Downloads, Standing, checksum_of, has_file
+from silo.api.revisions import Downloads, Standing, has_file
 from silo.api.transport import Cancel
 from silo.api.wire import Revision
 from silo.bom.changes import Assembly, LineChange, ThreeLines, compare_assemblies, compare_three
@@ -97,11 +97,6 @@ class RevisionBoms:
 def file_revisions(revisions: Sequence[Revision]) -> list[Revision]:
     """Those with a file, newest first."""
     return sorted(filter(has_file, revisions), key=lambda one: one.revision_number, reverse=True)
-
-
-def revision_of(revisions: Sequence[Revision], sha256: str) -> Revision | None:
-    """The newest revision that is this very file."""
-    return next((one for one in file_revisions(revisions) if checksum_of(one) == sha256), None)
 
 
 def words(lines: Sequence[LineChange], most: int = 6) -> str:
