@@ -38,8 +38,7 @@ class Found(NamedTuple):
 
     def is_straight(self, recorded: str, folder: str) -> bool:
         """True where the path itself leads to the file: it is found so for as long as it lies there."""
-        plain = self.opened == self.real and not self.respelt
-        return plain and self.real == os.path.normpath(os.path.join(folder, recorded))
+        return self.real == os.path.normpath(os.path.join(folder, recorded))
 
 
 class NotFound(NamedTuple):
