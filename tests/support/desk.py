@@ -299,6 +299,9 @@ class Desk:
     def identity(self, doc: Any) -> str | None:
         return str(doc.identity) or None
 
+    def is_registered(self, doc: Any) -> bool:
+        return bool(doc.identity)
+
     def ask(self, planned: Plan, note: str, comment: str, look: Look) -> Answer | None:
         self.asked.append(note)
         self.comments.append(comment)

@@ -337,7 +337,7 @@ class AddOn:
 
     def show_settings(self) -> None:
         """Open the preferences."""
-        host.show_preferences("Silo", 0)
+        host.gui().showPreferences("Silo", 0)
 
     def show_help(self) -> None:
         """Show the add-on's page of the documentation."""

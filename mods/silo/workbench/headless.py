@@ -247,16 +247,12 @@ def _without_server(job: Job, error: ImportError) -> int:
             else {"top": top, "bom": bom_json(found)}
             for top, found in _each(documents_in(job.tops), job)
         ]
-        _write_json(job.json, {"results": results})
+        _write(job.json, json.dumps({"results": results}, indent=2, ensure_ascii=False) + "\n")
         told = ConfigError(f"{told}. The BOMs themselves were written to {job.json}")
     return _tell(told)
 
 
-def _write_json(path: str, data: Any) -> None:
-    _write_text(path, json.dumps(data, indent=2, ensure_ascii=False) + "\n")
-
-
-def _write_text(path: str, text: str) -> None:
+def _write(path: str, text: str) -> None:
     """Whole or not at all: a run that dies while it writes leaves the report before."""
     from silo.durable import replacing
 

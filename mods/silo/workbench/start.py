@@ -53,12 +53,12 @@ def start() -> None:
         from silo.workbench.gui.installing import stub_commands
 
         host.error(dependencies.sentence(missing, host.packages_folder(), sys.version_info[:2]))
-        host.add_workbench(silo_workbench(Names(stub_commands(missing)), [INSTALL], [INSTALL]))
+        host.gui().addWorkbench(silo_workbench(Names(stub_commands(missing)), [INSTALL], [INSTALL]))
         return
     addon = AddOn()
     names = Names(commands(addon))
-    host.add_workbench(silo_workbench(names, TOOLBAR, MENU))
-    host.add_preference_page(addon.preference_page(), PREFERENCE_GROUP)
+    host.gui().addWorkbench(silo_workbench(names, TOOLBAR, MENU))
+    host.gui().addPreferencePage(addon.preference_page(), PREFERENCE_GROUP)
     _kept.append(addon)
     qt.later(0, lambda: when_loaded(lambda: finish(addon, names)))
 
@@ -106,7 +106,8 @@ def finish(addon: AddOn, names: Names) -> None:
             # FreeCAD, or a fork of it, commits by itself: its command stays, its end is hooked.
             addon.hook_commit(name)
     _kept.append(place(placed, addon.shown_everywhere))
-    host.reload_workbench()
+    # The menus and toolbars get the commands that are new.
+    host.gui().activeWorkbench().reloadActive()
     addon.begin()
 
 

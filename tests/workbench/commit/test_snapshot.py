@@ -9,7 +9,7 @@ import pytest
 from fakes import Doc, edit
 
 from silo.bom.findings import FindingCode
-from silo.workbench.commit.snapshot import Snapshot, part_identity, take
+from silo.workbench.commit.snapshot import Snapshot, is_registered, part_identity, take
 
 
 def gearbox() -> tuple[Doc, Doc, Doc]:
@@ -119,3 +119,20 @@ def test_identity_of_the_only_marked_object() -> None:
     assert part_identity(doc) == "i"
     edit(other, SiloItemId="j")
     assert part_identity(doc) is None
+
+
+def test_a_document_is_registered_where_a_commit_of_it_has_an_item() -> None:
+    """Whatever carries the identity: the document, the assembly in it, its only part."""
+    top, sub, bolt = gearbox()
+    two, second = two_assemblies()
+    marked = Doc("/v/Marked.FCStd")
+    box = marked.assembly(marked.link("L", bolt.Objects[0]), name="Box")
+    several = Doc("/v/Several.FCStd")
+    for name in ("One", "Other"):
+        edit(several.body(name), SiloItemId=name)
+    docs = (top, sub, bolt, two, marked, several)
+    told = [is_registered(doc) for doc in docs]
+    assert told == [bool(take(doc).identity) for doc in docs] == [True, True, True, True, False, False]
+    edit(box, SiloItemId="box")
+    assert is_registered(marked)
+    assert is_registered(two, second)

@@ -77,6 +77,9 @@ class Desk(Protocol):
     def identity(self, doc: Any, /) -> str | None:
         """The item that a document belongs to, without looking at its components."""
 
+    def is_registered(self, doc: Any, /) -> bool:
+        """True where a document belongs to an item."""
+
     def ask(self, planned: Plan, note: str, comment: str, look: Look, /) -> Answer | None:
         """Which documents to commit, with which comment; None where the person does not want to.
 

@@ -97,7 +97,7 @@ class CommitFlow:
         """Commit a document: ask where there is something to ask, then return without waiting."""
         if not doc.FileName:
             self._desk.save_as(doc)
-        unregistered = bool(doc.FileName) and not self._desk.identity(doc)
+        unregistered = bool(doc.FileName) and not self._desk.is_registered(doc)
         planned = plan(doc, self._desk.documents, unregistered=unregistered)
         if text := refusal(planned):
             if planned.top.state is not State.UNNAMED:

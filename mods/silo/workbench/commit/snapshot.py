@@ -81,6 +81,11 @@ def identity(doc: Any, assembly: Any = None) -> str | None:
     return identity_of(container) or part_identity(doc)
 
 
+def is_registered(doc: Any, assembly: Any = None) -> bool:
+    """True where :func:`identity` finds an item; in most documents without looking for the assembly."""
+    return bool(part_identity(doc) or identity(doc, assembly))
+
+
 def _choose(doc: Any, hint: Any) -> Any:
     try:
         return choose_assembly(doc)

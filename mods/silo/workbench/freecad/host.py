@@ -299,22 +299,12 @@ def icon(name: str) -> Any:
     return gui().getIcon(name)
 
 
-def add_workbench(workbench: Any) -> None:
-    """Add a workbench."""
-    gui().addWorkbench(workbench)
-
-
 def has_active_workbench() -> bool:
     """False while FreeCAD is still loading add-ons."""
     try:
         return gui().activeWorkbench() is not None
     except AssertionError:  # FreeCAD's own choice of exception for "none yet"
         return False
-
-
-def reload_workbench() -> None:
-    """Build the menus and toolbars of the active workbench anew, with commands that are new."""
-    gui().activeWorkbench().reloadActive()
 
 
 def add_workbench_manipulator(manipulator: Any) -> bool:
@@ -324,16 +314,6 @@ def add_workbench_manipulator(manipulator: Any) -> bool:
         return False
     add(manipulator)
     return True
-
-
-def add_preference_page(page: Any, group: str) -> None:
-    """Add a page (a class, or the path of a ``.ui`` file) to the preferences."""
-    gui().addPreferencePage(page, group)
-
-
-def show_preferences(group: str, page: int = 0) -> None:
-    """Open the preferences at a page."""
-    gui().showPreferences(group, page)
 
 
 def add_resources(icons: str, translations: str) -> None:

@@ -104,6 +104,11 @@ class LiveDesk:
         cached = live.cached_document(doc)
         return snapshot.identity(cached, self._hint(doc, cached))
 
+    def is_registered(self, doc: Any) -> bool:
+        """As :meth:`identity` finds it, sooner: each commit begins with this."""
+        cached = live.cached_document(doc)
+        return snapshot.is_registered(cached, self._hint(doc, cached))
+
     def ask(self, planned: Plan, note: str, comment: str, look: Look) -> Answer | None:
         """The commit dialog."""
         from silo.workbench.commit.dialog import CommitDialog

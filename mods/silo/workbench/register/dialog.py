@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from silo.bom.errors import SiloError
@@ -39,22 +39,6 @@ MOST_ROWS = 400
 COMPONENT, NAME, TYPE, CATEGORY, NUMBER, NOTE, BUTTON = range(7)
 
 
-@dataclass(frozen=True)
-class _Look:
-    """How a row is drawn. Only rows that look different are drawn anew: there may be hundreds."""
-
-    texts: tuple[str, ...]
-    keys: tuple[str, ...]
-    tone: Tone
-    checked: bool
-    editable: bool
-    can_choose: bool
-    can_register: bool
-    can_keep: bool
-    can_undeclare: bool
-    declares: bool
-
-
 class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
     """Not modal: documents are opened and saved while it is there."""
 
@@ -66,7 +50,8 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self._offer = Offer((), {})
         self._types = type_words()
         self._categories: dict[str, str] = {}
-        self._drawn: dict[int, _Look] = {}
+        # How each row was drawn. Only what looks different is drawn anew: there may be hundreds.
+        self._drawn: dict[int, object] = {}
         # Where in the table each row stands, between the headings of the sections; and back.
         self._places: list[int] = []
         self._row_at: dict[int, int] = {}
@@ -234,45 +219,32 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self._enable()
 
     def _refresh_row(self, number: int, row: EditedRow, number_text: str) -> None:
-        look = self._look(row, number_text)
-        if self._drawn.get(number) != look:
-            self._drawn[number] = look
-            self._draw_row(self._places[number], look)
-
-    def _look(self, row: EditedRow, number_text: str) -> _Look:
         note, tone = row.note()
         category = self._categories.get(row.category, row.category)
         if row.guesses:
             category = translate("Silo", "guess: {category}").replace("{category}", category)
         kind = self._types.get(row.item_type, row.item_type)
-        return _Look(
-            texts=(row.component(), row.name, kind, category, number_text, note),
-            keys=(row.item_type, row.category, row.number),
-            tone=tone,
-            checked=row.checked,
-            editable=row.editable,
-            can_choose=row.can_choose,
-            can_register=row.can_register,
-            can_keep=row.can_keep,
-            can_undeclare=row.can_undeclare,
-            declares=row.section == "modelled",
-        )
-
-    def _draw_row(self, number: int, look: _Look) -> None:
-        keys = dict(zip((TYPE, CATEGORY, NUMBER), look.keys, strict=True))
-        for column, text in enumerate(look.texts):
-            item = self.table.item(number, column)
+        texts = (row.component(), row.name, kind, category, number_text, note)
+        keys = {TYPE: row.item_type, CATEGORY: row.category, NUMBER: row.number}
+        can = (row.editable, row.can_choose, row.can_register, row.can_keep, row.can_undeclare)
+        look = (texts, keys, tone, can, row.checked)
+        if self._drawn.get(number) == look:
+            return
+        self._drawn[number] = look
+        place = self._places[number]
+        for column, text in enumerate(texts):
+            item = self.table.item(place, column)
             item.setText(text)
             item.setData(KEY, keys.get(column))
-            item.setFlags(_flags(look, column))
-        state = QtCore.Qt.CheckState.Checked if look.checked else QtCore.Qt.CheckState.Unchecked
-        self.table.item(number, COMPONENT).setCheckState(state)
-        remark = self.table.item(number, NOTE)
-        remark.setToolTip(tip(look.texts[NOTE]))
-        remark.setForeground(widgets.brush(look.tone, self.table))
-        button = self.table.cellWidget(number, BUTTON)
-        button.setText(_button_text(look))
-        button.setEnabled(look.can_register or look.can_keep or look.can_undeclare)
+            item.setFlags(_flags(row, column))
+        state = QtCore.Qt.CheckState.Checked if row.checked else QtCore.Qt.CheckState.Unchecked
+        self.table.item(place, COMPONENT).setCheckState(state)
+        remark = self.table.item(place, NOTE)
+        remark.setToolTip(tip(note))
+        remark.setForeground(widgets.brush(tone, self.table))
+        button = self.table.cellWidget(place, BUTTON)
+        button.setText(_button_text(row))
+        button.setEnabled(row.can_register or row.can_keep or row.can_undeclare)
 
     def _enable(self) -> None:
         chosen = any(row.checked and (row.can_register or row.can_keep) for row in self._rows)
@@ -340,15 +312,16 @@ class RegisterDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no 
         self._flow.register(self._path, [row.order() for row in ready])
 
 
-def _button_text(look: _Look) -> str:
-    if look.can_keep:
+def _button_text(row: EditedRow) -> str:
+    if row.can_keep:
         return translate("Silo", "Keep")
-    if look.can_undeclare:
+    if row.can_undeclare:
         return translate("Silo", "Undeclare")
-    return translate("Silo", "Declare") if look.declares else translate("Silo", "Register")
+    is_modelled = row.section == "modelled"
+    return translate("Silo", "Declare") if is_modelled else translate("Silo", "Register")
 
 
-def _flags(row: _Look, column: int) -> Any:
+def _flags(row: EditedRow, column: int) -> Any:
     """What a person can do with a cell."""
     flag = QtCore.Qt.ItemFlag
     flags = flag.ItemIsEnabled | flag.ItemIsSelectable
