@@ -162,3 +162,8 @@ def test_edited_files_are_replaced_by_a_press_of_their_own(day: Day) -> None:
     assert day.bob["untouched"]
     assert day.bob["replaced"] == ["Bolts", "Plate"]
     assert day.bob["edit_kept"]
+
+
+def test_the_line_of_news_stays_readable(day: Day) -> None:
+    """However often its text and its colour change."""
+    assert day.bob["news_contrast"] >= 4.5

@@ -24,6 +24,7 @@ from inside import (
     App,
     Gui,
     QtCore,
+    QtGui,
     QtWidgets,
     addon,
     assembly,
@@ -39,6 +40,7 @@ from inside import (
     tell,
     wait,
 )
+from themes import contrast
 
 from silo.workbench.pane.activity import Action, Do
 
@@ -318,6 +320,9 @@ def windows(one: Any, doc: Any) -> None:
     again = wait(lambda: found_open("empty", "Taken"))
     kept = [file.read_bytes() == edited for file in FOLDER.rglob("kept-aside/**/*Taken.FCStd")]
     tell(replaced=sorted(obj.Name for obj in again.getObject("Assembly").Group), edit_kept=any(kept))
+    # The line has been grey, then in the colour of a warning, and is grey again.
+    line = found.news.grab().toImage().convertToFormat(QtGui.QImage.Format.Format_RGB32)
+    tell(news_contrast=contrast(line))
     found.reject()
 
 

@@ -62,7 +62,9 @@ def label(text: str, tone: Tone = Tone.PLAIN, *, bold: bool = False, wrap: bool 
 
 
 def paint(made: Any, tone: Tone, *, bold: bool = False) -> None:
-    """Give a label the colour of a tone."""
+    """Give a label the colour of a tone, also one that has the colour of another."""
+    # Its own colour is in its palette, and would be taken for that of the theme.
+    made.setStyleSheet("")
     rules = []
     if chosen := colour(tone, made):
         rules.append(f"color: {chosen};")

@@ -179,8 +179,7 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
     def tell_view(self, text: str, *, agrees: bool) -> None:
         """What a comparison with the 3D view found."""
         self._view_text.setText(plain(text, 2000) if "\n" not in text else text)
-        tone = Tone.GOOD if agrees else Tone.ERROR
-        self._view_text.setStyleSheet(f"color: {widgets.colour(tone, self)}")
+        widgets.paint(self._view_text, Tone.GOOD if agrees else Tone.ERROR)
         self._view_text.show()
 
     def _tell(self, text: str) -> None:

@@ -152,6 +152,7 @@ class OpenDialog(_Window):
         right = QtWidgets.QVBoxLayout()
         self.picture = QtWidgets.QLabel()
         self.picture.setFixedHeight(PICTURE)
+        self.picture.hide()
         right.addWidget(self.picture)
         self.revisions = _revisions_table()
         self.revisions.itemDoubleClicked.connect(lambda _item, _column: self._open())
@@ -194,7 +195,7 @@ class OpenDialog(_Window):
 
     def _chosen(self) -> None:
         self.revisions.clear()
-        self.picture.clear()
+        self.picture.hide()
         self.open_button.setEnabled(False)
         number = self._number()
         if not number:
@@ -226,6 +227,7 @@ class OpenDialog(_Window):
         picture = QtGui.QPixmap()
         if known.picture and picture.loadFromData(known.picture):
             self.picture.setPixmap(picture.scaledToHeight(PICTURE))
+            self.picture.show()
         if rows:
             self.revisions.setCurrentItem(rows[0])
         else:
