@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 from silo.bom.errors import ConfigError, Exit, InputError
 from silo.cli import common
@@ -255,9 +255,12 @@ def _progress(name: str) -> Iterator[Any]:
 
 
 def show(args: argparse.Namespace, report: InertiaReport, assembly: Assembly, *, quiet: bool = False) -> None:
-    """Write every file that was asked for, and print the report unless ``quiet``."""
+    """Write every file that was asked for, and print the report; only its warnings where ``quiet``."""
     _write_files(args, report, assembly)
     if quiet:
+        from silo.inertia.output.text import report_warnings
+
+        console(sys.stderr).print(report_warnings(report))
         return
     if args.json:
         from silo.inertia.output.data import report_json
@@ -270,11 +273,12 @@ def show(args: argparse.Namespace, report: InertiaReport, assembly: Assembly, *,
     console().print(report_tables(report))
 
 
-def console() -> Any:
-    """The terminal; wide where the output is a file or a pipe."""
+def console(stream: TextIO | None = None) -> Any:
+    """The terminal; wide where the output is a file or a pipe. ``stream``: standard output by default."""
     from rich.console import Console
 
-    return Console(highlight=False, width=None if sys.stdout.isatty() else PIPE_WIDTH)
+    stream = stream or sys.stdout
+    return Console(file=stream, highlight=False, width=None if stream.isatty() else PIPE_WIDTH)
 
 
 def _write_files(args: argparse.Namespace, report: InertiaReport, assembly: Assembly) -> None:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from silo.inertia.core import Floats
-from silo.inertia.links import PATH, PRODUCT, ROOT_LINK, LinkMap, link_map
+from silo.inertia.links import PATH, PRODUCT, ROOT_LINK, LinkMap, claim, link_map
 from silo.inertia.model import Assembly, Instance
 from silo.inertia.names import bare
 from silo.inertia.wording import counted
@@ -58,18 +58,9 @@ def starting_map(
     if urdf_links:
         return _by_urdf(assembly, urdf_links, root)
     if clusters is None and any(len(instance.path) > 1 for instance in assembly.instances):
-        return _by_first_level(assembly, root)
+        how = f"each first-level sub-assembly is a link; parts beside them are in {root}"
+        return StartingMap(claim(assembly, root=root).members, how)
     return _by_position(assembly, clusters)
-
-
-def _by_first_level(assembly: Assembly, root: str) -> StartingMap:
-    members: dict[str, list[int]] = {}
-    if any(len(instance.path) == 1 for instance in assembly.instances):
-        members[root] = []
-    for index, instance in enumerate(assembly.instances):
-        members.setdefault(instance.path[0] if len(instance.path) > 1 else root, []).append(index)
-    how = f"each first-level sub-assembly is a link; parts beside them are in {root}"
-    return StartingMap({name: tuple(ids) for name, ids in members.items()}, how)
 
 
 def _by_urdf(assembly: Assembly, urdf_links: Mapping[str, Sequence[str]], root: str) -> StartingMap:

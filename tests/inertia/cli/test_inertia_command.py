@@ -200,6 +200,7 @@ def test_snippets(run: Run, arm: Path, kind: str, words: str) -> None:
     assert ran.out.count(words) == 4
     assert ran.out.startswith("<")
     assert "forearm: frame of the numbers: assembly frame" in ran.err
+    assert "No mass or material assigned: counted as 0 kg  [no_mass_no_material]" in ran.err
 
 
 def test_the_picture_of_a_report_is_found_whatever_it_is_called(run: Run, arm: Path) -> None:

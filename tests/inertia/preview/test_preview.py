@@ -22,7 +22,7 @@ from silo.inertia.core import MassProps
 from silo.inertia.geometry import Mesh
 from silo.inertia.geometry.mesh import mesh_volume
 from silo.inertia.model import Assembly, Instance, Prototype
-from silo.inertia.preview.glb import quaternion, write_glb
+from silo.inertia.preview.glb import write_glb
 from silo.inertia.preview.legend import fitted, mass_words, width_of, write
 from silo.inertia.preview.picture import preview_bytes, write_picture, write_preview
 from silo.inertia.preview.raster import Canvas
@@ -125,15 +125,6 @@ def test_the_ellipsoid_has_the_inertia_that_it_stands_for(radii: Any, mass: floa
 def test_a_link_without_mass_has_no_ellipsoid() -> None:
     """Nothing to draw, no error."""
     assert inertia_ellipsoid(MassProps.nothing()) is None
-
-
-@given(st.floats(-3, 3), st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda v: np.linalg.norm(v) > 0.1))
-def test_quaternions_turn_like_their_matrices(angle: float, axis: Any) -> None:
-    """Back by the textbook formula."""
-    turn = trimesh.transformations.rotation_matrix(angle, axis)[:3, :3]
-    x, y, z, w = quaternion(turn)
-    back = trimesh.transformations.quaternion_matrix([w, x, y, z])[:3, :3]
-    np.testing.assert_allclose(back, turn, atol=1e-9)
 
 
 # --- the picture -------------------------------------------------------------------------------------------

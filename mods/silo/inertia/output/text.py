@@ -13,6 +13,7 @@ from rich.text import Text
 
 from silo.inertia.codes import Decided, Source
 from silo.inertia.report import InertiaReport, LinkResult, PartResult, PartWarning
+from silo.inertia.wording import counted
 
 MAX_PART_ROWS = 60
 """Rows of parts in a terminal; JSON, CSV and Markdown have them all."""
@@ -51,73 +52,79 @@ def material_of(part: PartResult) -> str:
 
 def report_tables(report: InertiaReport) -> RenderableType:
     """Links, parts and warnings for a terminal."""
-    warnings = _warnings_text(report.warnings, with_links=not _is_one_body(report))
-    return Group(_links_table(report), Text(), _parts_table(report), Text(), warnings)
+    return Group(_links_table(report), Text(), _parts_table(report), Text(), report_warnings(report))
 
 
-def _links_table(report: InertiaReport) -> Table:
-    table = Table(title=_plain(f"{report.assembly or 'assembly'}: mass properties"), title_justify="left")
-    for heading, justify in (("Link", "left"), ("Mass kg", "right"), ("Centre of mass m", "right")):
-        table.add_column(heading, justify=justify)  # type: ignore[arg-type]
-    table.add_column("Ixx Iyy Izz / Ixy Ixz Iyz  kg m²", justify="right")
-    table.add_column("Parts", justify="right")
-    table.add_column("Warnings", justify="right")
-    for link in report.links.values():
-        table.add_row(*(_plain(cell) for cell in _link_cells(report, link)))
-    if report.total is not None and not _is_one_body(report):
-        table.add_section()
-        loose = sum(part.total_mass for part in report.unclaimed)
-        table.add_row(
-            _plain("whole assembly"),
-            _plain(_short(report.total.mass)),
-            _plain(_vector(report.total.com, 1.0)),
-            _plain(f"in no link: {_short(loose)} kg" if report.unclaimed else ""),
-            _plain(str(sum(part.quantity for _, part in report.parts()))),
-            _plain(str(len(report.warnings))),
-        )
+def _table(title: str, headings: Iterable[str]) -> Table:
+    """``headings``: those of columns that are flush right begin with ">"."""
+    table = Table(title=_plain(title), title_justify="left")
+    for heading in headings:
+        table.add_column(heading.lstrip(">"), justify="right" if heading[0] == ">" else "left")
     return table
 
 
-def _link_cells(report: InertiaReport, link: LinkResult) -> Sequence[str]:
-    moments, products = _tensor(link)
+def _links_table(report: InertiaReport) -> Table:
+    tensor = ">Ixx Iyy Izz / Ixy Ixz Iyz  kg m²"
+    headings = ("Link", ">Mass kg", ">Centre of mass m", tensor, ">Parts", ">Warnings")
+    table = _table(f"{report.assembly or 'assembly'}: mass properties", headings)
+    for link in report.links.values():
+        name, mass, com, moments, products, parts = _link_cells(link)
+        warnings = str(sum(w.link_name == link.name for w in report.warnings))
+        table.add_row(*map(_plain, (name, mass, com, f"{moments}\n{products}", parts, warnings)))
+    if report.total is not None and not _is_one_body(report):
+        table.add_section()
+        cells = (
+            "whole assembly",
+            _short(report.total.mass),
+            _vector(report.total.com, 1.0),
+            f"in no link: {_short(_loose(report))} kg" if report.unclaimed else "",
+            str(sum(part.quantity for _, part in report.parts())),
+            str(len(report.warnings)),
+        )
+        table.add_row(*map(_plain, cells))
+    return table
+
+
+def _link_cells(link: LinkResult) -> tuple[str, str, str, str, str, str]:
+    """Name, mass, centre, moments, products, number of parts."""
+    t = link.props.inertia
+    size = float(abs(t).max())
     return (
         link.name,
         _short(link.props.mass),
         _vector(link.props.com, 1.0),
-        f"{moments}\n{products}",
+        _vector((t[0, 0], t[1, 1], t[2, 2]), size),
+        _vector((t[0, 1], t[0, 2], t[1, 2]), size),
         str(sum(part.quantity for part in link.parts)),
-        str(sum(w.link_name == link.name for w in report.warnings)),
     )
 
 
-def _tensor(link: LinkResult) -> tuple[str, str]:
-    t = link.props.inertia
-    size = float(abs(t).max())
-    return _vector((t[0, 0], t[1, 1], t[2, 2]), size), _vector((t[0, 1], t[0, 2], t[1, 2]), size)
+def _loose(report: InertiaReport) -> float:
+    return sum(part.total_mass for part in report.unclaimed)
+
+
+_PART_HEADINGS = ("Link", "Part", ">Qty", ">Volume cm³", ">Mass kg", "Source", "Matched", "Material")
+
+
+def _part_cells(link: str, part: PartResult) -> tuple[str, ...]:
+    return (
+        link or "(no link)",
+        part.name,
+        str(part.quantity),
+        f"{part.volume * 1e6:.5g}",
+        _short(part.mass),
+        SOURCE_WORDS[part.source],
+        how(part),
+        material_of(part),
+    )
 
 
 def _parts_table(report: InertiaReport) -> RenderableType:
-    table = Table(title="Parts and where their masses come from", title_justify="left")
-    with_links = not _is_one_body(report)
-    for heading in ("Link", "Part") if with_links else ("Part",):
-        table.add_column(heading)
-    for heading in ("Qty", "Volume cm³", "Mass kg"):
-        table.add_column(heading, justify="right")
-    for heading in ("Source", "Matched", "Material"):
-        table.add_column(heading)
+    skip = int(_is_one_body(report))  # the link's name
+    table = _table("Parts and where their masses come from", _PART_HEADINGS[skip:])
     rows = report.parts()
     for link, part in rows[:MAX_PART_ROWS]:
-        cells = [
-            part.name,
-            str(part.quantity),
-            f"{part.volume * 1e6:.5g}",
-            _short(part.mass),
-            SOURCE_WORDS[part.source],
-            how(part),
-            material_of(part),
-        ]
-        shown = [link or "(no link)", *cells] if with_links else cells
-        table.add_row(*(_plain(cell) for cell in shown), style="yellow" if part.warnings else "")
+        table.add_row(*map(_plain, _part_cells(link, part)[skip:]), style="yellow" if part.warnings else "")
     if len(rows) > MAX_PART_ROWS:
         table.caption = f"… and {len(rows) - MAX_PART_ROWS} more; --report parts.csv has them all"
     return table
@@ -127,11 +134,13 @@ def _is_one_body(report: InertiaReport) -> bool:
     return len(report.links) == 1 and not report.unclaimed
 
 
-def _warnings_text(warnings: Sequence[PartWarning], *, with_links: bool) -> Text:
-    if not warnings:
+def report_warnings(report: InertiaReport) -> Text:
+    """The warnings for a terminal; what is said of twenty parts alike is said once."""
+    if not report.warnings:
         return Text("No warnings.", style="green")
-    text = Text(f"{len(warnings)} {'warning' if len(warnings) == 1 else 'warnings'}\n", style="yellow")
-    for (message, code), where in _grouped(warnings, with_links=with_links).items():
+    text = Text(f"{counted(len(report.warnings), 'warning')}\n", style="yellow")
+    groups = _grouped(report.warnings, with_links=not _is_one_body(report))
+    for (message, code), where in groups.items():
         text.append(f"  {_places(where)}: " if where else "  ", style="bold")
         text.append(_clean(message))
         text.append(f"  [{code}]\n", style="dim")
@@ -164,8 +173,10 @@ def report_markdown(report: InertiaReport, picture: str | None = None) -> str:
     out += ["## Links", "", *_link_rows(report), "", *_frames(report), ""]
     out += ["## Parts", "", *_part_rows(report), ""]
     if report.unclaimed:
-        loose = sum(part.total_mass for part in report.unclaimed)
-        out += [f"Parts without a link sum up to {_short(loose)} kg; they are in no link's mass.", ""]
+        out += [
+            f"Parts without a link sum up to {_short(_loose(report))} kg; they are in no link's mass.",
+            "",
+        ]
     out += ["## Warnings", ""]
     out += [_warning_row(*group, where) for group, where in _grouped(report.warnings).items()] or ["None."]
     return "\n".join(out) + "\n"
@@ -175,11 +186,7 @@ def _link_rows(report: InertiaReport) -> Iterable[str]:
     yield "| Link | Mass kg | Centre of mass m | Ixx, Iyy, Izz kg m² | Ixy, Ixz, Iyz kg m² | Parts |"
     yield "|---|--:|--:|--:|--:|--:|"
     for link in report.links.values():
-        moments, products = _tensor(link)
-        yield (
-            f"| {_cell(link.name)} | {_short(link.props.mass)} | {_vector(link.props.com, 1.0)} "
-            f"| {moments} | {products} | {sum(part.quantity for part in link.parts)} |"
-        )
+        yield _row(_link_cells(link))
     if report.total is not None:
         total = report.total
         yield f"| **whole assembly** | **{_short(total.mass)}** | {_vector(total.com, 1.0)} | | | |"
@@ -198,14 +205,14 @@ def _frames(report: InertiaReport) -> Iterable[str]:
 
 
 def _part_rows(report: InertiaReport) -> Iterable[str]:
-    yield "| Link | Part | Qty | Mass kg | Source | Matched | Material | Volume cm³ |"
-    yield "|---|---|--:|--:|---|---|---|--:|"
+    yield _row(heading.lstrip(">") for heading in _PART_HEADINGS)
+    yield _row("--:" if heading[0] == ">" else "---" for heading in _PART_HEADINGS)
     for link, part in report.parts():
-        yield (
-            f"| {_cell(link) or '(no link)'} | {_cell(part.name)} | {part.quantity} | {_short(part.mass)} "
-            f"| {SOURCE_WORDS[part.source]} | {how(part)} | {_cell(material_of(part))} "
-            f"| {part.volume * 1e6:.4g} |"
-        )
+        yield _row(_part_cells(link, part))
+
+
+def _row(cells: Iterable[str]) -> str:
+    return f"| {' | '.join(map(_cell, cells))} |"
 
 
 def _warning_row(message: str, code: str, where: Sequence[str]) -> str:

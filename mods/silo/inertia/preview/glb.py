@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from silo.inertia.core import is_rigid
 from silo.inertia.geometry.mesh import Floats, Mesh
 from silo.inertia.model import Assembly
 from silo.inertia.preview.scene import UNCLAIMED, Colour, LinkView, colour_of, inertia_ellipsoid, meshes_of
@@ -100,15 +99,8 @@ class _Writer:
         ]
 
     def _node(self, name: str, mesh: int, matrix: Floats) -> int:
-        node: dict[str, Any] = {"name": name, "mesh": mesh}
-        if is_rigid(matrix) and np.linalg.det(matrix[:3, :3]) > 0:
-            if not np.array_equal(matrix[:3, :3], np.eye(3)):
-                node["rotation"] = [round(float(v), 9) for v in quaternion(matrix[:3, :3])]
-            if matrix[:3, 3].any():
-                node["translation"] = [round(float(v), 9) for v in matrix[:3, 3]]
-        else:
-            node["matrix"] = [float(v) for v in matrix.T.ravel()]
-        self._doc["nodes"].append(node)
+        columns = [float(f"{value:.8g}") for value in matrix.T.ravel()]
+        self._doc["nodes"].append({"name": name, "mesh": mesh, "matrix": columns})
         return len(self._doc["nodes"]) - 1
 
     def _mesh(self, key: str, material: int) -> int:
@@ -200,27 +192,3 @@ def scene_corners(assembly: Assembly, views: Sequence[LinkView]) -> Floats:
         if i.prototype in corners
     ]
     return np.concatenate(rows) if rows else np.zeros((0, 3))
-
-
-def quaternion(turn: Floats) -> Floats:
-    """(x, y, z, w) of a rotation matrix, by its largest component."""
-    m = turn
-    squares = np.array(
-        [
-            1 + m[0, 0] - m[1, 1] - m[2, 2],
-            1 - m[0, 0] + m[1, 1] - m[2, 2],
-            1 - m[0, 0] - m[1, 1] + m[2, 2],
-            1 + m[0, 0] + m[1, 1] + m[2, 2],
-        ]
-    )
-    rows = np.array(
-        [
-            [squares[0], m[1, 0] + m[0, 1], m[0, 2] + m[2, 0], m[2, 1] - m[1, 2]],
-            [m[1, 0] + m[0, 1], squares[1], m[2, 1] + m[1, 2], m[0, 2] - m[2, 0]],
-            [m[0, 2] + m[2, 0], m[2, 1] + m[1, 2], squares[2], m[1, 0] - m[0, 1]],
-            [m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1], squares[3]],
-        ]
-    )
-    best = rows[int(squares.argmax())]
-    result: Floats = best / np.linalg.norm(best)
-    return result

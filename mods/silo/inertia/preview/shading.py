@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from trimesh import creation
 
 from silo.inertia.geometry.mesh import Floats, Indices, Mesh
 
@@ -69,20 +70,5 @@ def _unit(vectors: Floats) -> Floats:
 
 def ellipsoid(rings: int = 20, sectors: int = 32) -> Mesh:
     """A unit sphere; scaled by three semi-axes it is any ellipsoid."""
-    polar = np.linspace(0, np.pi, rings + 1)
-    around = np.linspace(0, 2 * np.pi, sectors, endpoint=False)
-    grid = np.array(
-        [[np.sin(p) * np.cos(t), np.sin(p) * np.sin(t), np.cos(p)] for p in polar for t in around]
-    )
-    faces = []
-    for i in range(rings):
-        for j in range(sectors):
-            a, b = i * sectors + j, i * sectors + (j + 1) % sectors
-            c, d = a + sectors, b + sectors
-            if i == 0:
-                faces.append((a, c, d))
-            elif i == rings - 1:
-                faces.append((a, c, b))
-            else:
-                faces += [(a, c, b), (b, c, d)]
-    return Mesh(grid, np.array(faces))
+    ball = creation.uv_sphere(radius=1.0, count=(rings, sectors))
+    return Mesh(np.asarray(ball.vertices), np.asarray(ball.faces))
