@@ -15,7 +15,7 @@ from silo.inertia import (
     InertiaReport,
     compute_link_inertials,
 )
-from silo.inertia.core import MassProps, combine
+from silo.inertia.core import combine
 from silo.inertia.geometry import ReadOptions
 
 ARM = Path(__file__).parents[2] / "examples" / "arm"
@@ -79,7 +79,8 @@ def test_compute_link_inertials_sums_up_to_the_whole() -> None:
     """Links by sub-assembly, in the assembly's frame: together they are the assembly."""
     report = compute_link_inertials(ARM / "arm.step", ARM / "bom.csv")
     assert list(report.link_properties) == ["base_link", "upper_arm", "forearm", "gripper"]
-    whole = combine([MassProps.from_inertial(p) for p in report.link_properties.values()])
+    whole = combine([link.props for link in report.links.values()])
+    assert [p.mass for p in report.link_properties.values()] == [k.props.mass for k in report.links.values()]
     assert report.total is not None
     assert whole.mass == pytest.approx(report.total.mass)
     assert whole.inertia == pytest.approx(report.total.inertia, rel=1e-12, abs=1e-15)

@@ -221,3 +221,14 @@ def test_a_doubtful_mass_is_not_written(assemble: Fixture, compute: Fixture, row
     plan = plan_push(compute(asm, MOTOR + rows))
     assert plan.items == ()
     assert code in plan.skipped[0].reason
+
+
+def test_two_sub_assemblies_of_one_number_are_not_both_written(assemble: Fixture, compute: Fixture) -> None:
+    """The second would overwrite the first."""
+    cubes = [
+        (f"l/{name}/case", box("case", 0.1, 0.1, 0.1), None, f"l/{name}/case") for name in ("left", "right")
+    ]
+    report = compute(assemble(*cubes), MOTOR + "P-1,1,,2.000 kg,left\nP-1,1,,3.000 kg,right\n")
+    plan = plan_push(report)
+    assert [(item.part_number, item.properties["mass_kg"]) for item in plan.items] == [("P-1", 2.0)]
+    assert "another part has the part number P-1" in {skipped.reason for skipped in plan.skipped}

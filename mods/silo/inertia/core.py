@@ -109,13 +109,6 @@ class MassProps:
         return cls(0.0, np.zeros(3), np.zeros((3, 3)))
 
     @classmethod
-    def from_inertial(cls, values: InertialProperties) -> MassProps:
-        """From the spec's plain type."""
-        v = values
-        rows = [[v.ixx, v.ixy, v.ixz], [v.ixy, v.iyy, v.iyz], [v.ixz, v.iyz, v.izz]]
-        return cls(v.mass, np.asarray(v.com, float), np.asarray(rows, float))
-
-    @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> MassProps:
         """From what :meth:`to_dict` gives. InputError with every key that lacks or does not fit."""
         try:
@@ -210,12 +203,6 @@ class MassProps:
             )
         turn = matrix[:3, :3]
         return MassProps(self.mass, turn @ self.com + matrix[:3, 3], turn @ self.inertia @ turn.T, frame)
-
-    def about(self, point: ArrayLike) -> Floats:
-        """(3, 3) tensor [kg m^2] about ``point`` ((3,) [m]) instead of the centre of mass."""
-        return self.inertia + parallel_axis(
-            np.array([self.mass]), (self.com - np.asarray(point, float))[None, :]
-        )
 
     def principal(self) -> tuple[Floats, Floats]:
         """Principal moments ((3,) [kg m^2], ascending) and axes ((3, 3), columns, right-handed)."""

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from silo.bom.errors import ConfigError
-from silo.inertia.materials import Found, Material, MaterialHit, MaterialMiss, MaterialTable, load_materials
+from silo.inertia.materials import Material, MaterialHit, MaterialMiss, MaterialTable, load_materials
 from silo.inertia.materials.density import parse_density
 from silo.inertia.materials.files import package_rows
 
@@ -29,7 +29,7 @@ def test_the_specs_materials(materials: MaterialTable, name: str) -> None:
     hit = materials.find(name)
     assert isinstance(hit, MaterialHit)
     assert hit.material.density == SPEC[name]
-    assert hit.found is Found.NAME
+    assert not hit.doubt
     assert hit.material.source
 
 
@@ -358,7 +358,7 @@ def test_cards_come_last(materials: Any) -> None:
     assert isinstance(steel, MaterialHit)
     assert isinstance(harry, MaterialHit)
     assert steel.material.density == 7850
-    assert harry.found is Found.CARD
+    assert harry.material is cards[1]
     assert isinstance(table.find("Wood screw thing"), MaterialMiss)
 
 
@@ -375,7 +375,7 @@ def test_an_installed_freecad_changes_no_result_without_a_word(materials: Materi
     assert "FreeCAD card" in guess.doubt
     gap = with_cards.find("PLA wood")
     assert isinstance(gap, MaterialHit)
-    assert gap.found is Found.CARD
+    assert gap.material is cards[2]
 
 
 @pytest.mark.parametrize(

@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 from silo.inertia.materials.cards import installed_cards
 from silo.inertia.materials.files import package_rows, user_rows
-from silo.inertia.materials.table import Found, Material, MaterialHit, MaterialMiss, MaterialTable
+from silo.inertia.materials.table import Material, MaterialHit, MaterialMiss, MaterialTable
 
 if TYPE_CHECKING:
     MATERIAL_DENSITIES: Mapping[str, float]
 
 __all__ = [
     "MATERIAL_DENSITIES",
-    "Found",
     "Material",
     "MaterialHit",
     "MaterialMiss",

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from enum import StrEnum
 from functools import cached_property
 
 from silo.inertia.materials.words import (
@@ -18,14 +17,6 @@ from silo.inertia.materials.words import (
     words,
 )
 from silo.inertia.names import Suggester
-
-
-class Found(StrEnum):
-    """How a material text led to its density."""
-
-    NAME = "name"  # equal to a name or alias of the table
-    WORDS = "words"  # a name or alias stands in the text as whole words
-    CARD = "card"  # equal to the name of a FreeCAD material card
 
 
 @dataclass(frozen=True)
@@ -51,7 +42,6 @@ class MaterialHit:
     """A material text that was understood; ``doubt`` says why it may mean another material, or is empty."""
 
     material: Material
-    found: Found
     doubt: str = ""
 
 
@@ -103,12 +93,12 @@ class MaterialTable:
         if card is None:
             return answer
         if isinstance(answer, MaterialMiss) or card.density == answer.material.density:
-            return MaterialHit(card, Found.CARD)
+            return MaterialHit(card)
         doubt = (
             f"{answer.doubt}; a FreeCAD card on this machine has that name, and its {card.density:g} kg/m³ "
             f"were used instead of the {answer.material.density:g} kg/m³ of {answer.material.name}"
         )
-        return MaterialHit(card, Found.CARD, doubt)
+        return MaterialHit(card, doubt)
 
     @cached_property
     def _index(self) -> _Index:
@@ -140,7 +130,7 @@ class _Index:
         if equal is None and not (joined := "".join(tokens)).isdecimal():
             equal = self._joined.get(joined)  # "GG-25", "AISI316L"
         if equal is not None:
-            return MaterialHit(equal, Found.NAME)
+            return MaterialHit(equal)
         text = uncovered(tokens, self._single)
         hits = self._hits(text)
         named: dict[str, Material] = {}
@@ -162,7 +152,7 @@ class _Index:
         strange = not_understood(rest)
         if strange and not doubt:
             doubt = f"“{' '.join(strange)}” in it is not understood, and may make it another"
-        return MaterialHit(left[0], Found.WORDS, doubt)
+        return MaterialHit(left[0], doubt)
 
     def _hits(self, text: Words) -> list[tuple[int, int, Material]]:
         hits = [

@@ -95,33 +95,35 @@ def plan_push(
     """
     known = part_numbers or {}
     by_number: dict[str, list[PartResult]] = defaultdict(list)
-    skipped: dict[Skipped, None] = {}
+    found: list[PushItem | Skipped] = []
     gaps = 0
     for _, part in report.parts():
         gap = _gap(part)
         gaps += gap is not None
         numbers = [part.part_number] if part.part_number else [known[k] for k in part.products if k in known]
         if gap is not None or not numbers:
-            skipped[Skipped(part.name, gap or "it has no part number")] = None
+            found.append(Skipped(part.name, gap or "it has no part number"))
             continue
         for part_number in dict.fromkeys(numbers):
             by_number[part_number].append(part)
-    items: list[PushItem] = []
     for part_number, parts in by_number.items():
-        values = {tuple(_properties(part).items()) for part in parts}
-        if len(values) > 1:
-            reason = f"{len(values)} different shapes or masses have the part number {part_number}"
-            skipped[Skipped(parts[0].name, reason)] = None
-            continue
-        items.append(PushItem(part_number, parts[0].name, _json(_properties(parts[0]))))
+        values = [_properties(part) for part in parts]
+        different = sum(one not in values[:index] for index, one in enumerate(values))
+        if different > 1:
+            reason = f"{different} different shapes or masses have the part number {part_number}"
+            found.append(Skipped(parts[0].name, reason))
+        else:
+            found.append(PushItem(part_number, parts[0].name, values[0]))
     for one in report.sub_assemblies:
-        _plan_sub_assembly(one, {item.part_number for item in items}, items, skipped)
+        found.append(_sub_assembly(one, {item.part_number for item in found if isinstance(item, PushItem)}))
     for warning in report.warnings:
         if warning.code == MassCode.ROW_UNUSED:
-            skipped[Skipped(warning.part_name, "no part of the geometry belongs to its row")] = None
+            found.append(Skipped(warning.part_name, "no part of the geometry belongs to its row"))
     if top is not None:
-        _plan_top(report, top, gaps, items, skipped)
-    return PushPlan(tuple(items), tuple(skipped), _comment(report))
+        found.append(_whole(report, top, gaps))
+    items = tuple(one for one in found if isinstance(one, PushItem))
+    skipped = dict.fromkeys(one for one in found if isinstance(one, Skipped))
+    return PushPlan(items, tuple(skipped), _comment(report))
 
 
 def push(items: Items, plan: PushPlan, told: Callable[[str], None] = lambda part_number: None) -> Pushed:
@@ -174,9 +176,7 @@ def _gap(part: PartResult) -> str | None:
     return None
 
 
-def _plan_sub_assembly(
-    one: SubAssemblyResult, taken: Set[str], items: list[PushItem], skipped: dict[Skipped, None]
-) -> None:
+def _sub_assembly(one: SubAssemblyResult, taken: Set[str]) -> PushItem | Skipped:
     reason = ""
     if not one.part_number:
         reason = "it has no part number"
@@ -188,34 +188,24 @@ def _plan_sub_assembly(
         reason = "its mass is in doubt (see the warnings)"
     elif one.part_number in taken:
         reason = f"another part has the part number {one.part_number}"
-    if reason:
-        skipped[Skipped(one.name, reason)] = None
-        return
-    items.append(PushItem(one.part_number, one.name, _json(_properties(one))))
+    return Skipped(one.name, reason) if reason else PushItem(one.part_number, one.name, _properties(one))
 
 
-def _plan_top(
-    report: InertiaReport, top: str, gaps: int, items: list[PushItem], skipped: dict[Skipped, None]
-) -> None:
+def _whole(report: InertiaReport, top: str, gaps: int) -> PushItem | Skipped:
     total = report.total
     if total is None or total.mass <= 0 or gaps:
-        skipped[Skipped(report.assembly, f"{gaps} of its parts have no mass that can be vouched for")] = None
-        return
+        return Skipped(report.assembly, f"{gaps} of its parts have no mass that can be vouched for")
     com = [_rounded(value) for value in total.com]
-    items.append(PushItem(top, report.assembly, {"mass_kg": _rounded(total.mass), "com_m": com}))
+    return PushItem(top, report.assembly, {"mass_kg": _rounded(total.mass), "com_m": com})
 
 
 def _properties(part: PartResult | SubAssemblyResult) -> dict[str, Any]:
     found: dict[str, Any] = {"mass_kg": _rounded(part.mass)}
     if part.volume:
         found["volume_m3"] = _rounded(part.volume)
-    if part.volume and part.com is not None:
-        found["com_m"] = tuple(_rounded(value) for value in part.com)
+        if part.com is not None:
+            found["com_m"] = [_rounded(value) for value in part.com]
     return found
-
-
-def _json(properties: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: list(value) if isinstance(value, tuple) else value for key, value in properties.items()}
 
 
 def _rounded(value: float) -> float:
