@@ -47,12 +47,11 @@ def block(number: int) -> Any:
     from OCP.TopExp import TopExp_Explorer
     from OCP.TopoDS import TopoDS
 
-    as_edge = getattr(TopoDS, "Edge_s", None) or TopoDS.Edge
     shape = BRepPrimAPI_MakeBox(60.0 + number / 7, 30.0, 20.0).Shape()
     fillet = BRepFilletAPI_MakeFillet(shape)
     edges = TopExp_Explorer(shape, TopAbs_EDGE)
     while edges.More():
-        fillet.Add(3.0, as_edge(edges.Current()))
+        fillet.Add(3.0, TopoDS.Edge(edges.Current()))
         edges.Next()
     shape = fillet.Shape()
     for k in range(10):

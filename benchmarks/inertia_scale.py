@@ -63,8 +63,6 @@ def parts() -> list[Any]:
     from OCP.TopExp import TopExp_Explorer
     from OCP.TopoDS import TopoDS
 
-    as_edge = getattr(TopoDS, "Edge_s", None) or TopoDS.Edge
-
     def plate(n: int) -> Any:
         shape = BRepPrimAPI_MakeBox(60.0 + n, 30.0, 6.0).Shape()
         for k in range(4):
@@ -82,7 +80,7 @@ def parts() -> list[Any]:
         fillet = BRepFilletAPI_MakeFillet(block)
         edges = TopExp_Explorer(block, TopAbs_EDGE)
         while edges.More():
-            fillet.Add(3.0, as_edge(edges.Current()))
+            fillet.Add(3.0, TopoDS.Edge(edges.Current()))
             edges.Next()
         return fillet.Shape()
 

@@ -30,20 +30,16 @@ def _options(density: float, **more: Any) -> Any:
 
 def test_several_solids_share_their_rows_mass(assemble: Fixture, compute: Fixture, part: Fixture) -> None:
     """One row, one product, two bodies: the mass is spread by volume, the centre is that of both."""
-    from silo.inertia.model import Prototype, SolidProps
+    from silo.inertia.geometry.measured import Measured
+    from silo.inertia.model import SolidProps
 
     unit = np.eye(3)
-    product = Prototype(
-        "p",
-        "p",
-        (SolidProps(1e-6, [0, 0, 0], unit * 1e-11), SolidProps(3e-6, [0.04, 0, 0], unit * 1e-10)),
-        4e-6,
-        np.array([0.03, 0, 0]),
-        unit * 2e-9,
-    )
+    solids = (SolidProps(1e-6, [0, 0, 0], unit * 1e-10), SolidProps(3e-6, [0.04, 0, 0], unit * 1e-10))
+    product = Measured(solids, (), None, True).prototype("p", "p")
+    apart = np.diag([0, 1.2e-9, 1.2e-9])  # 1e-6 * 3e-6 / 4e-6 * 0.04², across x
     report = compute(assemble(("l/p", product)), HEAD + "1,1,,,0.400 kg,p\n")
     assert report.links["l"].props.com == pytest.approx([0.03, 0, 0])
-    assert report.links["l"].props.inertia == pytest.approx(unit * 2e-9 * 1e5)
+    assert report.links["l"].props.inertia == pytest.approx((unit * 2e-10 + apart) * 1e5)
 
 
 def test_no_solid_with_a_mass_is_a_point(

@@ -15,15 +15,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from silo.inertia.core import Floats
-from silo.inertia.model import Prototype, SolidProps
+from silo.inertia.model import Prototype
 
 
 def body(name: str, volume: float, second: Sequence[float], **more: Any) -> Prototype:
     """A body of ``volume`` [m^3] with principal moments ``second`` [m^2 per unit mass]."""
     unit = np.diag(np.asarray(second, float)) * volume
-    solid = SolidProps(volume, np.zeros(3), unit)
     more.setdefault("key", name)
-    return Prototype(name=name, solids=(solid,), volume_m3=volume, inertia_unit=unit, **more)
+    return Prototype(name=name, volume_m3=volume, inertia_unit=unit, **more)
 
 
 def box(name: str, x: float, y: float, z: float, **more: Any) -> Prototype:

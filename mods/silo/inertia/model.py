@@ -95,7 +95,6 @@ class Prototype:
 
     key: str
     name: str
-    solids: tuple[SolidProps, ...] = ()
     volume_m3: float = 0.0
     com_m: Floats = field(default_factory=lambda: np.zeros(3))
     inertia_unit: Floats = field(default_factory=lambda: np.zeros((3, 3)))

@@ -7,7 +7,6 @@ same trait, which its docstring names, and goes the whole way: geometry, BOM, ma
 
 from __future__ import annotations
 
-import importlib
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from OCP import collections
 from OCP.BRep import BRep_Builder
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakeWire
@@ -25,7 +25,6 @@ from OCP.TopoDS import TopoDS_Compound
 from step_writer import trsf_of
 
 from silo.inertia.codes import Decided, Rule
-from silo.inertia.geometry.kernel import occt
 from silo.inertia.model import GeometryCode
 
 Fixture = Callable[..., Any]
@@ -218,13 +217,9 @@ def step_of(step: Fixture, folder: Path, name: str, shape: Any) -> Path:
 
 
 def array_of_points(points: np.ndarray[Any, Any]) -> Any:
-    """(n, 3) or (n, m, 3) [mm] as an array of the kernel; its class moved in version 8."""
+    """(n, 3) or (n, m, 3) [mm] as an array of the kernel."""
     size, kind = points.shape[:-1], points.ndim - 1
-    if int(occt.VERSION.split(".")[0]) >= 8:
-        module, name = importlib.import_module("OCP.collections"), f"Array{kind}_gp_Pnt"
-    else:
-        module, name = importlib.import_module("OCP.TColgp"), f"TColgp_Array{kind}OfPnt"
-    array = getattr(module, name)(*(bound for n in size for bound in (1, n)))
+    array = getattr(collections, f"Array{kind}_gp_Pnt")(*(bound for n in size for bound in (1, n)))
     for index in np.ndindex(*size):
         array.SetValue(*(i + 1 for i in index), gp_Pnt(*(float(v) for v in points[index])))
     return array

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from silo.bom.errors import InputError
 from silo.inertia.geometry.graph import Child, Node, bottom_up, count_instances, unfold, unique_names
-from silo.inertia.geometry.labels import clean, has_lost_characters, is_generic
+from silo.inertia.geometry.labels import clean, is_generic, lost_characters
 from silo.inertia.geometry.step.part21 import Ref, Typed, decoded, scan
 from silo.inertia.geometry.step.product_text import WANTED
 
@@ -103,9 +103,9 @@ def test_names_that_people_give_are_names(name: str) -> None:
 
 def test_lost_characters_and_control_characters() -> None:
     """Mojibake is kept and known; control characters are nobody's name."""
-    assert has_lost_characters("Pe?a")
-    assert has_lost_characters("Pe\ufffda")
-    assert not has_lost_characters("Peça")
+    assert lost_characters("Pe?a")
+    assert lost_characters("Pe\ufffda")
+    assert not lost_characters("Peça")
     assert clean(" a\x00b\x1b[31m\u200b ") == "ab[31m"
 
 

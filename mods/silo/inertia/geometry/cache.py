@@ -48,14 +48,8 @@ def key_of(path: Path, options: Mapping[str, Any]) -> str:
 
 def key_parts(path: Path, options: Mapping[str, Any]) -> list[str]:
     """All that a result depends on. The file's name counts: unnamed parts are called after it."""
-    return [
-        content_hash(path),
-        path.name,
-        str(store.FORMAT),
-        _versions(),
-        measured_by(),
-        json.dumps(options, sort_keys=True),
-    ]
+    content, asked = content_hash(path), json.dumps(options, sort_keys=True)
+    return [content, path.name, str(store.FORMAT), _versions(), measured_by(), asked]
 
 
 @cache

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""What any file may have wrong: its unit, its names, placements that scale. Pure."""
+"""What any file may have wrong: its unit, placements that scale or coincide. Pure."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from silo.inertia.core import rigid_mask
-from silo.inertia.geometry.labels import has_lost_characters
+from silo.inertia.geometry.graph import Unfolded
 from silo.inertia.geometry.mesh import Mesh
-from silo.inertia.model import GeometryCode, GeometryProblem, Instance, Prototype
+from silo.inertia.model import Assembly, GeometryCode, GeometryProblem, Instance, Prototype
 
 LARGE_M, SMALL_M = 20.0, 5e-4
 """A part whose largest extent [m] is outside of this was probably meant in another unit."""
@@ -30,54 +30,57 @@ def implausible_size(prototypes: Mapping[str, Prototype], unit: str) -> list[Geo
     ]
 
 
-def name_problems(name: str, unnamed: bool) -> list[GeometryProblem]:
-    """What may keep a name from being found in a BOM."""
-    problems = []
-    if has_lost_characters(name):
-        problems.append(
-            GeometryProblem(GeometryCode.NAME, f"characters of its name were lost in the export: '{name}'")
-        )
-    if unnamed:
-        problems.append(
-            GeometryProblem(
-                GeometryCode.NAME, f"it has no name in the file; called '{name}' after what holds it"
-            )
-        )
-    return problems
-
-
-def scaled_problems(instances: Sequence[Instance]) -> list[GeometryProblem]:
-    """One problem for all placements that scale; mirrored ones are rigid and need none."""
+def placement_problems(instances: Sequence[Instance]) -> list[GeometryProblem]:
+    """Placements that scale (mirrored ones are rigid), and parts that are placed twice at one place."""
     if not instances:
         return []
     placements = np.array([instance.transform for instance in instances])
     scaled = [i.name for i, rigid in zip(instances, rigid_mask(placements), strict=True) if not rigid]
-    if not scaled:
-        return []
-    more = f" and {len(scaled) - 3} more" if len(scaled) > 3 else ""
-    return [
-        GeometryProblem(
-            GeometryCode.SCALED,
-            f"placements that scale their part: {len(scaled)} ({', '.join(scaled[:3])}{more}); "
-            "volume and inertia are scaled with it, a mass from the BOM is not",
-        )
-    ]
-
-
-def coincident_problems(instances: Sequence[Instance]) -> list[GeometryProblem]:
-    """One problem for all parts that stand exactly where the same part stands already."""
-    seen: dict[tuple[str, bytes], Instance] = {}
+    seen: set[tuple[str, bytes]] = set()
     twice = []
     # 0.1 µm and 1e-7 of a turn; adding 0 makes -0 the 0 that it is.
-    places = np.round([instance.transform for instance in instances], 7) + 0.0
-    for instance, place in zip(instances, places, strict=True):
-        if seen.setdefault((instance.prototype, place.tobytes()), instance) is not instance:
+    for instance, place in zip(instances, np.round(placements, 7) + 0.0, strict=True):
+        here = (instance.prototype, place.tobytes())
+        if here in seen:
             twice.append(instance.name)
-    if not twice:
-        return []
-    more = f" and {len(twice) - 3} more" if len(twice) > 3 else ""
-    words = (
-        f"parts that stand exactly where the same part stands already: {len(twice)} "
-        f"({', '.join(twice[:3])}{more}); all of them are counted"
+        seen.add(here)
+    problems = []
+    if scaled:
+        words = (
+            f"placements that scale their part: {_some(scaled)}; "
+            "volume and inertia are scaled with it, a mass from the BOM is not"
+        )
+        problems.append(GeometryProblem(GeometryCode.SCALED, words))
+    if twice:
+        words = (
+            f"parts that stand exactly where the same part stands already: {_some(twice)}; "
+            "all of them are counted"
+        )
+        problems.append(GeometryProblem(GeometryCode.COINCIDENT_PARTS, words))
+    return problems
+
+
+def _some(names: Sequence[str]) -> str:
+    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+    return f"{len(names)} ({', '.join(names[:3])}{more})"
+
+
+def assembled(
+    unfolded: Unfolded,
+    prototypes: Mapping[str, Prototype],
+    problems: Sequence[GeometryProblem],
+    *,
+    name: str,
+    source: str,
+    unit: str,
+) -> Assembly:
+    """What a reader found, as an assembly; the problems of its placements are added."""
+    return Assembly(
+        name=name,
+        prototypes=prototypes,
+        instances=tuple(unfolded.instances),
+        problems=(*problems, *placement_problems(unfolded.instances)),
+        source=source,
+        unit=unit,
+        frames=unfolded.frames,
     )
-    return [GeometryProblem(GeometryCode.COINCIDENT_PARTS, words)]

@@ -42,6 +42,13 @@ _SUFFIXES = {
     ".3mf": Kind.THREEMF,
 }
 
+_OTHERS = {
+    b"<?xml": "is XML. STEP AP242 XML (.stpx) holds no geometry; export the assembly as STEP text (.step)",
+    b"\x1f\x8b": "is compressed (gzip); unpack it first",
+    b"PK": "is a zip archive, and no FreeCAD document or 3MF file; unpack it first",
+}
+"""What is refused with a word of its own, by its first bytes."""
+
 _HEAD_BYTES = 1024
 READABLE = "STEP, FCStd, BREP, STL, OBJ, 3MF, GLB, PLY"
 
@@ -60,6 +67,9 @@ def detect(path: Path) -> Kind:
     if by_suffix in (Kind.STL, Kind.OBJ):
         # A binary STL begins with 80 free bytes and an OBJ with anything: only the suffix can say it.
         return by_suffix
+    for start, words in _OTHERS.items():
+        if head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(start):
+            raise DocumentError(str(path), words)
     if by_suffix is not None:
         raise DocumentError(
             str(path), f"is named like a {by_suffix.value} file, but its content is not; export it again"

@@ -39,6 +39,13 @@ class Node:
     has_geometry: bool = False
 
 
+def in_metres(matrix: Floats, unit: float = 1e-3) -> Floats:
+    """The same (4, 4) placement, its translation in m instead of in ``unit`` [m], mm by default."""
+    result = matrix.copy()
+    result[:3, 3] *= unit
+    return result
+
+
 MAX_DEPTH = 200
 """Levels of sub-assemblies; real ones stay below 15, and Python's own stack ends near 500."""
 
@@ -51,6 +58,11 @@ class Unfolded:
         self._inside: dict[str, tuple[tuple[str, ...], Floats]] = {}
         self.instances: list[Instance] = []
         self.frames: dict[tuple[str, ...], Floats] = {}
+
+    @property
+    def placed(self) -> list[str]:
+        """The products with geometry that are placed, each once, in order."""
+        return list(dict.fromkeys(instance.prototype for instance in self.instances))
 
     def place(self, key: str, path: tuple[str, ...], products: tuple[str, ...], transform: Floats) -> None:
         """One use of a product at ``path``; ``products`` are the names of those around it."""

@@ -9,6 +9,8 @@ import unicodedata
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
+from silo.inertia.model import GeometryCode, GeometryProblem
+
 _GENERIC = re.compile(r"(?:(?:SOLID|COMPOUND|COMPSOLID|SHELL|FACE|WIRE|EDGE|VERTEX)(?:_?\d+)?|=>\[[\d:]*\])?")
 _SUFFIXES = (".step", ".stp", ".p21")
 MAX_ENTRIES = 20_000
@@ -20,9 +22,12 @@ def is_generic(name: str) -> bool:
     return _GENERIC.fullmatch(name.strip()) is not None
 
 
-def has_lost_characters(name: str) -> bool:
-    """True where an exporter put "?" or U+FFFD for what its character set lacks ("Peça" → "Pe?a")."""
-    return "?" in name or "\ufffd" in name
+def lost_characters(name: str) -> list[GeometryProblem]:
+    """Exporters put "?" or U+FFFD for what their character set lacks ("Peça" → "Pe?a"); no BOM has that."""
+    if "?" not in name and "\ufffd" not in name:
+        return []
+    words = f"characters of its name were lost in the export: '{name}'"
+    return [GeometryProblem(GeometryCode.NAME, words)]
 
 
 def clean(name: str) -> str:

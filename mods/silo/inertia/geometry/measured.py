@@ -4,13 +4,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
-import numpy as np
-
-from silo.inertia.core import combine_arrays
-from silo.inertia.geometry.mesh import Floats, Mesh
-from silo.inertia.geometry.together import Together
-from silo.inertia.model import GeometryCode, GeometryProblem, SolidProps
+from silo.inertia.geometry.labels import lost_characters
+from silo.inertia.geometry.mesh import Mesh
+from silo.inertia.geometry.together import Together, combined
+from silo.inertia.model import GeometryCode, GeometryProblem, Prototype, SolidProps
 from silo.inertia.wording import counted
 
 STATED = 5e-5
@@ -36,14 +35,6 @@ NO_VOLUME: Note = (
 INVALID: Note = (GeometryCode.INVALID_SHAPE, "the geometry kernel's own check finds this shape invalid")
 
 
-@dataclass(frozen=True, slots=True)
-class Gap:
-    """What keeps a solid from being closed: open edges, and its volume [m^3] taken from another point."""
-
-    edges: int
-    other_m3: float
-
-
 @dataclass(frozen=True, eq=False)
 class Measured:
     """What was found in one prototype; ``has_faces``, ``has_wires``: what there is without a solid."""
@@ -54,17 +45,25 @@ class Measured:
     has_faces: bool
     has_wires: bool = False
 
-    @property
-    def total(self) -> tuple[float, Floats, Floats]:
-        """Volume [m^3], centre (3,) [m], tensor per unit density (3, 3) [m^5] about it, of all solids."""
+    def prototype(
+        self, key: str, name: str, *more: GeometryProblem, empty: GeometryProblem | None = None, **stated: Any
+    ) -> Prototype:
+        """The product with these solids; ``empty`` says why there is none, ``stated`` what the file gives."""
+        whole = combined(self.solids)
+        problems = [*self.problems, *more]
         if not self.solids:
-            return 0.0, np.zeros(3), np.zeros((3, 3))
-        body = combine_arrays(
-            [s.volume_m3 for s in self.solids],
-            np.array([s.com_m for s in self.solids]),
-            np.array([s.inertia_unit for s in self.solids]),
+            problems.append(empty or no_solid(self))
+        return Prototype(
+            key=key,
+            name=name,
+            volume_m3=whole.volume_m3,
+            com_m=whole.com_m,
+            inertia_unit=whole.inertia_unit,
+            has_solid=bool(self.solids),
+            problems=(*problems, *lost_characters(name)),
+            mesh=self.mesh,
+            **stated,
         )
-        return body.mass, body.com, body.inertia
 
 
 def integration_notes(
@@ -132,12 +131,9 @@ def shell_note(shells: int, solids: int) -> GeometryProblem:
     return GeometryProblem(GeometryCode.SHELL_VOLUME, words)
 
 
-def open_note(gap: Gap, volume_m3: float) -> Note:
-    """A solid whose faces do not close."""
-    words = (
-        f"its faces do not close ({counted(gap.edges, 'open edge')}), so it has no exact volume: "
-        f"{volume_m3 * 1e6:.6g} cm³ from its middle, {gap.other_m3 * 1e6:.6g} cm³ from a corner of its box"
-    )
+def open_note(edges: int) -> Note:
+    """A solid whose faces do not close, or disagree on what is outside."""
+    words = f"its faces do not close ({counted(edges, 'open edge')}), so it has no exact volume"
     return (GeometryCode.OPEN_SHELL, words)
 
 

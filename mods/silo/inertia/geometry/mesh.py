@@ -51,6 +51,12 @@ class Mesh:
         size: Floats = np.ptp(self.vertices, axis=0)
         return size
 
+    def moved(self, matrix: Floats) -> Mesh:
+        """The same triangles after a placement ((4, 4) [m]); one that mirrors turns them over."""
+        mirrored = np.linalg.det(matrix[:3, :3]) < 0
+        faces = self.faces[:, ::-1] if mirrored else self.faces
+        return Mesh(self.vertices @ matrix[:3, :3].T + matrix[:3, 3], faces)
+
 
 def joined(parts: list[Mesh]) -> Mesh:
     """Several meshes as one, in order."""
@@ -62,14 +68,11 @@ def joined(parts: list[Mesh]) -> Mesh:
 
 
 def mesh_volume(mesh: Mesh) -> float:
-    """Signed volume [m^3] by trimesh; negative where the faces look inwards."""
+    """Signed volume [m^3]; negative where the faces look inwards. Without trimesh, which FreeCAD lacks."""
     if not len(mesh):
         return 0.0
-    from trimesh.triangles import mass_properties
-
-    corners = _centred(mesh)[0][mesh.faces]
-    with np.errstate(all="ignore"):  # the centre of a flat mesh is 0/0; nobody asks for it here
-        return float(mass_properties(corners, skip_inertia=True).volume)
+    a, b, c = np.moveaxis(_centred(mesh)[0][mesh.faces], 1, 0)
+    return float(np.einsum("ni,ni->", a, np.cross(b, c)) / 6)
 
 
 def mesh_solid(mesh: Mesh) -> SolidProps:
@@ -123,8 +126,8 @@ def _merged(vertices: Floats, faces: Indices) -> Mesh:
     return Mesh(unique, faces[~flat])
 
 
-def without_doubled(mesh: Mesh) -> tuple[Mesh, int, int]:
-    """The mesh with each triangle once: (mesh, repeated triangles, triangles that met their own back).
+def without_doubled(mesh: Mesh) -> tuple[Mesh, int]:
+    """The mesh with each triangle once, and how many were repeated.
 
     Triangles that stand there twice are a copy; a triangle and the same turned over enclose nothing.
     """
@@ -134,7 +137,7 @@ def without_doubled(mesh: Mesh) -> tuple[Mesh, int, int]:
     kinds, kind = np.unique(rows, axis=0, return_inverse=True)
     kind = kind.reshape(-1)
     if len(kinds) == len(mesh.faces):
-        return mesh, 0, 0
+        return mesh, 0
     forward = np.bincount(kind, weights=even, minlength=len(kinds))
     backward = np.bincount(kind, weights=~even, minlength=len(kinds))
     kept = np.zeros(len(mesh.faces), dtype=bool)
@@ -143,7 +146,7 @@ def without_doubled(mesh: Mesh) -> tuple[Mesh, int, int]:
         side = even if forward[number] > backward[number] else ~even
         kept[np.nonzero((kind == number) & side)[0][0]] = True
     met = 2 * int(np.minimum(forward, backward).sum())
-    return Mesh(mesh.vertices, mesh.faces[kept]), int(len(mesh.faces) - kept.sum()) - met, met
+    return Mesh(mesh.vertices, mesh.faces[kept]), int(len(mesh.faces) - kept.sum()) - met
 
 
 _EVEN = [0 * 9 + 1 * 3 + 2, 1 * 9 + 2 * 3 + 0, 2 * 9 + 0 * 3 + 1]

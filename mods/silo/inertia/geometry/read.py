@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import IO, Any
 
-from silo.bom.errors import CancelledError, ConfigError, DocumentError, SiloError
+from silo.bom.errors import CancelledError, ConfigError, DocumentError, InputError, SiloError
 from silo.folders import scratch_folder
 from silo.inertia.geometry import isolate, store
 from silo.inertia.geometry.cache import Cache, changed_since, default_folder, key_of, provenance
@@ -86,6 +86,15 @@ def _content(kind: Kind, options: ReadOptions) -> dict[str, Any]:
 
 def read_here(path: Path, options: ReadOptions, report: Report, helpers: Helpers) -> Reading:
     """Read in this process, and in the helpers: what the child does."""
+    try:
+        return _reading(path, options, report, helpers)
+    except (DocumentError, ConfigError):
+        raise
+    except InputError as error:  # of a structure that does not end
+        raise DocumentError(str(path), str(error)) from error
+
+
+def _reading(path: Path, options: ReadOptions, report: Report, helpers: Helpers) -> Reading:
     kind = detect(path)
     if kind is Kind.STEP:
         text = begin(path, options, helpers)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import zipfile
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -16,17 +17,16 @@ from numpy.typing import NDArray
 
 from silo.bom.errors import InputError
 from silo.inertia.geometry.mesh import Mesh
-from silo.inertia.model import Assembly, GeometryProblem, Instance, Prototype, SolidProps
+from silo.inertia.model import Assembly, GeometryProblem, Instance, Prototype
 
-FORMAT = 1
+FORMAT = 2
 """Raise it when the form, or the meaning of a number in it, changes."""
 
 
 def save(assembly: Assembly, path: Path, extra: dict[str, Any] | None = None) -> None:
     """Write ``assembly`` to ``path``; ``extra`` is kept beside it (JSON values)."""
     prototypes = list(assembly.prototypes.values())
-    solids = [solid for prototype in prototypes for solid in prototype.solids]
-    words = _Words()
+    number = {prototype.key: n for n, prototype in enumerate(prototypes)}
     header = {
         "format": FORMAT,
         "name": assembly.name,
@@ -34,28 +34,19 @@ def save(assembly: Assembly, path: Path, extra: dict[str, Any] | None = None) ->
         "unit": assembly.unit,
         "problems": _problems_out(assembly.problems),
         "prototypes": [_prototype_out(p) for p in prototypes],
-        "paths": [words.row(i.path) for i in assembly.instances],
-        "products": [words.row(i.product_path) for i in assembly.instances],
-        "frames": [words.row(path) for path in assembly.frames],
-        "words": words.words,
+        "instances": [(i.path, i.product_path, number[i.prototype]) for i in assembly.instances],
+        "frames": list(assembly.frames),
         "extra": extra or {},
     }
-    position = {p.key: n for n, p in enumerate(prototypes)}
     arrays: dict[str, NDArray[Any]] = {
         "header": np.frombuffer(json.dumps(header).encode("utf-8"), dtype=np.uint8),
-        "proto": _rows([np.r_[p.volume_m3, p.com_m, p.inertia_unit.ravel()] for p in prototypes], 13),
-        "solids": _rows(
-            [np.r_[s.volume_m3, s.com_m, s.inertia_unit.ravel(), float(s.reversed)] for s in solids], 14
-        ),
-        "solid_counts": np.array([len(p.solids) for p in prototypes], dtype=np.int64),
-        "instance_prototype": np.array([position[i.prototype] for i in assembly.instances], dtype=np.int64),
-        "transforms": _rows([i.transform.ravel() for i in assembly.instances], 16),
-        "frames": _rows([np.asarray(f).ravel() for f in assembly.frames.values()], 16),
+        "transforms": np.array([i.transform for i in assembly.instances]),
+        "frames": np.array(list(assembly.frames.values())),
     }
-    for number, prototype in enumerate(prototypes):
+    for n, prototype in enumerate(prototypes):
         if isinstance(prototype.mesh, Mesh):
-            arrays[f"vertices_{number}"] = prototype.mesh.vertices.astype(np.float32)
-            arrays[f"faces_{number}"] = prototype.mesh.faces.astype(np.int32)
+            arrays[f"vertices_{n}"] = prototype.mesh.vertices.astype(np.float32)
+            arrays[f"faces_{n}"] = prototype.mesh.faces.astype(np.int32)
     with path.open("wb") as stream:
         np.savez(stream, **arrays)  # type: ignore[arg-type]
 
@@ -69,25 +60,6 @@ def load(path: Path) -> tuple[Assembly, dict[str, Any]]:
         raise InputError(f"{path}: is no stored geometry of format {FORMAT}: {error}") from error
 
 
-class _Words:
-    """Names repeat by the thousand; each is written once."""
-
-    def __init__(self) -> None:
-        self.words: list[str] = []
-        self._known: dict[str, int] = {}
-
-    def row(self, names: tuple[str, ...]) -> list[int]:
-        for name in names:
-            if name not in self._known:
-                self._known[name] = len(self.words)
-                self.words.append(name)
-        return [self._known[name] for name in names]
-
-
-def _rows(rows: list[NDArray[np.float64]], width: int) -> NDArray[np.float64]:
-    return np.array(rows, dtype=np.float64).reshape(-1, width)
-
-
 def _problems_out(problems: tuple[GeometryProblem, ...]) -> list[list[str]]:
     return [[str(p.code), p.message] for p in problems]
 
@@ -97,71 +69,34 @@ def _problems_in(rows: list[list[str]]) -> tuple[GeometryProblem, ...]:
 
 
 def _prototype_out(prototype: Prototype) -> dict[str, Any]:
-    return {
-        "key": prototype.key,
-        "name": prototype.name,
-        "has_solid": prototype.has_solid,
-        "problems": _problems_out(prototype.problems),
-        "step_density": prototype.step_density,
-        "step_material": prototype.step_material,
-        "stated_volume_m3": prototype.stated_volume_m3,
-        "part_number": prototype.part_number,
-    }
+    values = {f.name: getattr(prototype, f.name) for f in fields(prototype) if f.name != "mesh"}
+    values["problems"] = _problems_out(prototype.problems)
+    return {name: v.tolist() if isinstance(v, np.ndarray) else v for name, v in values.items()}
 
 
 def _assembly_in(arrays: Any) -> tuple[Assembly, dict[str, Any]]:
     header = json.loads(bytes(arrays["header"]).decode("utf-8"))
     if header.get("format") != FORMAT:
         raise InputError(f"wanted stored geometry of format {FORMAT}, got {header.get('format')!r}")
-    words: list[str] = header["words"]
-    prototypes = _prototypes_in(header["prototypes"], arrays)
-    keys = list(prototypes)
-
-    def name(row: list[int]) -> tuple[str, ...]:
-        return tuple(words[n] for n in row)
-
-    transforms = arrays["transforms"].reshape(-1, 4, 4)
+    prototypes = [_prototype_in(n, row, arrays) for n, row in enumerate(header["prototypes"])]
     instances = tuple(
-        Instance(name(path), name(products), keys[number], transform)
-        for path, products, number, transform in zip(
-            header["paths"],
-            header["products"],
-            arrays["instance_prototype"].tolist(),
-            transforms,
-            strict=True,
-        )
+        Instance(tuple(path), tuple(products), prototypes[n].key, transform)
+        for (path, products, n), transform in zip(header["instances"], arrays["transforms"], strict=True)
     )
-    frames = arrays["frames"].reshape(-1, 4, 4)
     assembly = Assembly(
         name=header["name"],
-        prototypes=prototypes,
+        prototypes={prototype.key: prototype for prototype in prototypes},
         instances=instances,
         problems=_problems_in(header["problems"]),
         source=header["source"],
         unit=header["unit"],
-        frames={name(row): frame for row, frame in zip(header["frames"], frames, strict=True)},
+        frames={tuple(path): f for path, f in zip(header["frames"], arrays["frames"], strict=True)},
     )
     return assembly, header["extra"]
 
 
-def _prototypes_in(rows: list[dict[str, Any]], arrays: Any) -> dict[str, Prototype]:
-    numbers, solids = arrays["proto"], arrays["solids"]
-    counts = arrays["solid_counts"].tolist()
-    ends = np.cumsum(counts).tolist()
-    result = {}
-    for n, row in enumerate(rows):
-        mesh = None
-        if f"faces_{n}" in arrays.files:
-            mesh = Mesh(arrays[f"vertices_{n}"], arrays[f"faces_{n}"])
-        result[row["key"]] = Prototype(
-            **{**row, "problems": _problems_in(row["problems"])},
-            solids=tuple(
-                SolidProps(float(s[0]), s[1:4], s[4:13].reshape(3, 3), bool(s[13]))
-                for s in solids[ends[n] - counts[n] : ends[n]]
-            ),
-            volume_m3=float(numbers[n, 0]),
-            com_m=numbers[n, 1:4],
-            inertia_unit=numbers[n, 4:13].reshape(3, 3),
-            mesh=mesh,
-        )
-    return result
+def _prototype_in(number: int, row: dict[str, Any], arrays: Any) -> Prototype:
+    mesh = None
+    if f"faces_{number}" in arrays.files:
+        mesh = Mesh(arrays[f"vertices_{number}"], arrays[f"faces_{number}"])
+    return Prototype(**{**row, "problems": _problems_in(row["problems"])}, mesh=mesh)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any
 
@@ -248,12 +248,20 @@ def _tell(
 
 
 def _minus(body: SolidProps, cavity: SolidProps) -> SolidProps:
-    rest = combine_arrays(
-        [body.volume_m3, -cavity.volume_m3],
-        np.array([body.com_m, cavity.com_m]),
-        np.array([body.inertia_unit, -cavity.inertia_unit]),
+    nothing = replace(cavity, volume_m3=-cavity.volume_m3, inertia_unit=-cavity.inertia_unit)
+    return replace(combined([body, nothing]), reversed=body.reversed)
+
+
+def combined(solids: Sequence[SolidProps]) -> SolidProps:
+    """All solids as one; no volume at the origin where there is none."""
+    if not solids:
+        return NOTHING
+    whole = combine_arrays(
+        [s.volume_m3 for s in solids],
+        np.array([s.com_m for s in solids]),
+        np.array([s.inertia_unit for s in solids]),
     )
-    return SolidProps(rest.mass, rest.com, rest.inertia, body.reversed)
+    return SolidProps(whole.mass, whole.com, whole.inertia)
 
 
 NOTHING = SolidProps(0.0, np.zeros(3), np.zeros((3, 3)))
@@ -302,13 +310,13 @@ def _closed(body: Body) -> Any:
 
 def enclosed(mesh: Mesh, problems: list[GeometryProblem]) -> SolidProps:
     """The moments of a part's triangles; every doubt is added to ``problems``."""
-    mesh, repeated, _ = without_doubled(mesh)
+    mesh, repeated = without_doubled(mesh)
     if repeated:
         what = counted(repeated, "of its triangles is", "of its triangles are")
         words = f"{what} there more than once; each is counted once"
         problems.append(GeometryProblem(GeometryCode.COINCIDENT_SOLIDS, words))
     if not len(mesh):
-        return SolidProps(0.0, np.zeros(3), np.zeros((3, 3)))
+        return NOTHING
     edges = open_edges(mesh)
     if edges:
         problems.append(_not_closed(mesh, edges))
@@ -324,13 +332,7 @@ def enclosed(mesh: Mesh, problems: list[GeometryProblem]) -> SolidProps:
         which = "the mesh is" if len(pieces) == 1 else f"{found.turned} of its {len(pieces)} pieces are"
         words = f"{which} inside out; the sign was turned"
         problems.append(GeometryProblem(GeometryCode.NEGATIVE_VOLUME, words))
-    solids = found.solids
-    whole = combine_arrays(
-        np.array([s.volume_m3 for s in solids]),
-        np.array([s.com_m for s in solids]),
-        np.array([s.inertia_unit for s in solids]),
-    )
-    return SolidProps(whole.mass, whole.com, whole.inertia, reversed=found.turned > 0)
+    return replace(combined(found.solids), reversed=found.turned > 0)
 
 
 def _body(piece: Mesh) -> Body:

@@ -29,6 +29,7 @@ from silo.inertia.geometry.freecad.stated_materials import (
     told_material,
 )
 from silo.inertia.geometry.freecad.walk import Leaf, Walk
+from silo.inertia.geometry.graph import in_metres
 from silo.inertia.geometry.measured import (
     INVALID,
     NO_VOLUME,
@@ -41,7 +42,7 @@ from silo.inertia.geometry.measured import (
     mesh_notes,
     shell_note,
 )
-from silo.inertia.geometry.mesh import PICTURE_TRIANGLES, Floats, Mesh, joined, simplified
+from silo.inertia.geometry.mesh import PICTURE_TRIANGLES, Floats, Mesh, joined, mesh_volume, simplified
 from silo.inertia.geometry.options import ReadOptions, Report
 from silo.inertia.geometry.together import Body, together
 from silo.inertia.model import Assembly, GeometryCode, GeometryProblem, SolidProps
@@ -178,7 +179,7 @@ class _Product:
         meshes = [body.mesh for body in bodies if body.mesh is not None]
         if self.mesh_check and not solids and faces:
             meshes = [
-                _moved(_mesh(shape, _fineness(shape)), matrix) for shape, matrix in placed if shape.Faces
+                _mesh(shape, _fineness(shape)).moved(in_metres(t)) for shape, t in placed if shape.Faces
             ]
         picture = simplified(joined(meshes), PICTURE_TRIANGLES) if meshes else None
         settled = together(bodies, _common, self.problems)
@@ -287,26 +288,17 @@ def _mesh(shape: Any, deflection: float) -> Mesh:
     return Mesh(vertices, np.array(facets, dtype=np.int64).reshape(-1, 3))
 
 
-def mesh_volume(mesh: Mesh) -> float:
-    """Signed volume [m^3]; trimesh, which does this elsewhere, is not there inside FreeCAD."""
-    if not len(mesh):
-        return 0.0
-    corners = (mesh.vertices - mesh.vertices.mean(axis=0))[mesh.faces]
-    return float(np.einsum("ni,ni->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6)
-
-
 def _placed(found: _Solid, moved: Floats, solid: Any, matrix: Floats) -> Body:
     """A measured solid after ``moved``; ``solid`` after ``matrix`` ((4, 4) [mm]) is the same."""
     assert found.props is not None
-    props, metres = found.props, moved.copy()
-    metres[:3, 3] *= MM
+    props, metres = found.props, in_metres(moved)
     volumes, coms, units = place([props.volume_m3], [props.com_m], [props.inertia_unit], [metres])
     there = SolidProps(float(volumes[0]), coms[0], units[0], props.reversed)
     box = solid.BoundBox
     ends = ((box.XMin, box.XMax), (box.YMin, box.YMax), (box.ZMin, box.ZMax))
     corners = np.array([(*corner, 1.0) for corner in product(*ends)]) @ matrix.T
     corners = corners[:, :3] * MM
-    mesh = _moved(found.mesh, moved) if found.mesh is not None else None
+    mesh = found.mesh.moved(metres) if found.mesh is not None else None
     return Body(there, corners.min(axis=0), corners.max(axis=0), mesh, (solid, matrix))
 
 
@@ -346,9 +338,3 @@ def _shape(body: Body) -> Any:
     if body.props.reversed:
         moved.reverse()
     return moved
-
-
-def _moved(mesh: Mesh, matrix: Floats) -> Mesh:
-    mirrored = np.linalg.det(matrix[:3, :3]) < 0
-    faces = mesh.faces[:, ::-1] if mirrored else mesh.faces
-    return Mesh(mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3] * MM, faces)

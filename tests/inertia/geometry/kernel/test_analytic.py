@@ -226,8 +226,6 @@ def test_an_off_axis_assembly_is_exact(box: Any, trsf: Any, step: Any, tmp_path:
 @pytest.mark.parametrize("unit", ["M", "INCH", "CM", "FT"])
 def test_the_file_s_unit_does_not_change_the_part(unit: str, box: Any, step_part: Any, read_in: Any) -> None:
     """The same box written in metres, inches, centimetres and feet is the same box."""
-    if occt.VERSION.startswith("7.8"):
-        pytest.skip("the writer of this version names the unit without converting the numbers")
     assembly = read_in(step_part(box(10, 20, 30), unit=unit))
     assert_body(only(assembly), 6000, (5, 10, 15), box_tensor(10, 20, 30), 30)
     assert assembly.unit == {"M": "m", "INCH": "inch", "CM": "cm", "FT": "foot"}[unit]
@@ -276,7 +274,6 @@ def test_a_product_of_three_solids_is_one_product(box: Any, step: Any, tmp_path:
     assembly = read_in(document.write(tmp_path / "multisolid.step"))
     by_name = {p.name: p for p in assembly.prototypes.values()}
     assert set(by_name) == {"multi", "after"}
-    assert sorted(s.volume_m3 * 1e9 for s in by_name["multi"].solids) == pytest.approx([125, 1000, 7000])
     assert by_name["multi"].volume_m3 == pytest.approx(8125e-9, rel=EXACT)
     assert by_name["after"].volume_m3 == pytest.approx(27e-9, rel=EXACT)
 

@@ -35,7 +35,7 @@ from silo.inertia.geometry.kernel import occt
 from silo.inertia.geometry.kernel.closure import beside_edges
 from silo.inertia.geometry.kernel.moments import solid_moments
 from silo.inertia.geometry.measured import Notes
-from silo.inertia.geometry.step.read import lost_stretches, stated_totals
+from silo.inertia.geometry.step.read import stated_totals
 from silo.inertia.geometry.step.xcaf import Stated, StepFile
 from silo.inertia.model import GeometryCode, Prototype
 
@@ -182,8 +182,6 @@ def test_mirrored_and_scaled_placements_are_exact_or_refused_aloud(
     box: Any, step: Any, tmp_path: Path, read_in: Any, codes_of: Any
 ) -> None:
     """A mirror moves the centre to the other side; a scale of 2 has eight times the volume."""
-    if int(occt.VERSION.split(".")[0]) < 8:
-        pytest.skip(f"the kernel {occt.VERSION} neither writes nor reads such placements")
     mirror, double = gp_Trsf(), gp_Trsf()
     mirror.SetMirror(gp_Ax2(gp_Pnt(0, 0, 0), gp_Dir(1, 0, 0)))
     double.SetScale(gp_Pnt(0, 0, 0), 2.0)
@@ -206,16 +204,6 @@ def test_mirrored_and_scaled_placements_are_exact_or_refused_aloud(
     assert np.linalg.det(assembly.instances[0].transform[:3, :3]) == pytest.approx(-1)
 
 
-def test_stretches_that_the_kernel_drops_are_reported() -> None:
-    """Kernels before version 8 read a mirror as a turn and a scale as nothing; the text gives it away."""
-    plain = {"top": Node("top", "top", (Child("part", "part"),)), "part": Node("part", "part", (), True)}
-    (problem,) = lost_stretches(StepFile(Path("x.step"), stretched=2, nodes=plain))
-    assert "scales or mirrors parts in 2 places" in problem.message
-    mirrored = {**plain, "top": Node("top", "top", (Child("part", "part", np.diag([-1.0, 1, 1, 1])),))}
-    assert lost_stretches(StepFile(Path("x.step"), stretched=2, nodes=mirrored)) == []
-    assert lost_stretches(StepFile(Path("x.step"), stretched=0, nodes=plain)) == []
-
-
 @pytest.mark.parametrize(("stated", "doubts"), [(8e-6, 0), (1e-6, 1), (None, 0)])
 def test_a_stated_total_counts_scaled_parts_as_they_stand(stated: float | None, doubts: int) -> None:
     """A part of 1 cm³, placed twice as large and mirrored: its assembly has 8 cm³."""
@@ -234,7 +222,6 @@ def test_a_solid_inside_out_is_turned_and_said(box: Any, tmp_path: Path, read_in
     (part,) = read_in(path).prototypes.values()
     assert part.volume_m3 == pytest.approx(6e-6, rel=1e-9)
     assert np.linalg.eigvalsh(part.inertia_unit).min() > 0
-    assert part.solids[0].reversed
     assert codes_of(part) == [GeometryCode.NEGATIVE_VOLUME]
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from silo.inertia.geometry.exact.quadrature import Floats
 
 NO_BREAKS: Floats = np.zeros(0)
+"""Of a surface that is smooth, or whose breaks are not known."""
 
 Ask: TypeAlias = Callable[[float, float], tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]]
 """(u, v) → a point of a surface, and its derivatives in u and in v."""
@@ -56,6 +57,7 @@ class Elementary:
     coefficients: Floats
     u_range: tuple[float, float]
     exact: bool = True
+    v_breaks = NO_BREAKS
 
     @classmethod
     def sampled(
@@ -75,11 +77,6 @@ class Elementary:
     def u_breaks(self) -> Floats:
         """The range in quarter turns, in which twelve points are exact to the last digit."""
         return np.array(self.u_range) if self.in_u is Basis.LINEAR else _quarters(*self.u_range)
-
-    @property
-    def v_breaks(self) -> Floats:
-        """None: it is smooth."""
-        return NO_BREAKS
 
     @property
     def order(self) -> int:
@@ -243,16 +240,12 @@ class Turned:
     u_range: tuple[float, float]
     order: int = 12
     exact: bool = True
+    v_breaks = NO_BREAKS
 
     @property
     def u_breaks(self) -> Floats:
         """The range in quarter turns."""
         return _quarters(*self.u_range)
-
-    @property
-    def v_breaks(self) -> Floats:
-        """Not known."""
-        return NO_BREAKS
 
     def at(self, u: Floats, v: Floats) -> tuple[Floats, Floats, Floats]:
         """See :class:`silo.inertia.geometry.exact.quadrature.Surface`."""
@@ -278,11 +271,7 @@ class Asked:
     u_breaks: Floats
     order: int = 10
     exact: bool = False
-
-    @property
-    def v_breaks(self) -> Floats:
-        """Not known."""
-        return NO_BREAKS
+    v_breaks = NO_BREAKS
 
     def at(self, u: Floats, v: Floats) -> tuple[Floats, Floats, Floats]:
         """See :class:`silo.inertia.geometry.exact.quadrature.Surface`."""

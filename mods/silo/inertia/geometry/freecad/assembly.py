@@ -6,11 +6,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from silo.bom.errors import DocumentError, InputError
-from silo.inertia.geometry.checks import coincident_problems, name_problems, scaled_problems
+from silo.bom.errors import DocumentError
+from silo.inertia.geometry import checks
 from silo.inertia.geometry.freecad.walk import Leaf, Walk
 from silo.inertia.geometry.graph import Child, unfold
-from silo.inertia.geometry.measured import Measured, no_solid
+from silo.inertia.geometry.measured import Measured
 from silo.inertia.geometry.options import ReadOptions, Report
 from silo.inertia.model import Assembly, GeometryCode, GeometryProblem, Prototype
 
@@ -21,28 +21,16 @@ Measure = Callable[[Sequence[Leaf], Callable[[int, int], Any]], Sequence[Measure
 def assembled(
     walk: Walk, top: str, source: str, options: ReadOptions, measure: Measure, report: Report
 ) -> Assembly:
-    """The assembly that the walk found below the product ``top``. Raises DocumentError for ``source``."""
-    node = walk.nodes[top]
-    try:
-        unfolded = unfold(walk.nodes, [Child(node.name, top)], options.max_instances)
-    except InputError as error:
-        raise DocumentError(source, str(error)) from error
-    used = list(dict.fromkeys(instance.prototype for instance in unfolded.instances))
+    """The assembly that the walk found below the product ``top``. InputError where it does not end."""
+    unfolded = unfold(walk.nodes, [Child("", top)], options.max_instances)
+    keys = unfolded.placed
     found = measure(
-        [walk.leaves[key] for key in used], lambda number, total: report("measuring", number, total)
+        [walk.leaves[key] for key in keys], lambda number, total: report("measuring", number, total)
     )
-    prototypes = {key: _prototype(walk, key, one) for key, one in zip(used, found, strict=True)}
+    prototypes = {key: _prototype(walk, key, one) for key, one in zip(keys, found, strict=True)}
     problems = [GeometryProblem(code, message) for code, listed in walk.notes.items() for message in listed]
-    problems += scaled_problems(unfolded.instances)
-    problems += coincident_problems(unfolded.instances)
-    return Assembly(
-        name=node.name,
-        prototypes=prototypes,
-        instances=tuple(unfolded.instances),
-        problems=tuple(problems),
-        source=source,
-        unit="mm",
-        frames=unfolded.frames,
+    return checks.assembled(
+        unfolded, prototypes, problems, name=walk.nodes[top].name, source=source, unit="mm"
     )
 
 
@@ -63,29 +51,15 @@ def one_by_one(measure: Callable[[Leaf], Measured]) -> Measure:
 
 
 def _prototype(walk: Walk, key: str, found: Measured | str) -> Prototype:
-    node, leaf = walk.nodes[key], walk.leaves[key]
-    problems = name_problems(node.name, unnamed=False)
+    leaf = walk.leaves[key]
     measured = Measured((), (), None, False) if isinstance(found, str) else found
-    if isinstance(found, str):
-        problems.append(GeometryProblem(GeometryCode.NO_GEOMETRY, found))
-    problems += measured.problems
-    if leaf.broken:
-        problems.append(GeometryProblem(GeometryCode.NO_GEOMETRY, leaf.broken))
-    elif not measured.solids:
-        problems.append(no_solid(measured))
-    if leaf.material.problem:
-        problems.append(GeometryProblem("material", leaf.material.problem))
-    volume, com, inertia = measured.total
-    return Prototype(
-        key=key,
-        name=node.name,
-        solids=measured.solids,
-        volume_m3=volume,
-        com_m=com,
-        inertia_unit=inertia,
-        has_solid=bool(measured.solids),
-        problems=tuple(problems),
-        step_density=leaf.material.density,
-        step_material=leaf.material.name,
-        mesh=measured.mesh,
+    broken = leaf.broken or (found if isinstance(found, str) else "")
+    stated = leaf.material
+    return measured.prototype(
+        key,
+        walk.nodes[key].name,
+        *([GeometryProblem("material", stated.problem)] if stated.problem else []),
+        empty=GeometryProblem(GeometryCode.NO_GEOMETRY, broken) if broken else None,
+        step_density=stated.density,
+        step_material=stated.name,
     )

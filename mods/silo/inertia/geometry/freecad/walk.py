@@ -33,7 +33,7 @@ from silo.bom.walk.targets import is_assembly_link, is_link
 from silo.inertia.geometry.freecad.facts import Facts, element_places, file_of, link_placement, scale
 from silo.inertia.geometry.freecad.members import MODELLED, child_named, counted, steps_of
 from silo.inertia.geometry.freecad.stated_materials import NOTHING, Material
-from silo.inertia.geometry.graph import MAX_DEPTH, Child, Floats, Node
+from silo.inertia.geometry.graph import MAX_DEPTH, Child, Floats, Node, in_metres
 
 MAX_HOPS = 64
 
@@ -115,7 +115,7 @@ class Walk:
         for member in found:
             children += self._uses(member, moved.get(object_name(member)))
         if beside := loose_hardware(obj, self._reader):
-            inwards = np.linalg.inv(_metres(self.facts.placement(obj)))
+            inwards = np.linalg.inv(in_metres(self.facts.placement(obj)))
             for member in beside:
                 children += [
                     replace(use, transform=inwards @ use.transform) for use in self._uses(member, None)
@@ -191,12 +191,11 @@ class Walk:
         if kind is Kind.COMPOUND and self._is_hardware(member):
             outer = self.facts.placement(member)
             uses = (use for source in sources(member) for use in self._resolved(source, True, None, MAX_HOPS))
-            return [Child(name, key, _metres(outer @ inner)) for key, inner in uses]
+            return [Child(name, key, in_metres(outer @ inner)) for key, inner in uses]
         if kind in (Kind.LINK, Kind.ASSEMBLY_LINK):
             self._remark(member)
-        return [
-            Child(name, key, _metres(matrix)) for key, matrix in self._resolved(member, True, moved, MAX_HOPS)
-        ]
+        found = self._resolved(member, True, moved, MAX_HOPS)
+        return [Child(name, key, in_metres(matrix)) for key, matrix in found]
 
     def _resolved(
         self, obj: Any, with_place: bool, moved: Floats | None, hops: int
@@ -261,7 +260,7 @@ class Walk:
         base = base[0] if isinstance(base, tuple) else base
         places = self.facts.places(array)
         if base is None or (not places and self.facts.shape(array) is not None):
-            return [Child(label_of(array), self.product(array), _metres(self.facts.placement(array)))]
+            return [Child(label_of(array), self.product(array), in_metres(self.facts.placement(array)))]
         count = own(array, "Count", 0)
         if not places and isinstance(count, int) and count > 1:
             words = f"the array “{label_of(array)}” was saved without its {count} placements; counted once"
@@ -269,7 +268,7 @@ class Walk:
         inside = self._resolved(base, own(array, "LinkTransform") is True, None, MAX_HOPS)
         outer = self.facts.placement(array)
         return [
-            Child(label_of(array), key, _metres(outer @ place @ inner))
+            Child(label_of(array), key, in_metres(outer @ place @ inner))
             for place in places or [np.eye(4)]
             for key, inner in inside
         ]
@@ -292,9 +291,3 @@ class Walk:
 def product_key(path: str, name: str, designation: str, base: str) -> str:
     """What identifies a product: a standard part by its designation, any other by its file and its object."""
     return f"{STANDARD_PARTS}{designation}" if designation else f"{relative(path, base)}#{name}"
-
-
-def _metres(matrix: Floats) -> Floats:
-    result = matrix.copy()
-    result[:3, 3] *= 1e-3
-    return result

@@ -19,9 +19,9 @@ from silo.bom.errors import DocumentError
 from silo.durable import remove_patiently
 from silo.inertia.geometry.helpers import Helpers
 from silo.inertia.geometry.kernel.solids import measure
-from silo.inertia.geometry.measured import Measured, no_solid
+from silo.inertia.geometry.measured import Measured
 from silo.inertia.geometry.options import Reading, ReadOptions, Report
-from silo.inertia.model import Assembly, Instance, Prototype
+from silo.inertia.model import Assembly, Instance
 
 
 def load_shape(path: Path, named: str) -> Any:
@@ -44,19 +44,7 @@ def read_brep(path: Path, options: ReadOptions, report: Report) -> Reading:
     shape = load_shape(path, str(path))
     report("measuring", 1, 1)
     measured = measure([shape], eps=options.eps, mesh_check=options.mesh_check)
-    volume, com, inertia = measured.total
-    problems = measured.problems if measured.solids else (*measured.problems, no_solid(measured))
-    part = Prototype(
-        key="shape",
-        name=path.stem,
-        solids=measured.solids,
-        volume_m3=volume,
-        com_m=com,
-        inertia_unit=inertia,
-        has_solid=bool(measured.solids),
-        problems=problems,
-        mesh=measured.mesh,
-    )
+    part = measured.prototype("shape", path.stem)
     instance = Instance((path.stem,), (path.stem,), "shape", np.eye(4))
     return Reading(Assembly(path.stem, {"shape": part}, (instance,), source=str(path), unit="mm"))
 

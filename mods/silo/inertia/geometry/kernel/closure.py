@@ -17,8 +17,8 @@ from OCP.Standard import Standard_Failure
 from OCP.TopoDS import TopoDS
 
 from silo.inertia.geometry.kernel import occt
-from silo.inertia.geometry.kernel.tessellate import MM, bounds, box, triangles, xyz
-from silo.inertia.geometry.measured import CONVERGED, STATED, Gap
+from silo.inertia.geometry.kernel.tessellate import box, triangles, xyz
+from silo.inertia.geometry.measured import CONVERGED, STATED
 from silo.inertia.geometry.mesh import Floats, open_edges, welded
 
 MEETING = 1e-4
@@ -27,23 +27,20 @@ MEETING = 1e-4
 MOST_FACES = 20_000
 """Loose faces of one product that are sewn."""
 
-_as_shell = getattr(TopoDS, "Shell_s", None) or TopoDS.Shell
 
-
-def gap_of(solid: Any) -> Gap | None:
-    """What is open in a solid; None where its faces close."""
+def open_edges_of(solid: Any) -> int | None:
+    """How many edges of a solid are open, 0 where only its faces disagree; None where its faces close."""
     if _is_closed(solid):
         return None
-    sewing = _sewn(occt.faces_of(solid), MEETING * box(solid)[1])
-    here, corner = _flux(solid, box(solid)[0]), _flux(solid, bounds(solid)[0])
-    if sewing is not None and not sewing.NbFreeEdges() and not sewing.NbMultipleEdges():
-        # Closed all the same; but faces that disagreed on what is outside were turned for it.
-        sewn = abs(_flux(sewing.SewedShape(), box(solid)[0]))
-        if abs(sewn - abs(here)) <= CONVERGED * sewn:
-            return None
-        return Gap(0, sewn * MM**3)
+    middle, size = box(solid)
+    sewing = _sewn(occt.faces_of(solid), MEETING * size)
     edges = sewing.NbFreeEdges() + sewing.NbMultipleEdges() if sewing is not None else 0
-    return Gap(edges, abs(corner) * MM**3)
+    if sewing is not None and not edges:
+        # Closed all the same; but faces that disagreed on what is outside were turned for it.
+        sewn = abs(_flux(sewing.SewedShape(), middle))
+        if abs(sewn - abs(_flux(solid, middle))) <= CONVERGED * sewn:
+            return None
+    return edges
 
 
 def beside_edges(solid: Any, volume: float) -> float:
@@ -133,7 +130,7 @@ def _sewn(faces: list[Any], tolerance: float) -> Any:
 
 
 def _solid(shell: Any) -> Any:
-    return BRepBuilderAPI_MakeSolid(_as_shell(shell)).Solid()
+    return BRepBuilderAPI_MakeSolid(TopoDS.Shell(shell)).Solid()
 
 
 def _flux(shape: Any, point: Floats) -> float:

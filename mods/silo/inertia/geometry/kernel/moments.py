@@ -131,7 +131,6 @@ _ELEMENTARY = {
     GeomAbs_Torus: (Basis.CIRCULAR, Basis.CIRCULAR),
 }
 _ROUND = (GeomAbs_Circle, GeomAbs_Ellipse)
-_as_edge = getattr(TopoDS, "Edge_s", None) or TopoDS.Edge
 
 
 def moments(solid: Any, volume: float, eps: float) -> Moments:
@@ -154,7 +153,7 @@ def _edges(face: Any) -> Iterator[Any]:
                     TopAbs_FORWARD,
                     TopAbs_REVERSED,
                 ):
-                    yield _as_edge(edge)
+                    yield TopoDS.Edge(edge)
 
 
 def _inside(shape: Any) -> Iterator[Any]:

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The one door to the geometry kernel: OpenCASCADE through OCP 7.8 to 8.x, its differences evened out.
+"""The one door to the geometry kernel: OpenCASCADE through OCP 8.
 
-Version 8 moved the collections to ``OCP.collections`` and dropped the ``_s`` from some static methods; what
-the readers need of both is here under one name. Importing this module imports the kernel (half a second and
-200 MB): only the readers do, and they run in a child process.
+Importing this module imports the kernel (half a second and 200 MB): only the readers do, and they run in a
+child process.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from silo.bom.errors import ConfigError
@@ -20,6 +20,12 @@ except ModuleNotFoundError as error:  # pragma: no cover - the development envir
         'pip install "silo-mod[inertia]"'
     ) from error
 
+if int(OCP.__version__.split(".")[0]) < 8:  # pragma: no cover - the development environment has a newer one
+    raise ConfigError(
+        f"the geometry kernel OCP {OCP.__version__} loses placements that scale or mirror; wanted version 8: "
+        'pip install "silo-mod[inertia]"'
+    )
+
 try:
     from OCP.BRep import BRep_Tool
 except ImportError as error:  # pragma: no cover - a machine without a desktop's libraries
@@ -31,6 +37,7 @@ except ImportError as error:  # pragma: no cover - a machine without a desktop's
     ) from error
 
 from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Curve2d, BRepAdaptor_Surface
+from OCP.collections import Sequence_TDF_Label
 from OCP.GeomAbs import (
     GeomAbs_Circle,
     GeomAbs_Cone,
@@ -43,28 +50,12 @@ from OCP.GeomAbs import (
 from OCP.Message import Message
 from OCP.TCollection import TCollection_AsciiString
 from OCP.TDataStd import TDataStd_Name
-from OCP.TDF import TDF_Label, TDF_Tool
+from OCP.TDF import TDF_Tool
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SHAPE, TopAbs_SHELL, TopAbs_SOLID
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS
 
-try:
-    from OCP.TColStd import TColStd_SequenceOfAsciiString
-    from OCP.TDF import TDF_LabelSequence
-except ImportError:
-    from OCP.collections import Sequence_TCollection_AsciiString as TColStd_SequenceOfAsciiString
-    from OCP.collections import Sequence_TDF_Label as TDF_LabelSequence
-
-AsciiStrings = TColStd_SequenceOfAsciiString
-LabelSequence = TDF_LabelSequence
-
-VERSION: str = OCP.__version__
-"""The kernel's version; part of the key of everything that is kept of its results."""
-
 _ELEMENTARY = (GeomAbs_Plane, GeomAbs_Cylinder, GeomAbs_Cone, GeomAbs_Sphere, GeomAbs_Torus)
-
-_as_edge = getattr(TopoDS, "Edge_s", None) or TopoDS.Edge
-_as_face = getattr(TopoDS, "Face_s", None) or TopoDS.Face
 
 
 def quiet() -> None:
@@ -74,8 +65,10 @@ def quiet() -> None:
         messenger.RemovePrinter(printer)
 
 
-def labels(sequence: Any) -> list[Any]:
-    """A label sequence as a list (it counts from 1)."""
+def labels(fill: Callable[[Any], Any]) -> list[Any]:
+    """The labels that ``fill`` puts into the kernel's sequence."""
+    sequence = Sequence_TDF_Label()
+    fill(sequence)
     return [sequence.Value(i) for i in range(1, sequence.Length() + 1)]
 
 
@@ -88,10 +81,8 @@ def entry(label: Any) -> str:
 
 def name_of(label: Any) -> str:
     """The label's name, "" where it has none."""
-    attribute = TDataStd_Name()
-    if not label.FindAttribute(TDataStd_Name.GetID_s(), attribute):
-        return ""
-    return str(attribute.Get().ToExtString())
+    attribute = attribute_of(label, TDataStd_Name)
+    return str(attribute.Get().ToExtString()) if attribute is not None else ""
 
 
 def attribute_of(label: Any, kind: Any) -> Any | None:
@@ -107,11 +98,6 @@ def attribute_of(label: Any, kind: Any) -> Any | None:
     return attribute
 
 
-def new_label() -> Any:
-    """An empty label, for the kernel to fill."""
-    return TDF_Label()
-
-
 def solids_of(shape: Any) -> list[Any]:
     """All solids of a shape, placed."""
     return _explored(shape, TopAbs_SOLID)
@@ -119,12 +105,12 @@ def solids_of(shape: Any) -> list[Any]:
 
 def faces_of(shape: Any) -> list[Any]:
     """All faces of a shape, placed and oriented."""
-    return [_as_face(face) for face in _explored(shape, TopAbs_FACE)]
+    return [TopoDS.Face(face) for face in _explored(shape, TopAbs_FACE)]
 
 
-def edges_of(face: Any) -> list[Any]:
-    """All edges of a face, a seam twice."""
-    return [_as_edge(edge) for edge in _explored(face, TopAbs_EDGE)]
+def edges_of(shape: Any) -> list[Any]:
+    """All edges of a face or a solid, each as often as it is used: a seam twice."""
+    return [TopoDS.Edge(edge) for edge in _explored(shape, TopAbs_EDGE)]
 
 
 def loose_shells_of(shape: Any) -> list[Any]:
@@ -134,7 +120,7 @@ def loose_shells_of(shape: Any) -> list[Any]:
 
 def loose_faces_of(shape: Any) -> list[Any]:
     """The faces of a shape that stand in no shell, placed and oriented."""
-    return [_as_face(face) for face in _explored(shape, TopAbs_FACE, TopAbs_SHELL)]
+    return [TopoDS.Face(face) for face in _explored(shape, TopAbs_FACE, TopAbs_SHELL)]
 
 
 def has_edges(shape: Any) -> bool:
@@ -168,9 +154,7 @@ def is_plain(solid: Any) -> bool:
 def is_flat(solid: Any) -> bool:
     """True where all faces are planes and all edges straight: its triangles are the very solid."""
     planes = (BRepAdaptor_Surface(face, False).GetType() == GeomAbs_Plane for face in faces_of(solid))
-    return all(planes) and all(
-        BRepAdaptor_Curve(_as_edge(edge)).GetType() == GeomAbs_Line for edge in _explored(solid, TopAbs_EDGE)
-    )
+    return all(planes) and all(BRepAdaptor_Curve(edge).GetType() == GeomAbs_Line for edge in edges_of(solid))
 
 
 def _explored(shape: Any, kind: Any, outside: Any = TopAbs_SHAPE) -> list[Any]:

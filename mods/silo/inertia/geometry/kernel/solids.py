@@ -22,8 +22,9 @@ from OCP.gp import gp_Trsf, gp_Vec
 from OCP.TopLoc import TopLoc_Location
 
 from silo.inertia.core import place
+from silo.inertia.geometry.graph import in_metres
 from silo.inertia.geometry.kernel import occt
-from silo.inertia.geometry.kernel.closure import beside_edges, closed_shells, gap_of
+from silo.inertia.geometry.kernel.closure import beside_edges, closed_shells, open_edges_of
 from silo.inertia.geometry.kernel.common import KernelCommon
 from silo.inertia.geometry.kernel.moments import solid_moments
 from silo.inertia.geometry.kernel.tessellate import (
@@ -31,7 +32,6 @@ from silo.inertia.geometry.kernel.tessellate import (
     bounds,
     box,
     cross_check,
-    in_metres,
     tessellated,
     triangles,
     trsf_matrix,
@@ -138,8 +138,8 @@ def _measured(solid: Any, body: Any, eps: float, picture: _Picture | None) -> _B
     if not BRepCheck_Analyzer(solid).IsValid():
         notes.append(INVALID)
     mesh = _checked_mesh(solid, props, picture, notes) if picture is not None else None
-    if props is not None and (gap := gap_of(solid)) is not None:
-        notes.append(open_note(gap, props.volume_m3))
+    if props is not None and (edges := open_edges_of(solid)) is not None:
+        notes.append(open_note(edges))
     elif props is not None and not any(code is GeometryCode.NOT_CONVERGENT for code, _ in notes):
         note = drift_note(beside_edges(solid, props.volume_m3 / MM**3))
         notes += [note] if note is not None else []
@@ -156,10 +156,7 @@ def _placed(bare: _Bare, solid: Any) -> list[Body]:
     if not np.array_equal(location, np.eye(4)):
         matrix = in_metres(location)
         volumes, coms, units = place([props.volume_m3], [props.com_m], [props.inertia_unit], [matrix])
-        if mesh is not None:
-            mirrored = np.linalg.det(matrix[:3, :3]) < 0
-            faces = mesh.faces[:, ::-1] if mirrored else mesh.faces
-            mesh = Mesh(mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3], faces)
+        mesh = mesh.moved(matrix) if mesh is not None else None
         props = SolidProps(float(volumes[0]), coms[0], units[0], props.reversed)
     low, high = bounds(solid)
     shape = solid.Reversed() if props.reversed else solid
@@ -211,6 +208,7 @@ def _triangulated_solid(solid: Any, notes: Notes) -> tuple[SolidProps | None, Me
 def _checked_mesh(solid: Any, props: SolidProps | None, picture: _Picture, notes: Notes) -> Mesh:
     small = box(solid)[1] < SMALL * picture.size
     coarse = small or len(occt.faces_of(solid)) > MANY_FACES
-    check = cross_check(solid, props.volume_m3 if props is not None else None, small=coarse)
-    notes += mesh_notes(check.deviation, check.missing)
-    return simplified(check.picture, picture.triangles)
+    volume = props.volume_m3 if props is not None else None
+    mesh, deviation, missing = cross_check(solid, volume, small=coarse)
+    notes += mesh_notes(deviation, missing)
+    return simplified(mesh, picture.triangles)

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,17 +21,12 @@ MM = 1e-3
 """The kernel counts in mm."""
 
 
-@dataclass(frozen=True, slots=True)
-class Level:
-    """How fine a mesh is: linear deflection in diagonals of the box, and angle [rad]."""
+Level = tuple[float, float]
+"""How fine a mesh is: linear deflection in diagonals of the box, and angle [rad]."""
 
-    linear: float
-    angle: float
-
-
-PICTURE = Level(0.005, 0.3)
-COARSE = Level(0.01, 0.5)
-FINE = Level(0.001, 0.12)
+PICTURE: Level = (0.005, 0.3)
+COARSE: Level = (0.01, 0.5)
+FINE: Level = (0.001, 0.12)
 
 CLOSE = 0.01
 """A relative deviation of the volume below this is agreement: chords cut about that much off a cylinder."""
@@ -42,22 +35,9 @@ FINE_ENOUGH = 30_000
 """Triangles from where a finer mesh takes seconds, and chords are no excuse any more."""
 
 
-@dataclass(frozen=True, eq=False)
-class CrossCheck:
-    """A solid's mesh for a picture, and what meshing says of its volume.
-
-    deviation
-        relative, of the best closed mesh; None where no mesh is closed.
-    missing
-        faces without triangles in the picture's mesh.
-    """
-
-    picture: Mesh
-    deviation: float | None
-    missing: int
-
-
-def cross_check(solid: Any, volume_m3: float | None, *, small: bool = False) -> CrossCheck:
+def cross_check(
+    solid: Any, volume_m3: float | None, *, small: bool = False
+) -> tuple[Mesh, float | None, int]:
     """Compare meshes of a solid with ``volume_m3`` (> 0; None: nothing to compare), as few as are needed.
 
     ``small``: the solid is hardly seen in its product's picture, so a coarse mesh of it is tried first.
@@ -66,38 +46,35 @@ def cross_check(solid: Any, volume_m3: float | None, *, small: bool = False) -> 
     there at another, and thin curved wires lose several per cent to chords. So one closed mesh that agrees
     clears a solid, and so does what two closed ones converge to, their chord error going with the square of
     the angle. Bad geometry is as wrong at every fineness.
+
+    Returns a mesh for the picture, the relative deviation of the best closed mesh (None where none is
+    closed), and how many faces have no triangles in the picture's mesh.
     """
-    tried: list[tuple[Level, Mesh, int]] = []
+    tried: list[tuple[int, bool, Mesh]] = []
     closed: list[tuple[float, float]] = []
     deviation: float | None = None
     for level in (COARSE, PICTURE, FINE) if small else (PICTURE, COARSE, FINE):
-        if level is FINE and max(len(mesh) for _, mesh, _ in tried) > FINE_ENOUGH:
+        if level is FINE and max(len(mesh) for *_, mesh in tried) > FINE_ENOUGH:
             break
         mesh, missing = tessellated(solid, level)
-        tried.append((level, mesh, missing))
+        tried.append((missing, level is not PICTURE, mesh))
         if volume_m3 is not None and not missing:
-            closed.append((level.angle, abs(mesh_volume(mesh))))
-            deviation = min(abs(v / volume_m3 - 1) for v in (*_converging(closed), closed[-1][1]))
+            volume = abs(mesh_volume(mesh))
+            limits = [volume + (volume - v) * level[1] ** 2 / (a**2 - level[1] ** 2) for a, v in closed]
+            closed.append((level[1], volume))
+            off = min(abs(v / volume_m3 - 1) for v in (volume, *limits))
+            deviation = off if deviation is None else min(off, deviation)
         if not missing and (deviation is None or deviation < CLOSE):
             break
-    _, picture, missing = min(tried, key=lambda t: (t[2], t[0] is not PICTURE))
-    return CrossCheck(picture, deviation, missing)
-
-
-def _converging(found: list[tuple[float, float]]) -> Iterator[float]:
-    """The volumes so far, and what each two of them tend to."""
-    for n, (angle, volume) in enumerate(found):
-        yield volume
-        for other_angle, other in found[:n]:
-            one, two = angle**2, other_angle**2
-            yield volume + (volume - other) * one / (two - one)
+    missing, _, picture = min(tried, key=lambda t: t[:2])
+    return picture, deviation, missing
 
 
 def tessellated(shape: Any, level: Level = PICTURE) -> tuple[Mesh, int]:
     """The triangles of a shape in m, and how many of its faces could not be meshed."""
     size = box(shape)[1]
     BRepTools.Clean_s(shape)
-    BRepMesh_IncrementalMesh(shape, max(level.linear * size, 1e-7), False, level.angle, False)
+    BRepMesh_IncrementalMesh(shape, max(level[0] * size, 1e-7), False, level[1], False)
     return triangles(shape)
 
 
@@ -150,10 +127,3 @@ def trsf_matrix(trsf: Any) -> Floats:
     value = trsf.Value
     rows = [[value(i, j) for j in (1, 2, 3, 4)] for i in (1, 2, 3)]
     return np.array([*rows, [0.0, 0.0, 0.0, 1.0]])
-
-
-def in_metres(matrix: Floats) -> Floats:
-    """The same (4, 4) placement, the translation in m instead of mm."""
-    result = matrix.copy()
-    result[:3, 3] *= MM
-    return result

@@ -8,20 +8,21 @@ computed all the same and said: a number from an open mesh looks like any other 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from silo.bom.errors import ConfigError, DocumentError
-from silo.inertia.geometry.checks import coincident_problems, implausible_size, name_problems, scaled_problems
+from silo.inertia.geometry.checks import assembled, implausible_size
 from silo.inertia.geometry.detect import Kind
-from silo.inertia.geometry.graph import MAX_DEPTH, Child, Floats, Node, unfold
+from silo.inertia.geometry.graph import MAX_DEPTH, Child, Node, in_metres, unfold
+from silo.inertia.geometry.measured import Measured
 from silo.inertia.geometry.mesh import Mesh, welded
 from silo.inertia.geometry.options import MESH_UNITS, Reading, ReadOptions, Report
 from silo.inertia.geometry.together import enclosed
-from silo.inertia.model import Assembly, GeometryCode, GeometryProblem, Prototype
+from silo.inertia.model import GeometryCode, GeometryProblem, Prototype
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,35 +41,18 @@ def read_mesh(path: Path, kind: Kind, options: ReadOptions, report: Report) -> R
     report("reading", 0, 0)
     scene = _scene(path, kind)
     unit, unit_name, problems = _unit(scene, options)
+    unfolded = unfold(scene.nodes, scene.roots, options.max_instances)
+    unfolded.instances = [replace(i, transform=in_metres(i.transform, unit)) for i in unfolded.instances]
+    unfolded.frames = {path: in_metres(frame, unit) for path, frame in unfolded.frames.items()}
     prototypes = {}
-    for number, (key, mesh) in enumerate(scene.meshes.items(), start=1):
-        report("measuring", number, len(scene.meshes))
+    for number, key in enumerate(unfolded.placed, start=1):
+        report("measuring", number, len(unfolded.placed))
+        mesh = scene.meshes[key]
         prototypes[key] = _prototype(key, scene.nodes[key].name, Mesh(mesh.vertices * unit, mesh.faces))
-    roots = [Child(r.name, r.product, _in_metres(r.transform, unit)) for r in scene.roots]
-    nodes = {
-        key: Node(
-            key,
-            node.name,
-            tuple(Child(c.name, c.product, _in_metres(c.transform, unit)) for c in node.children),
-            node.has_geometry,
-        )
-        for key, node in scene.nodes.items()
-    }
-    unfolded = unfold(nodes, roots, options.max_instances)
     problems += implausible_size(prototypes, unit_name)
-    problems += scaled_problems(unfolded.instances)
-    problems += coincident_problems(unfolded.instances)
-    used = dict.fromkeys(instance.prototype for instance in unfolded.instances)
-    assembly = Assembly(
-        name=path.stem,
-        prototypes={key: prototypes[key] for key in used},
-        instances=tuple(unfolded.instances),
-        problems=tuple(problems),
-        source=str(path),
-        unit=unit_name,
-        frames=unfolded.frames,
+    return Reading(
+        assembled(unfolded, prototypes, problems, name=path.stem, source=str(path), unit=unit_name)
     )
-    return Reading(assembly)
 
 
 def _scene(path: Path, kind: Kind) -> MeshScene:
@@ -154,27 +138,8 @@ def _unit(scene: MeshScene, options: ReadOptions) -> tuple[float, str, list[Geom
     return MESH_UNITS["mm"], "mm", [problem]
 
 
-def _in_metres(matrix: Floats, unit: float) -> Floats:
-    result = np.array(matrix, dtype=np.float64)
-    result[:3, 3] *= unit
-    return result
-
-
 def _prototype(key: str, name: str, mesh: Mesh) -> Prototype:
-    problems = name_problems(name, unnamed=False)
-    solid = None
-    if len(mesh):
-        solid = enclosed(mesh, problems)
-    if solid is None or solid.volume_m3 == 0.0:
-        problems.append(GeometryProblem(GeometryCode.NO_SOLID, "its triangles enclose no volume"))
-        return Prototype(key, name, has_solid=False, problems=tuple(problems), mesh=mesh)
-    return Prototype(
-        key=key,
-        name=name,
-        solids=(solid,),
-        volume_m3=solid.volume_m3,
-        com_m=solid.com_m,
-        inertia_unit=solid.inertia_unit,
-        problems=tuple(problems),
-        mesh=mesh,
-    )
+    problems: list[GeometryProblem] = []
+    solid = enclosed(mesh, problems)
+    solids = (solid,) if solid.volume_m3 else ()
+    return Measured(solids, tuple(problems), mesh, has_faces=True).prototype(key, name)

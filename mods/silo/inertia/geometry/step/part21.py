@@ -45,6 +45,7 @@ _ENTITY = re.compile(rb"#(\d+)\s*=\s*([A-Z_0-9]*)\s*\(")
 _COMPLEX = re.compile(rb"UNIT|REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION")
 _BODY = re.compile(rb"(?:[^';]+|'[^']*')*")
 _REFERENCE = re.compile(rb"'(?:[^']|'')*'|#(\d+)")
+_COMMENT = re.compile(rb"'[^']*'|/\*.*?(?:\*/|\Z)", re.DOTALL)
 _TOKEN = re.compile(
     rb"\s*(?:(?P<string>'(?:[^']|'')*')|#(?P<ref>\d+)|(?P<enum>\.[A-Za-z0-9_]+\.)"
     rb"|(?P<number>[+-]?\d+\.?\d*(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z_!][A-Za-z0-9_]*)"
@@ -112,6 +113,8 @@ def scan(data: Buffer, wanted: frozenset[str]) -> Part21:
 
     Of complex entities: units, and relationships that place a part.
     """
+    if data.find(b"/*") >= 0:  # a comment may hold what looks like an entity
+        data = _COMMENT.sub(lambda found: found[0] if found[0][:1] == b"'" else b" " * len(found[0]), data[:])
     result = Part21(data)
     names: dict[bytes, str | None] = {}
     ordinal = 0

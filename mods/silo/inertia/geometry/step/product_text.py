@@ -59,7 +59,6 @@ WANTED = frozenset(
         "DOCUMENT_PRODUCT_EQUIVALENCE",
         "DOCUMENT_FILE",
         "APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT",
-        "CARTESIAN_TRANSFORMATION_OPERATOR_3D",
         "NEXT_ASSEMBLY_USAGE_OCCURRENCE",
         "CONTEXT_DEPENDENT_SHAPE_REPRESENTATION",
         "ITEM_DEFINED_TRANSFORMATION",
@@ -92,14 +91,12 @@ class Products:
     """All products of a file. ``by_ordinal``: entity position in the file → PRODUCT_DEFINITION id.
 
     ``count`` is the number of entities: positions only mean something to a reader that counts as many.
-    ``stretched`` counts the transformations that scale or mirror; ``uses`` are (assembly, part) as
-    PRODUCT_DEFINITION ids; ``shaped`` are those that have geometry of their own.
+    ``uses`` are (assembly, part) as PRODUCT_DEFINITION ids, ``shaped`` those with geometry of their own.
     """
 
     facts: dict[int, ProductFacts] = field(default_factory=dict)
     by_ordinal: dict[int, int] = field(default_factory=dict)
     count: int = 0
-    stretched: int = 0
     uses: tuple[tuple[int, int], ...] = ()
     shaped: frozenset[int] = frozenset()
 
@@ -148,7 +145,6 @@ def read_products(source: Part21) -> Products:
             **{source.ordinals[item]: owner for owner, item in items},
         },
         count=source.count,
-        stretched=_stretched(source),
         uses=tuple(_uses(source, facts)),
         shaped=frozenset(owner for owner, item in items if source.keywords[item] in _ITEMS),
     )
@@ -193,13 +189,6 @@ def count_placed(products: Products) -> int:
     used = {str(part) for _, part in products.uses}
     tops = [key for key in nodes if key not in used] or list(nodes)[:1]
     return sum(count_instances(nodes, bottom_up(nodes, top)) for top in tops)
-
-
-def _stretched(source: Part21) -> int:
-    """Transformation operators whose scale is not 1; a mirror is written as a negative one."""
-    operators = (arguments for _, arguments in source.of("CARTESIAN_TRANSFORMATION_OPERATOR_3D"))
-    scales = (number(arguments[6]) for arguments in operators if len(arguments) > 6)
-    return sum(scale is not None and abs(scale - 1) > 1e-9 for scale in scales)
 
 
 # --- split assemblies -------------------------------------------------------------------------------------

@@ -8,19 +8,17 @@ from pathlib import Path
 
 import numpy as np
 
-from silo.bom.errors import DocumentError, InputError
-from silo.inertia.core import rigid_mask
-from silo.inertia.geometry.checks import coincident_problems, implausible_size, name_problems, scaled_problems
+from silo.inertia.geometry.checks import assembled, implausible_size
 from silo.inertia.geometry.graph import bottom_up, unfold
 from silo.inertia.geometry.helpers import Helpers
 from silo.inertia.geometry.kernel.brep import measure_all
-from silo.inertia.geometry.measured import no_solid
 from silo.inertia.geometry.mesh import Floats
 from silo.inertia.geometry.options import Reading, ReadOptions, Report
 from silo.inertia.geometry.step.prepare import Prepared
 from silo.inertia.geometry.step.siblings import Siblings
 from silo.inertia.geometry.step.xcaf import Stated, StepFile, load
-from silo.inertia.model import Assembly, GeometryCode, GeometryProblem, Prototype
+from silo.inertia.geometry.together import combined
+from silo.inertia.model import GeometryCode, GeometryProblem, Prototype
 from silo.inertia.wording import counted
 
 
@@ -41,12 +39,8 @@ def read_step(
     step = load(path, max_instances=options.max_instances, text=text() if text is not None else None)
     siblings = Siblings(step, options, helpers, lambda name: report(f"reading {name}", 0, 0))
     siblings.resolve()
-    try:
-        unfolded = unfold(step.nodes, step.roots, options.max_instances)
-    except InputError as error:
-        raise DocumentError(str(path), str(error)) from error
-    placed = list(dict.fromkeys(instance.prototype for instance in unfolded.instances))
-    unmeasured = [key for key in placed if key not in step.measured]
+    unfolded = unfold(step.nodes, step.roots, options.max_instances)
+    unmeasured = [key for key in unfolded.placed if key not in step.measured]
     found = measure_all(
         [step.shapes.get(key, []) for key in unmeasured],
         options=options,
@@ -54,53 +48,37 @@ def read_step(
         done=lambda number, total: report("measuring", number, total),
     )
     step.measured.update(zip(unmeasured, found, strict=True))
-    prototypes = {key: _prototype(step, key, siblings.problems.get(key)) for key in placed}
+    prototypes = {key: _prototype(step, key, siblings.problems.get(key)) for key in unfolded.placed}
     problems = [*split_problems(siblings), *stated_totals(step, prototypes)]
-    problems += [*lost_stretches(step), *scaled_problems(unfolded.instances)]
-    problems += coincident_problems(unfolded.instances)
     problems += implausible_size(prototypes, step.unit or "mm")
     if not step.unit and any(prototype.volume_m3 for prototype in prototypes.values()):
         words = "the file states no unit of length that is understood; it was read as mm"
         problems.append(GeometryProblem(GeometryCode.UNITS, words))
-    single = len(step.roots) == 1
-    assembly = Assembly(
-        name=step.nodes[step.roots[0].product].name if single else path.stem,
-        prototypes=prototypes,
-        instances=tuple(unfolded.instances),
-        problems=tuple(problems),
-        source=str(path),
-        unit=step.unit,
-        frames=unfolded.frames,
-    )
+    name = step.nodes[step.roots[0].product].name if len(step.roots) == 1 else path.stem
+    assembly = assembled(unfolded, prototypes, problems, name=name, source=str(path), unit=step.unit)
     return Reading(assembly, tuple(siblings.used), tuple(siblings.missing), kept=step.kept)
 
 
 def _prototype(step: StepFile, key: str, known: GeometryProblem | None) -> Prototype:
-    node, facts, stated = step.nodes[key], step.facts[key], step.stated[key]
-    measured = step.measured[key]
-    volume, com, inertia = measured.total
-    problems = list(measured.problems)
-    if not measured.solids:
-        problems.append(known or no_solid(measured))
-    elif not node.children:
-        problems += against_stated(volume, com, stated)
+    node, facts, stated, measured = step.nodes[key], step.facts[key], step.stated[key], step.measured[key]
+    problems = []
+    if measured.solids and not node.children:
+        whole = combined(measured.solids)
+        problems += against_stated(whole.volume_m3, whole.com_m, stated)
     if facts.density_problem:
         problems.append(GeometryProblem(GeometryCode.UNITS, facts.density_problem))
-    problems += name_problems(node.name, key in step.unnamed)
-    return Prototype(
-        key=key,
-        name=node.name,
-        solids=measured.solids,
-        volume_m3=volume,
-        com_m=com,
-        inertia_unit=inertia,
-        has_solid=bool(measured.solids),
-        problems=tuple(problems),
+    if key in step.unnamed:
+        words = f"it has no name in the file; called '{node.name}' after what holds it"
+        problems.append(GeometryProblem(GeometryCode.NAME, words))
+    return measured.prototype(
+        key,
+        node.name,
+        *problems,
+        empty=known,
         step_density=facts.density,
         step_material=facts.material,
         stated_volume_m3=stated.volume_m3,
         part_number=facts.part_number or None,
-        mesh=measured.mesh,
     )
 
 
@@ -180,24 +158,3 @@ def stated_totals(step: StepFile, prototypes: Mapping[str, Prototype]) -> list[G
                     )
                 )
     return problems
-
-
-def lost_stretches(step: StepFile) -> list[GeometryProblem]:
-    """Transformations that scale or mirror, of which the kernel made plain ones (versions before 8 do)."""
-    placements = [child.transform for node in step.nodes.values() for child in node.children]
-    if not step.stretched or any(_stretches(np.array(placements).reshape(-1, 4, 4))):
-        return []
-    from silo.inertia.geometry.kernel.occt import VERSION
-
-    return [
-        GeometryProblem(
-            GeometryCode.SCALED,
-            f"the file scales or mirrors parts in {step.stretched} places, which the installed geometry "
-            f"kernel ({VERSION}) does not do; masses and centres are wrong there. Install "
-            "cadquery-ocp-novtk 8 or newer",
-        )
-    ]
-
-
-def _stretches(placements: Floats) -> list[bool]:
-    return [*(~rigid_mask(placements)), *(np.linalg.det(placements[:, :3, :3]) < 0)]

@@ -14,17 +14,19 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from OCP.collections import Sequence_TCollection_AsciiString
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.STEPCAFControl import STEPCAFControl_Reader
 from OCP.TCollection import TCollection_ExtendedString
+from OCP.TDF import TDF_Label
 from OCP.TDocStd import TDocStd_Document
 from OCP.XCAFDoc import XCAFDoc_Centroid, XCAFDoc_DocumentTool, XCAFDoc_Volume
 
 from silo.bom.errors import DocumentError
 from silo.folders import scratch_folder
-from silo.inertia.geometry.graph import Child, Node
+from silo.inertia.geometry.graph import Child, Node, in_metres
 from silo.inertia.geometry.kernel import occt
-from silo.inertia.geometry.kernel.tessellate import MM, in_metres, trsf_matrix
+from silo.inertia.geometry.kernel.tessellate import MM, trsf_matrix
 from silo.inertia.geometry.labels import clean, is_generic
 from silo.inertia.geometry.measured import Measured
 from silo.inertia.geometry.step.prepare import Prepared, prepare
@@ -44,8 +46,6 @@ class Stated:
 class StepFile:
     """The content of one file; keys are unique over all files of a split assembly.
 
-    stretched
-        how many transformations the text has that scale or mirror.
     shapes, measured
         of each product with a shape of its own: the kernel's, or what was measured of them already.
     empty
@@ -56,7 +56,6 @@ class StepFile:
 
     path: Path
     unit: str = ""
-    stretched: int = 0
     nodes: dict[str, Node] = field(default_factory=dict)
     shapes: dict[str, list[Any]] = field(default_factory=dict)
     measured: dict[str, Measured] = field(default_factory=dict)
@@ -75,7 +74,6 @@ class StepFile:
         self.facts.update(other.facts)
         self.stated.update(other.stated)
         self.unnamed.update(other.unnamed)
-        self.stretched += other.stretched
 
     def take_shape(self, key: str, other: str) -> None:
         """Give the product ``key`` the shape of ``other``, or none if that has none."""
@@ -137,13 +135,11 @@ class _Walk:
         self._products = products
         self._owners = _owners(reader, products)
         self._known: dict[str, _Used] = {}
-        self._file = StepFile(path, unit=_unit(reader), stretched=products.stretched)
+        self._file = StepFile(path, unit=_unit(reader))
         self._fallback = clean(path.stem) or "part"
 
     def run(self) -> StepFile:
-        free = occt.LabelSequence()
-        self._tool.GetFreeShapes(free)
-        for label in occt.labels(free):
+        for label in occt.labels(self._tool.GetFreeShapes):
             key = self._prefix + occt.entry(label)
             self._visit_all(key, label)
             self._file.roots.append(Child(self._file.nodes[key].name, key))
@@ -197,11 +193,10 @@ class _Walk:
 
     def _components(self, label: Any) -> Iterator[tuple[Any, _Used]]:
         """Uses and what they use; groups of our own making are seen through."""
-        components = occt.LabelSequence()
-        if self._tool.IsAssembly_s(label):
-            self._tool.GetComponents_s(label, components)
-        for component in occt.labels(components):
-            target = occt.new_label()
+        if not self._tool.IsAssembly_s(label):
+            return
+        for component in occt.labels(lambda found: self._tool.GetComponents_s(label, found)):
+            target = TDF_Label()
             self._tool.GetReferredShape_s(component, target)
             used = self._used(target)
             if used.name.startswith(MARK):
@@ -272,7 +267,7 @@ _UNITS = {
 
 
 def _unit(reader: Any) -> str:
-    lengths, angles, solid_angles = (occt.AsciiStrings() for _ in range(3))
+    lengths, angles, solid_angles = (Sequence_TCollection_AsciiString() for _ in range(3))
     reader.Reader().FileUnits(lengths, angles, solid_angles)
     names = {str(lengths.Value(i).ToCString()).strip().lower() for i in range(1, lengths.Length() + 1)}
     return " and ".join(sorted(_UNITS.get(name, name) for name in names))
