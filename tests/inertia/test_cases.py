@@ -107,7 +107,6 @@ CASES: dict[int, Case] = {
     14: Case(
         "mirrored and scaled placements", "made",
         (PRODUCTS + "test_mirrored_and_scaled_placements_are_exact_or_refused_aloud",
-         PRODUCTS + "test_stretches_that_the_kernel_drops_are_reported",
          "test_core.py::test_mirror_is_rigid_and_turns_products"),
     ),
     15: Case(
