@@ -45,14 +45,14 @@ class Standing:
         """The base's number; -1 where it is not known, so that any revision is newer."""
         return self.base.revision_number if self.base is not None else -1
 
-    def refusal(self, part_number: str) -> NewerRevisionError:
-        """What is said of a commit that would undo the newer revision."""
-        newest = self.newest
-        assert newest is not None  # something is newer
+    def check(self, part_number: str) -> None:
+        """Raise NewerRevisionError where committing the file would undo a newer revision."""
+        if (newest := self.newer) is None:
+            return
         made = (
             f"revision {self.base_number}" if self.base is not None else "a file that is no revision in Silo"
         )
-        return NewerRevisionError(
+        raise NewerRevisionError(
             f"{newest.created_by or 'Somebody'} committed revision {newest.revision_number} of {part_number}"
             f"{f' ({newest.comment})' if newest.comment else ''}, and this was made from {made}. "
             "Sending it would undo that. Look at theirs; then send yours on top of it, or discard it and "

@@ -15,13 +15,12 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
-from typing import Any
 
 from silo.api.address import canonical
 from silo.bom.errors import DocumentError, InputError
 from silo.durable import private_file, sync_folder
 
-VERSION = 5
+VERSION = 6
 # What a saved file was made from is forgotten after two years.
 _REMEMBERED = 2 * 366 * 86400.0
 # A copy of a file that was replaced is kept for so long, or until a person deletes it.
@@ -40,7 +39,6 @@ CREATE TABLE entry (
     part_number TEXT NOT NULL DEFAULT '',
     taken_at REAL NOT NULL,
     comment TEXT NOT NULL DEFAULT '',
-    properties TEXT NOT NULL DEFAULT '{}',
     file_left INTEGER NOT NULL DEFAULT 0,
     file_name TEXT NOT NULL DEFAULT '',
     copy TEXT NOT NULL DEFAULT '',
@@ -284,12 +282,6 @@ def _transaction(db: sqlite3.Connection) -> Iterator[None]:
         db.execute("ROLLBACK")
         raise
     db.execute("COMMIT")
-
-
-def insert(db: sqlite3.Connection, row: dict[str, Any]) -> None:
-    """Add a row; columns that it does not name have their defaults."""
-    names, places = ", ".join(row), ", ".join(f":{name}" for name in row)
-    db.execute(f"INSERT INTO entry ({names}) VALUES ({places})", row)  # noqa: S608
 
 
 def _version(db: sqlite3.Connection) -> int:

@@ -91,7 +91,6 @@ class Commit:
     file: Path | None = None
     stamp: Stamp | None = None
     sha256: str = ""
-    properties: Mapping[str, Any] = field(default_factory=dict)
     extraction: Extraction | None = None
     request: str = ""
     allow_missing: bool = False
@@ -142,7 +141,6 @@ class Entry:
     part_number: str
     taken_at: float
     comment: str
-    properties: Mapping[str, Any]
     file_left: bool
     file_name: str
     copy: str

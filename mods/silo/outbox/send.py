@@ -24,6 +24,7 @@ from silo.api.policy import Backoff, Scope, Then, judge
 from silo.api.revisions import (
     MayHaveArrivedError,
     SentFile,
+    Standing,
     checksum_of,
     find_arrived,
     is_newest,
@@ -107,8 +108,10 @@ class _Run:
         # Read anew each time: what is added or discarded meanwhile counts.
         while self.report.stopped_by is None and (found := self.store.next_due(self.client.base_url, last)):
             last = found.id
-            entry = self._kept(found) if found.state is State.KEEPING else found
-            if entry is None:
+            if found.state is State.KEEPING and not self.store.is_coming(found.key):
+                # The copy that an earlier run of the program could not make any more.
+                self.store.finish(found.key)
+            if (entry := self.store.entry(found.id)) is None:
                 continue
             if (
                 entry.state is not State.WAITING
@@ -118,12 +121,6 @@ class _Run:
                 self.behind |= entry.keys
                 continue
             self._try(entry)
-
-    def _kept(self, entry: Entry) -> Entry | None:
-        """Make the copy that an earlier run of the program could not make any more."""
-        if not self.store.is_coming(entry.key):
-            self.store.finish(entry.key)
-        return self.store.entry(entry.id)
 
     def _is_due(self, entry: Entry) -> bool:
         # A pause that is longer than any that we make was noted before the clock was set back.
@@ -140,14 +137,12 @@ class _Run:
         except SiloError as error:
             self._failed(entry, error)
             return
-        if sent is None:
-            return
         if refused:
             self._hold(entry, refused)
-            return
-        self.report.sent.append(sent)
-        if self.on_sent is not None:
-            self.on_sent(sent)
+        elif sent is not None:
+            self.report.sent.append(sent)
+            if self.on_sent is not None:
+                self.on_sent(sent)
 
     def _failed(self, entry: Entry, error: SiloError) -> None:
         if isinstance(error, OutboxError):
@@ -249,12 +244,10 @@ class _Run:
         # The newest one decides it nearly always; an item may have hundreds.
         newest = self._revisions(sent.part_number, newest=1)
         if is_newest(entry.sha256, newest):
-            number = newest[0].revision_number
-            self._learn(entry, newest[0])
-            self.store.arrived(entry, "file", number)
+            there = self._arrived(entry, newest[0])
             # The BOM is the BOM of that revision, also where this commit did not make it.
-            new = None if entry.base_revision is None else number
-            return replace(sent, entry=replace(entry, revision=number), revision=new)
+            new = None if entry.base_revision is None else there.revision
+            return replace(sent, entry=there, revision=new)
         if entry.base_revision is None:
             known = self._revisions(sent.part_number)
             self._check_name(entry, known)
@@ -273,51 +266,49 @@ class _Run:
             )
             base = self._base(entry, self._revisions(sent.part_number)) if mine is None else None
         revision = mine or self._upload(entry, base)
-        self._learn(entry, revision)
-        number = revision.revision_number
-        self.store.arrived(entry, "file", number, base=revision.base_revision)
-        return replace(sent, entry=replace(entry, revision=number), revision=number)
+        there = self._arrived(entry, revision, revision.base_revision)
+        return replace(sent, entry=there, revision=there.revision)
 
-    def _learn(self, entry: Entry, revision: Revision) -> None:
-        self.store.learn(entry.server, entry.sha256, entry.identity, revision.revision_number)
+    def _arrived(self, entry: Entry, revision: Revision, base: int | None = None) -> Entry:
+        number = revision.revision_number
+        self.store.learn(entry.server, entry.sha256, entry.identity, number)
+        self.store.arrived(entry, "file", number, base=base)
+        return replace(entry, revision=number)
 
     def _base(self, entry: Entry, known: Sequence[Revision]) -> int | None:
         """The revision that the file was made from; None where nobody asks. NewerRevisionError where sending
         it would undo a colleague's; the server looks again, for somebody may commit before the upload."""
         if not entry.origin:
             return None
-        number = self.store.known_revision(entry.server, entry.origin, entry.identity)
-        stands = standing(known, entry.origin, number, entry.on_top_of)
-        if stands.newer is not None:
-            raise stands.refusal(entry.part_number)
+        stands = self._standing(entry, known, entry.origin)
+        stands.check(entry.part_number)
         return max(stands.base_number, 0)
 
+    def _standing(self, entry: Entry, known: Sequence[Revision], content: str) -> Standing:
+        number = self.store.known_revision(entry.server, content, entry.identity)
+        return standing(known, content, number, entry.on_top_of)
+
     def _upload(self, entry: Entry, base: int | None) -> Revision:
-        try:
-            path = self.store.verified(entry)
-        except OSError as error:
-            raise _PassingError(
-                f"{entry.path or entry.file_name}: the copy kept for sending cannot be read "
-                f"({error.strerror or error})"
-            ) from error
         progress = self.on_progress
+        links = [LinkedFile.model_validate(one) for one in json.loads(entry.links)] if entry.links else None
         try:
             return self.client.upload_file(
                 entry.part_number,
-                path,
+                self.store.verified(entry),
                 entry.comment,
-                entry.properties or None,
-                None if progress is None else lambda done, total: progress(entry, done, total),
+                on_progress=None if progress is None else lambda done, total: progress(entry, done, total),
                 file_name=entry.file_name,
                 idempotency_key=entry.key,
                 sha256=entry.sha256,
-                origin=_origin(entry, base),
+                origin=Origin(base_revision=base, file_path=entry.place, links=links),
                 cancelled=self.cancelled,
             )
-        except DocumentError as error:
-            # The copy was whole a moment ago, so this is the disk, and not damage. People know their own
+        except (OSError, DocumentError) as error:
+            # This is the disk, and not damage: the hash of a damaged copy differs. People know their own
             # file, not our copy.
-            raise _PassingError(f"{entry.path or entry.file_name}: {error.reason}") from error
+            reason = error.reason if isinstance(error, DocumentError) else error.strerror or str(error)
+            told = f"the copy kept for sending cannot be read ({reason})"
+            raise _PassingError(f"{entry.path or entry.file_name}: {told}") from error
 
     def _revisions(
         self, part_number: str, *, newest: int | None = None, after: int = 0
@@ -378,15 +369,9 @@ class _Run:
         if entry.has_file or not entry.origin or entry.revision is not None:
             return entry
         known = self._revisions(entry.part_number)
-        stands = max(
-            (
-                standing(known, one, self.store.known_revision(entry.server, one, entry.identity))
-                for one in (entry.sha256, entry.origin)
-            ),
-            key=lambda one: one.base_number,
-        )
-        if stands.newer is not None:
-            raise stands.refusal(entry.part_number)
+        both = [self._standing(entry, known, content) for content in (entry.sha256, entry.origin)]
+        stands = max(both, key=lambda one: one.base_number)
+        stands.check(entry.part_number)
         base = stands.base
         return (
             entry if base is None else replace(entry, revision=base.revision_number, sha256=checksum_of(base))
@@ -406,11 +391,6 @@ class _Run:
         if document is not None and (document.revision is None or entry.has_file):
             document = document.model_copy(update={"revision": entry.revision})
         return wanted.model_copy(update={"sync_id": wanted.sync_id or entry.key, "document": document})
-
-
-def _origin(entry: Entry, base: int | None) -> Origin:
-    links = [LinkedFile.model_validate(link) for link in json.loads(entry.links)] if entry.links else None
-    return Origin(base_revision=base, file_path=entry.place, links=links)
 
 
 def _refuse(error: SiloError, refused: list[SiloError]) -> None:

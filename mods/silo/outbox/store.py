@@ -33,7 +33,7 @@ from silo.bom.report import to_plain
 from silo.durable import remove_patiently, replacing, stamp_of
 from silo.files import content_hash, seen_as
 from silo.folders import data_folder
-from silo.outbox.database import Origins, insert
+from silo.outbox.database import Origins
 from silo.outbox.entry import ASKED, SAME_PART, Commit, Entry, State
 
 _BLOCK = 1 << 20
@@ -92,7 +92,6 @@ class Store(Origins):
         row = {name: getattr(commit, name) for name in _AS_GIVEN} | {
             "server": canonical(server) if server else "",
             "state": State.KEEPING if commit.file is not None else State.WAITING,
-            "properties": _strict_json(commit.properties),
             "stamp": json.dumps(commit.stamp) if commit.stamp else "",
             "file_left": commit.file is not None,
             "file_name": os.path.basename(commit.path) or (commit.file.name if commit.file else ""),
@@ -104,7 +103,7 @@ class Store(Origins):
             self._coming.add(commit.key)
         try:
             with self.transaction() as db:
-                insert(db, row)
+                db.execute(f"INSERT INTO entry ({', '.join(row)}) VALUES (:{', :'.join(row)})", row)  # noqa: S608
         except BaseException:
             self._coming.discard(commit.key)
             raise
@@ -388,16 +387,8 @@ _FLAGS = ("file_left", "bom_left", "allow_missing", "superseded")
 def _entry(row: sqlite3.Row) -> Entry:
     values = dict(row)
     values["state"] = State(values["state"])
-    values["properties"] = json.loads(values["properties"])
     values["newer"] = json.loads(values["newer"]) if values["newer"] else {}
     return Entry(**values | {name: bool(values[name]) for name in _FLAGS})
-
-
-def _strict_json(data: Any) -> str:
-    try:
-        return json.dumps(dict(data), allow_nan=False)
-    except (TypeError, ValueError, RecursionError) as error:
-        raise InputError(f"these properties cannot be sent as JSON: {error}") from error
 
 
 def _key_of(copy: str) -> str:

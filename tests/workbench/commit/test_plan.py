@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 
 from silo.bom.errors import DocumentError
 from silo.workbench.commit.opened import Base
-from silo.workbench.commit.plan import Plan, State, Taker, leaves_first, plan
+from silo.workbench.commit.plan import Plan, Row, State, Taken, leaves_first, plan, take_each
 from silo.workbench.commit.snapshot import Snapshot
 
 
@@ -148,38 +149,46 @@ def test_states(doc: Doc, state: State, can_commit: bool) -> None:
     assert row.note
 
 
-def taker(documents: Documents, *, unknown: str = "") -> Taker:
+class Outbox:
+    """Keeps nothing."""
+
+    def hold(self, _path: str, key: str, /) -> Path | None:
+        return Path("/held") / key
+
+    def keep_aside(self, _path: str, /) -> Path | None:
+        return None
+
+
+def taken(rows: Iterable[Row], documents: Documents, *, unknown: str = "") -> list[Taken]:
     def take(doc: Any) -> Snapshot:
         return Snapshot(doc.FileName, doc.Label, None if doc.Name == unknown else f"{doc.Name}-id")
 
-    keys = iter(range(100))
-    return Taker(documents, take, lambda path, key: Path(f"/held/{key}"), lambda: f"k{next(keys)}")
+    return list(take_each(rows, documents, take, Outbox()))
 
 
 def test_each_is_saved_then_taken() -> None:
     """In the order of the plan."""
     documents = Documents()
     top = Doc("Top", Doc("Sub", changed=True), changed=True)
-    taken = list(taker(documents).each(plan(top, documents).rows))
+    sub, whole = taken(plan(top, documents).rows, documents)
     assert documents.saved == ["Sub", "Top"]
-    assert [(one.snapshot.identity, one.key, one.held) for one in taken if one.snapshot] == [
-        ("Sub-id", "k0", Path("/held/k0")),
-        ("Top-id", "k1", Path("/held/k1")),
-    ]
+    assert [one.snapshot and one.snapshot.identity for one in (sub, whole)] == ["Sub-id", "Top-id"]
+    assert [one.held for one in (sub, whole)] == [Path("/held") / sub.key, Path("/held") / whole.key]
+    assert sub.key != whole.key
 
 
 def test_what_was_only_recomputed_is_saved_where_a_person_wants_it() -> None:
     """FreeCAD's mark goes away."""
     documents, leaf = Documents(), Doc("Leaf", changed=True, recomputed=True)
     planned = plan(Doc("Top", leaf), documents)
-    list(taker(documents).each(planned.rows))
+    taken(planned.rows, documents)
     assert documents.saved == ["Leaf"]
 
 
 def test_what_is_saved_already_is_not_saved_again() -> None:
     """Its time stamp would change for nothing."""
     documents = Documents()
-    list(taker(documents).each(plan(Doc("Top"), documents).rows))
+    taken(plan(Doc("Top"), documents).rows, documents)
     assert documents.saved == []
 
 
@@ -187,7 +196,7 @@ def test_a_failure_does_not_stop_the_others() -> None:
     """And nothing of the failed one is sent."""
     documents = Documents()
     top = Doc("Top", Doc("Sub", changed=True, full_disk=True), changed=True)
-    first, second = taker(documents).each(plan(top, documents).rows)
+    first, second = taken(plan(top, documents).rows, documents)
     assert isinstance(first.error, DocumentError)
     assert first.snapshot is None
     assert second.error is None
@@ -199,16 +208,16 @@ def test_a_document_that_was_saved_as_another_file_is_not_sent() -> None:
     documents, doc = Documents(), Doc("Top", changed=True)
     planned = plan(doc, documents)
     doc.FileName = "/v/Variant.FCStd"
-    (taken,) = taker(documents).each(planned.rows)
-    assert "under another name" in str(taken.error)
-    assert (taken.snapshot, documents.saved) == (None, [])
+    (one,) = taken(planned.rows, documents)
+    assert "under another name" in str(one.error)
+    assert (one.snapshot, documents.saved) == (None, [])
 
 
 def test_a_document_without_identity_is_not_held() -> None:
     """There is nothing to send it to, so no copy is kept."""
     documents = Documents()
-    (taken,) = taker(documents, unknown="Top").each(plan(Doc("Top", changed=True), documents).rows)
-    assert taken.held is None
+    (one,) = taken(plan(Doc("Top", changed=True), documents).rows, documents, unknown="Top")
+    assert one.held is None
     assert documents.saved == ["Top"]
 
 

@@ -27,7 +27,7 @@ from silo.outbox.store import on_top, seen
 from silo.spelling import one_path
 from silo.workbench.commit.decisions import Decisions
 from silo.workbench.commit.desk import Answer, Desk
-from silo.workbench.commit.plan import Plan, Row, State, Taken, Taker, is_edited, plan, refusal
+from silo.workbench.commit.plan import Plan, Row, State, Taken, is_edited, plan, refusal, take_each
 from silo.workbench.commit.snapshot import Snapshot
 from silo.workbench.commit.theirs import Asked, Choice, Theirs, look
 from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone, not_in_silo_key
@@ -165,9 +165,8 @@ class CommitFlow:
 
     def run(self, rows: tuple[Row, ...], comment: str = "") -> None:
         """Commit these documents, in order, after those of an earlier commit."""
-        outbox = self._session.outbox
-        taker = Taker(self._desk.documents, self.snapshot, outbox.hold, new_key, outbox.keep_aside)
-        self._turns.append((taker.each(rows), comment))
+        turns = take_each(rows, self._desk.documents, self.snapshot, self._session.outbox)
+        self._turns.append((turns, comment))
         if len(self._turns) == 1:
             self._desk.later(self._turn)
 

@@ -17,6 +17,7 @@ from typing import Any, Protocol
 
 from silo.bom.errors import DocumentError, SiloError
 from silo.durable import Stamp, stamp_of
+from silo.outbox.entry import new_key
 from silo.spelling import one_path
 from silo.workbench.commit.opened import Base
 from silo.workbench.commit.snapshot import Snapshot
@@ -267,57 +268,46 @@ class Taken:
     base: Base | None = None
 
 
-@dataclass(frozen=True)
-class Taker:
-    """Saves documents and takes their snapshots.
+class Keeping(Protocol):
+    """What is needed of :class:`silo.outbox.store.Store`."""
 
-    take
-        snapshot of a document.
-    hold
-        keeps a file's content under a second name: (path, key).
-    new_key
-        names a commit.
-    keep_aside
-        keeps a copy of a file that somebody else has written and that saving replaces.
-    """
+    def hold(self, path: str, key: str, /) -> Path | None: ...
 
-    documents: Documents
-    take: Callable[[Any], Snapshot]
-    hold: Callable[[str, str], Path | None]
-    new_key: Callable[[], str]
-    keep_aside: Callable[[str], object] = lambda _path: None
+    def keep_aside(self, path: str, /) -> Path | None: ...
 
-    def each(self, rows: Iterable[Row]) -> Iterator[Taken]:
-        """One document after another; a failure does not stop the others. GUI thread."""
-        for row in rows:
-            try:
-                taken = self._one(row)
-            except SiloError as error:
-                taken = Taken(row, error=error)
-            except ReferenceError:
-                text = translate("Silo", "It was closed before it was saved: open it and commit it again.")
-                taken = Taken(row, error=SiloError(text))
-            except Exception as error:  # noqa: BLE001  # one document's trouble is not that of the others
-                problem = f"unexpected problem ({type(error).__name__}: {error})"
-                taken = Taken(row, error=SiloError(problem))
-            yield taken
 
-    def _one(self, row: Row) -> Taken:
-        base = self.documents.base(row.document)
-        if one_path(row.document.FileName) != row.path:
-            told = "it was saved under another name since this commit was asked for; commit it again"
-            raise DocumentError(row.path, told)
-        # What somebody else has written is no file of ours: ours is written anew, at a person's word. What
-        # was edited while documents before it were saved goes along: the BOM is that of the file.
-        if row.state is not State.SAVED or base.replaced or is_edited(self.documents, row.document):
-            if base.replaced and not row.replaced:
-                told = "somebody has written it since this commit was asked for; nothing was saved over it. "
-                raise DocumentError(row.path, told + "Commit it again, and choose which one counts")
-            if base.replaced:
-                self.keep_aside(row.path)
-            self.documents.save(row.document)
-        stamp = stamp_of(row.path)
-        snapshot = self.take(row.document)
-        key = self.new_key()
-        held = self.hold(row.path, key) if snapshot.identity else None
-        return Taken(row, snapshot, key, held, stamp, base=base)
+def take_each(
+    rows: Iterable[Row], documents: Documents, take: Callable[[Any], Snapshot], outbox: Keeping
+) -> Iterator[Taken]:
+    """Save one document after another and take snapshots; a failure does not stop the others. GUI thread."""
+    for row in rows:
+        try:
+            taken = _take(row, documents, take, outbox)
+        except SiloError as error:
+            taken = Taken(row, error=error)
+        except ReferenceError:
+            text = translate("Silo", "It was closed before it was saved: open it and commit it again.")
+            taken = Taken(row, error=SiloError(text))
+        except Exception as error:  # noqa: BLE001  # one document's trouble is not that of the others
+            taken = Taken(row, error=SiloError(f"unexpected problem ({type(error).__name__}: {error})"))
+        yield taken
+
+
+def _take(row: Row, documents: Documents, take: Callable[[Any], Snapshot], outbox: Keeping) -> Taken:
+    base = documents.base(row.document)
+    if one_path(row.document.FileName) != row.path:
+        told = "it was saved under another name since this commit was asked for; commit it again"
+        raise DocumentError(row.path, told)
+    # What somebody else has written is no file of ours: ours is written anew, at a person's word. What
+    # was edited while documents before it were saved goes along: the BOM is that of the file.
+    if row.state is not State.SAVED or base.replaced or is_edited(documents, row.document):
+        if base.replaced and not row.replaced:
+            told = "somebody has written it since this commit was asked for; nothing was saved over it. "
+            raise DocumentError(row.path, told + "Commit it again, and choose which one counts")
+        if base.replaced:
+            outbox.keep_aside(row.path)
+        documents.save(row.document)
+    stamp = stamp_of(row.path)
+    snapshot, key = take(row.document), new_key()
+    held = outbox.hold(row.path, key) if snapshot.identity else None
+    return Taken(row, snapshot, key, held, stamp, base=base)

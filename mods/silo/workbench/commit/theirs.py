@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from silo.bom.changes import Assembly, ThreeLines
 from silo.bom.errors import SiloError
 from silo.bom.naming import display_name
-from silo.workbench.commit.opened import Base, Origins
+from silo.workbench.commit.opened import Base
 from silo.workbench.words import counted, plain, quantity, translate
 
 if TYPE_CHECKING:
@@ -135,7 +135,7 @@ class Asked:
 
 def look(
     client: SiloClient,
-    origins: Origins,
+    outbox: Store,
     asked: Iterable[Asked],
     mine: Callable[[str], Assembly | None],
     cancelled: Cancel | None = None,
@@ -149,36 +149,15 @@ def look(
     items = client.get_items_by_uuid([one.identity for one in files], cancelled=cancelled)
     found: dict[str, Theirs] = {}
     for one in files:
-        item = items.get(one.identity)
-        if (
-            item is not None
-            and (theirs := _one(client, origins, one, item.part_number, mine, cancelled)) is not None
-        ):
-            found[one.path] = theirs
+        if (item := items.get(one.identity)) is None:
+            continue
+        file = _File(one.path, item.part_number, one.identity, one.base.settle(outbox))
+        if (stands := file.standing(client, outbox)) is not None:
+            lines: tuple[ThreeLines, ...] = ()
+            with suppress(SiloError):  # the question stands without its details
+                lines = file.lines(client, stands, mine(one.path), cancelled)
+            found[one.path] = file.theirs(stands, lines)
     return found
-
-
-def _one(
-    client: SiloClient,
-    origins: Origins,
-    one: Asked,
-    part_number: str,
-    mine: Callable[[str], Assembly | None],
-    cancelled: Cancel | None,
-) -> Theirs | None:
-    from silo.api.revisions import is_newest, standing
-
-    origin = one.base.settle(origins)
-    if is_newest(origin, client.revisions(part_number, newest=1)):
-        return None
-    known = getattr(origins, "known_revision", lambda *_: None)(client.base_url, origin, one.identity)
-    stands = standing(client.revisions(part_number), origin, known)
-    if stands.newer is None:
-        return None
-    lines: tuple[ThreeLines, ...] = ()
-    with suppress(SiloError):  # the question stands without its details
-        lines = _lines(client, part_number, one.path, stands, mine(one.path), cancelled)
-    return _theirs(one.path, part_number, stands, lines)
 
 
 def look_held(
@@ -190,7 +169,6 @@ def look_held(
     Raises SiloError where the server or a file does not answer.
     """
     from silo.api.address import canonical
-    from silo.api.revisions import standing
     from silo.bom.report import from_plain
     from silo.vault.revisions import top_of
 
@@ -201,41 +179,50 @@ def look_held(
         mine = top_of(from_plain(json.loads(extraction)))
     except ValueError:
         return None  # sending it says so
-    known = outbox.known_revision(client.base_url, entry.origin, entry.identity)
-    stands = standing(client.revisions(entry.part_number), entry.origin, known)
-    if stands.newer is None:
-        return None
-    lines = _lines(client, entry.part_number, entry.path, stands, mine, cancelled)
-    return _theirs(entry.path, entry.part_number, stands, lines)
+    file = _File(entry.path, entry.part_number, entry.identity, entry.origin)
+    stands = file.standing(client, outbox)
+    return None if stands is None else file.theirs(stands, file.lines(client, stands, mine, cancelled))
 
 
-def _lines(
-    client: SiloClient,
-    part_number: str,
-    path: str,
-    stands: Standing,
-    mine: Assembly | None,
-    cancelled: Cancel | None,
-) -> tuple[ThreeLines, ...]:
-    from silo.vault.revisions import RevisionBoms
+@dataclass(frozen=True)
+class _File:
+    path: str
+    part_number: str
+    identity: str
+    origin: str
 
-    if mine is None:
-        return ()
-    with RevisionBoms(client, part_number, path, cancelled) as boms:
-        return boms.three(stands, mine)
+    def standing(self, client: SiloClient, outbox: Store) -> Standing | None:
+        """None where the file would undo nothing."""
+        from silo.api.revisions import is_newest, standing
 
+        # The newest one decides it nearly always; an item may have hundreds.
+        if is_newest(self.origin, client.revisions(self.part_number, newest=1)):
+            return None
+        known = outbox.known_revision(client.base_url, self.origin, self.identity)
+        stands = standing(client.revisions(self.part_number), self.origin, known)
+        return None if stands.newer is None else stands
 
-def _theirs(path: str, part_number: str, stands: Standing, lines: tuple[ThreeLines, ...]) -> Theirs:
-    newest = stands.newer
-    assert newest is not None  # the callers looked
-    return Theirs(
-        path,
-        part_number,
-        newest.revision_number,
-        newest.created_by or "",
-        newest.created_at.timestamp() if newest.created_at else None,
-        newest.comment,
-        stands.base.revision_number if stands.base is not None else None,
-        lines,
-        newest.model_dump(mode="json", exclude={"properties", "links"}),
-    )
+    def lines(
+        self, client: SiloClient, stands: Standing, mine: Assembly | None, cancelled: Cancel | None
+    ) -> tuple[ThreeLines, ...]:
+        from silo.vault.revisions import RevisionBoms
+
+        if mine is None:
+            return ()
+        with RevisionBoms(client, self.part_number, self.path, cancelled) as boms:
+            return boms.three(stands, mine)
+
+    def theirs(self, stands: Standing, lines: tuple[ThreeLines, ...]) -> Theirs:
+        newest = stands.newest
+        assert newest is not None  # something is newer
+        return Theirs(
+            self.path,
+            self.part_number,
+            newest.revision_number,
+            newest.created_by or "",
+            newest.created_at.timestamp() if newest.created_at else None,
+            newest.comment,
+            stands.base.revision_number if stands.base is not None else None,
+            lines,
+            newest.model_dump(mode="json", exclude={"properties", "links"}),
+        )

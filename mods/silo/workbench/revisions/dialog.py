@@ -13,7 +13,7 @@ from silo.workbench.commit.theirs import more_text
 from silo.workbench.gui import widgets
 from silo.workbench.gui.qt import QtCore, QtGui, QtWidgets
 from silo.workbench.pane.activity import Tone
-from silo.workbench.revisions.flow import History, Known, RevisionFlow, left_alone
+from silo.workbench.revisions.flow import Known, RevisionFlow, left_alone
 from silo.workbench.words import plain, tip, translate
 
 if TYPE_CHECKING:
@@ -47,6 +47,22 @@ def _revisions_table() -> Any:
         translate("Silo", "Comment"),
     )
     return widgets.tree("revisions", headings)
+
+
+def _fill_in(tree: Any, known: Known, *, newest: str = "") -> None:
+    """Show the revisions and choose the first row; ``newest``: the comment of one above them, number 0."""
+    rows = [(0, [translate("Silo", "newest"), "", "", newest], "")] if newest and known.revisions else []
+    rows += [(one.revision_number, revision_texts(one), one.comment) for one in known.revisions]
+    for number, texts, hint in rows:
+        if number == known.base:
+            texts[0] += " ← " + translate("Silo", "yours")
+        row = QtWidgets.QTreeWidgetItem(texts)
+        row.setToolTip(3, tip(hint))
+        row.setData(0, _DATA, number)
+        tree.addTopLevelItem(row)
+    for column in range(3):
+        tree.resizeColumnToContents(column)
+    tree.setCurrentItem(tree.topLevelItem(0))
 
 
 class _Window(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no types
@@ -212,27 +228,14 @@ class OpenDialog(_Window):
         return str(row.data(0, _DATA)) if row is not None else ""
 
     def _show(self, known: Known) -> None:
-        newest = QtWidgets.QTreeWidgetItem([translate("Silo", "newest"), "", "", ""])
-        newest.setText(3, translate("Silo", "with the newest of all that it links to"))
-        newest.setData(0, _DATA, 0)
-        rows = [newest] if known.revisions else []
-        for revision in known.revisions:
-            row = QtWidgets.QTreeWidgetItem(revision_texts(revision))
-            row.setToolTip(3, tip(revision.comment))
-            row.setData(0, _DATA, revision.revision_number)
-            rows.append(row)
-        self.revisions.addTopLevelItems(rows)
-        for column in range(3):
-            self.revisions.resizeColumnToContents(column)
+        _fill_in(self.revisions, known, newest=translate("Silo", "with the newest of all that it links to"))
         picture = QtGui.QPixmap()
         if known.picture and picture.loadFromData(known.picture):
             self.picture.setPixmap(picture.scaledToHeight(PICTURE))
             self.picture.show()
-        if rows:
-            self.revisions.setCurrentItem(rows[0])
-        else:
+        if not known.revisions:
             self.say(translate("Silo", "It has no file in Silo."))
-        self.open_button.setEnabled(bool(rows))
+        self.open_button.setEnabled(bool(known.revisions))
 
     def _open(self) -> None:
         row, folder = self.revisions.currentItem(), self.folder.text().strip()
@@ -251,7 +254,7 @@ class HistoryDialog(_Window):
         title = translate("Silo", "History of {name}").replace("{name}", plain(os.path.basename(path), 80))
         super().__init__(flow, parent, "SiloHistory", title, (680, 460))
         self._path = path
-        self._history: History | None = None
+        self._known: Known | None = None
         self.revisions = _revisions_table()
         self.revisions.currentItemChanged.connect(lambda _now, _before: self._chosen())
         self._layout.addWidget(self.revisions, 1)
@@ -263,24 +266,13 @@ class HistoryDialog(_Window):
         self._finish(self.get_button)
         self.say(translate("Silo", "Asking Silo…"))
 
-    def fill(self, history: History) -> None:
+    def fill(self, known: Known) -> None:
         """Show the revisions."""
         if self._closed:
             return
-        self._history = history
-        self.say("" if history.known.revisions else translate("Silo", "It has no file in Silo."))
-        for revision in history.known.revisions:
-            texts = revision_texts(revision)
-            if revision.revision_number == history.base:
-                texts[0] += " ← " + translate("Silo", "yours")
-            row = QtWidgets.QTreeWidgetItem(texts)
-            row.setToolTip(3, tip(revision.comment))
-            row.setData(0, _DATA, revision.revision_number)
-            self.revisions.addTopLevelItem(row)
-        for column in range(3):
-            self.revisions.resizeColumnToContents(column)
-        if history.known.revisions:
-            self.revisions.setCurrentItem(self.revisions.topLevelItem(0))
+        self._known = known
+        self.say("" if known.revisions else translate("Silo", "It has no file in Silo."))
+        _fill_in(self.revisions, known)
 
     def _number(self) -> int:
         row = self.revisions.currentItem()
@@ -289,9 +281,9 @@ class HistoryDialog(_Window):
     def _chosen(self) -> None:
         number = self._number()
         self.get_button.setEnabled(bool(number))
-        if self._history is None or not number:
+        if self._known is None or not number:
             return
-        numbers = [one.revision_number for one in self._history.known.revisions]
+        numbers = [one.revision_number for one in self._known.revisions]
         older = next((one for one in numbers if one < number), None)
         self.change.setText(translate("Silo", "Comparing…"))
         self._first((), 0)
@@ -305,15 +297,15 @@ class HistoryDialog(_Window):
         def failed(error: SiloError) -> None:
             self.change.setText(str(error))
 
-        item = self._history.known.item
+        item = self._known.item
         self._flow.bom_change(
             item.part_number, self._path, older, number, self._alive(done), self._alive(failed)
         )
 
     def _get(self) -> None:
-        if self._history is None:
+        if self._known is None:
             return
-        number, item = self._number(), self._history.known.item
+        number, item = self._number(), self._known.item
         folder = ask_folder(self, os.path.dirname(os.path.dirname(self._path)))
         if folder:
             name = f"{plain(item.part_number, 60).replace('/', '_')}-r{number}"

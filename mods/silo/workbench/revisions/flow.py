@@ -12,7 +12,7 @@ import re
 import shutil
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,18 +37,15 @@ MOST_FOUND = 60
 
 @dataclass(frozen=True)
 class Known:
-    """An item with its revisions that have a file, newest first, and its picture (PNG)."""
+    """An item with its revisions that have a file, newest first, and its picture (PNG).
+
+    base
+        the revision that the document was made from; None: unknown, or no document was asked about.
+    """
 
     item: Item
     revisions: tuple[Revision, ...]
     picture: bytes = b""
-
-
-@dataclass(frozen=True)
-class History:
-    """The item of a document, its revisions, and the one that the document was made from; None: unknown."""
-
-    known: Known
     base: int | None = None
 
 
@@ -94,12 +91,12 @@ class RevisionFlow:
         self._desk.open(str(target))
 
     def _take(self, path: str, theirs: Theirs, taken: Callable[[], object]) -> None:
-        def replace(content: Path | None) -> None:
+        def put(content: Path | None) -> None:
             self._replace(path, content, theirs)
             taken()
 
         if not theirs.revision:
-            self._guarded(path, lambda: replace(None))
+            self._guarded(path, lambda: put(None))
             return
         content = self._session.outbox.path.parent / "fetched" / f"{time.monotonic_ns()}.FCStd"
 
@@ -114,7 +111,7 @@ class RevisionFlow:
         self._session.ask(
             translate("Silo", "Fetching from Silo"),
             fetch,
-            done=lambda _none: self._guarded(path, lambda: replace(content)),
+            done=lambda _none: self._guarded(path, lambda: put(content)),
             failed=lambda error: self._box_error(path, error),
         )
 
@@ -252,7 +249,7 @@ class RevisionFlow:
     # -- the history of a document ----------------------------------------------------------------------
 
     def history(
-        self, identity: str, base: Base, done: Callable[[History], None], failed: Callable[[SiloError], None]
+        self, identity: str, base: Base, done: Callable[[Known], None], failed: Callable[[SiloError], None]
     ) -> None:
         """The revisions of a document's item.
 
@@ -261,7 +258,7 @@ class RevisionFlow:
         """
         outbox = self._session.outbox
 
-        def run(client: SiloClient, _control: Control) -> History:
+        def run(client: SiloClient, _control: Control) -> Known:
             from silo.api.revisions import standing
             from silo.bom.errors import NotFoundError
 
@@ -272,7 +269,7 @@ class RevisionFlow:
             origin = base.settle(outbox)
             number = outbox.known_revision(client.base_url, origin, identity)
             made_from = standing(known.revisions, origin, number).base
-            return History(known, made_from.revision_number if made_from is not None else None)
+            return replace(known, base=made_from.revision_number if made_from is not None else None)
 
         self._session.ask(translate("Silo", "Asking Silo"), run, done, failed)
 
