@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -24,23 +26,67 @@ def sha(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def mine(vault: Vault, content: bytes, origin: str, comment: str = "") -> Entry:
-    """A commit of Top with a file and one bolt, made from ``origin``."""
+def mine(
+    vault: Vault,
+    content: bytes,
+    made_from: bytes | None = None,
+    comment: str = "",
+    *,
+    bom: bool = True,
+    path: Path | None = None,
+) -> Entry:
+    """A commit of Top with a file and, unless it is a file only, as many bolts as its content is long."""
     vault.clock += 1
-    vault.top.write_bytes(content)
-    taken = vault.snapshot(vault.part("Bolt", len(content)))
+    path = path or vault.top
+    path.write_bytes(content)
+    extraction = vault.snapshot(vault.part("Bolt", len(content))).extraction
     return vault.outbox.add(
         Commit(
-            path=str(vault.top),
+            path=str(path),
             taken_at=vault.clock,
             label="Top",
             identity=vault.ids["Top"],
-            file=vault.top,
-            extraction=taken.extraction,
-            origin=origin,
+            file=path,
+            extraction=extraction if bom else None,
+            origin=UNKNOWN if made_from is None else sha(made_from),
             comment=comment,
         )
     )
+
+
+def sent(vault: Vault, *contents: bytes, made_from: bytes | None = None, bom: bool = False) -> None:
+    """Commits that are in Silo, each made from the one before."""
+    for content in contents:
+        mine(vault, content, made_from, bom=bom)
+        made_from = content
+    vault.send()
+
+
+def once(vault: Vault, called: str, deed: Callable[[], object], *, after: bool = False) -> None:
+    """Do this the next time that the server is called so, before it acts or after."""
+
+    def hook(name: str) -> None:
+        if name == called:
+            setattr(vault.silo, place, lambda _name: None)
+            deed()
+
+    place = "after" if after else "before"
+    setattr(vault.silo, place, hook)
+
+
+def lose() -> None:
+    raise UnreachableError("no answer")
+
+
+def refuse() -> None:
+    raise RejectedError("Bolt is archived")
+
+
+def held(vault: Vault) -> Entry:
+    """The one entry that waits, for a person."""
+    (entry,) = vault.waiting()
+    assert entry.state is State.HELD
+    return entry
 
 
 def theirs(vault: Vault, content: bytes, base: int) -> Revision:
@@ -55,39 +101,31 @@ def theirs(vault: Vault, content: bytes, base: int) -> Revision:
         vault.silo.user = me
 
 
-def contents(vault: Vault) -> list[bytes]:
-    return vault.files()
-
-
 def test_a_commit_that_would_undo_a_colleagues_is_held_with_file_and_bom(vault: Vault) -> None:
     """The reason says who, which and what; nothing of it is in Silo."""
-    mine(vault, b"one", UNKNOWN)
-    vault.send()
+    sent(vault, b"one", bom=True)
     before = vault.lines()
     theirs(vault, b"one less", 1)
-    mine(vault, b"one other", sha(b"one"))
+    mine(vault, b"one other", b"one")
     report = vault.send()
-    (held,) = vault.waiting()
-    assert (held.state, held.newer["revision_number"], held.newer["created_by"]) == (State.HELD, 2, "alice")
-    assert "alice committed revision 2" in held.reason
-    assert "(less)" in held.reason
-    assert "made from revision 1" in held.reason
-    assert (held.file_left, held.bom_left, report.sent) == (True, True, [])
-    assert (contents(vault), vault.lines()) == ([b"one", b"one less"], before)
+    entry = held(vault)
+    assert (entry.newer["revision_number"], entry.newer["created_by"]) == (2, "alice")
+    for told in ("alice committed revision 2", "(less)", "made from revision 1"):
+        assert told in entry.reason
+    assert (entry.file_left, entry.bom_left, report.sent) == (True, True, [])
+    assert (vault.files(), vault.lines()) == ([b"one", b"one less"], before)
 
 
 def test_on_top_of_it_at_a_persons_word_and_the_comment_says_so(vault: Vault) -> None:
     """Retry takes the revision that the person saw; a still newer one is asked about again."""
-    mine(vault, b"one", UNKNOWN)
-    vault.send()
+    sent(vault, b"one", bom=True)
     theirs(vault, b"one less", 1)
-    entry = mine(vault, b"one other", sha(b"one"), "longer")
+    entry = mine(vault, b"one other", b"one", "longer")
     vault.send()
     vault.outbox.retry(entry.id)
     theirs(vault, b"one less and less", 2)
     vault.send()
-    (held,) = vault.waiting()
-    assert held.newer["revision_number"] == 3
+    assert held(vault).newer["revision_number"] == 3
     vault.outbox.retry(entry.id)
     vault.send()
     assert vault.waiting() == ()
@@ -99,87 +137,65 @@ def test_on_top_of_it_at_a_persons_word_and_the_comment_says_so(vault: Vault) ->
 
 def test_a_race_between_the_look_and_the_upload_is_caught_by_the_server(vault: Vault) -> None:
     """The colleague commits after we looked: the 409 holds the entry as our own look does."""
-    mine(vault, b"one", UNKNOWN)
-    vault.send()
-    mine(vault, b"one other", sha(b"one"))
+    sent(vault, b"one", bom=True)
+    mine(vault, b"one other", b"one")
 
-    def hook(called: str) -> None:
-        if called == "upload_file":
-            vault.silo.before = lambda _name: None
-            theirs(vault, b"one less", 1)
-
-    vault.silo.before = hook
+    once(vault, "upload_file", lambda: theirs(vault, b"one less", 1))
     vault.send()
-    (held,) = vault.waiting()
-    assert (held.state, held.newer["revision_number"]) == (State.HELD, 2)
-    assert contents(vault) == [b"one", b"one less"]
+    assert held(vault).newer["revision_number"] == 2
+    assert vault.files() == [b"one", b"one less"]
 
 
 def test_own_commits_follow_each_other_offline(vault: Vault) -> None:
     """Each is made from the one before, which has no number yet."""
-    mine(vault, b"one", UNKNOWN)
-    mine(vault, b"two", sha(b"one"))
-    mine(vault, b"three", sha(b"two"))
+    mine(vault, b"one")
+    mine(vault, b"two", b"one")
+    mine(vault, b"three", b"two")
     vault.send()
-    assert contents(vault) == [b"one", b"two", b"three"]
+    assert vault.files() == [b"one", b"two", b"three"]
     assert [r.base_revision for r in reversed(vault.silo.revisions(vault.number))] == [0, 1, 2]
 
 
 def test_what_follows_a_held_one_is_held_too_and_goes_after_it(vault: Vault) -> None:
     """It has the first one's changes; sent alone it would undo the colleague's as well."""
-    mine(vault, b"one", UNKNOWN)
-    vault.send()
+    sent(vault, b"one", bom=True)
     theirs(vault, b"one less", 1)
-    first = mine(vault, b"two", sha(b"one"))
-    second = mine(vault, b"three", sha(b"two"))
+    first = mine(vault, b"two", b"one")
+    second = mine(vault, b"three", b"two")
     vault.send()
     assert [entry.state for entry in vault.waiting()] == [State.HELD, State.HELD]
     vault.outbox.retry(first.id)
     vault.send()
     vault.outbox.retry(second.id)
     vault.send()
-    assert (vault.waiting(), contents(vault)) == ((), [b"one", b"one less", b"two", b"three"])
+    assert (vault.waiting(), vault.files()) == ((), [b"one", b"one less", b"two", b"three"])
 
 
 def test_a_file_of_unknown_origin_is_asked_about(vault: Vault) -> None:
     """Such as a copied folder whose file was saved without the add-on."""
-    mine(vault, b"one", UNKNOWN)
+    sent(vault, b"one", bom=True)
+    mine(vault, b"from somewhere")
     vault.send()
-    mine(vault, b"from somewhere", UNKNOWN)
-    vault.send()
-    (held,) = vault.waiting()
-    assert "made from a file that is no revision in Silo" in held.reason
+    assert "made from a file that is no revision in Silo" in held(vault).reason
 
 
 def test_a_lost_answer_is_no_colleague(vault: Vault) -> None:
     """Our own revision arrived; the run after it finds that."""
-    mine(vault, b"one", UNKNOWN)
-    vault.send()
-    mine(vault, b"two", sha(b"one"))
+    sent(vault, b"one", bom=True)
+    mine(vault, b"two", b"one")
 
-    def hook(called: str) -> None:
-        if called == "upload_file":
-            vault.silo.after = lambda _name: None
-            raise UnreachableError("no answer")
-
-    vault.silo.after = hook
+    once(vault, "upload_file", lose, after=True)
     vault.send()
     vault.send(force=True)
-    assert (vault.waiting(), contents(vault)) == ((), [b"one", b"two"])
+    assert (vault.waiting(), vault.files()) == ((), [b"one", b"two"])
 
 
 def test_the_bom_of_a_file_that_a_colleague_went_on_from_is_not_sent(vault: Vault) -> None:
     """Their BOM has these changes; ours, coming late, would undo theirs."""
-    mine(vault, b"one", UNKNOWN)
-    vault.send()
-    mine(vault, b"longer", sha(b"one"))
+    sent(vault, b"one", bom=True)
+    mine(vault, b"longer", b"one")
 
-    def hook(called: str) -> None:
-        if called == "merge_bom":
-            vault.silo.before = lambda _name: None
-            theirs(vault, b"went further", 2)
-
-    vault.silo.before = hook
+    once(vault, "merge_bom", lambda: theirs(vault, b"went further", 2))
     vault.send()
     assert vault.lines() == {"F01-0001": 3}
     assert vault.waiting() == ()
@@ -199,14 +215,13 @@ def test_a_server_without_checksums_is_known_by_what_was_sent_to_it(vault: Vault
         revisions = bare  # type: ignore[assignment]
 
     silo.__class__ = Bare
-    mine(vault, b"one", UNKNOWN)
-    vault.send()
-    mine(vault, b"two", sha(b"one"))
+    sent(vault, b"one", bom=True)
+    mine(vault, b"two", b"one")
     vault.send()
     theirs(vault, b"theirs", 2)
-    mine(vault, b"three", sha(b"two"))
+    mine(vault, b"three", b"two")
     vault.send()
-    assert contents(vault) == [b"one", b"two", b"theirs"]
+    assert vault.files() == [b"one", b"two", b"theirs"]
     assert [entry.newer["revision_number"] for entry in vault.waiting()] == [3]
 
 
@@ -223,24 +238,15 @@ def test_saved_files_are_known_by_what_they_were_made_from(vault: Vault) -> None
 @pytest.mark.parametrize("origin", ["", UNKNOWN])
 def test_the_first_file_of_an_item_passes(vault: Vault, origin: str) -> None:
     """There is nothing to undo."""
-    mine(vault, b"one", origin)
+    vault.commit(vault.snapshot(), content=b"one", origin=origin)
     vault.send()
-    assert (vault.waiting(), contents(vault)) == ((), [b"one"])
-
-
-def refuse_next_merge(vault: Vault) -> None:
-    def hook(called: str) -> None:
-        if called == "merge_bom":
-            vault.silo.before = lambda _name: None
-            raise RejectedError("Bolt is archived")
-
-    vault.silo.before = hook
+    assert (vault.waiting(), vault.files()) == ((), [b"one"])
 
 
 def test_a_bom_that_was_held_does_not_undo_a_colleagues(vault: Vault) -> None:
     """Retry says "the part is there now", not "send it over what a colleague committed meanwhile"."""
-    entry = mine(vault, b"one", UNKNOWN)
-    refuse_next_merge(vault)
+    entry = mine(vault, b"one")
+    once(vault, "merge_bom", refuse)
     vault.send()
     assert [one.file_left for one in vault.waiting()] == [False]
     theirs(vault, b"one less", 1)
@@ -252,45 +258,21 @@ def test_a_bom_that_was_held_does_not_undo_a_colleagues(vault: Vault) -> None:
 
 def test_a_held_bom_may_go_after_files_that_come_from_here(vault: Vault) -> None:
     """Own files that were made from its file are no colleague's; with one between them they are."""
-    entry = mine(vault, b"one", UNKNOWN)
-    refuse_next_merge(vault)
+    entry = mine(vault, b"one")
+    once(vault, "merge_bom", refuse)
     vault.send()
-    for content, origin in ((b"two", b"one"), (b"three", b"two")):
-        vault.top.write_bytes(content)
-        vault.outbox.add(
-            Commit(
-                path=str(vault.top),
-                taken_at=2.0,
-                identity=vault.ids["Top"],
-                file=vault.top,
-                origin=sha(origin),
-            )
-        )
-        vault.send()
+    sent(vault, b"two", b"three", made_from=b"one")
     vault.outbox.retry(entry.id)
     vault.send()
     assert (vault.waiting(), vault.lines()) == ((), {"F01-0001": 3})
 
 
-def file_only(vault: Vault, content: bytes, origin: str) -> Entry:
-    vault.top.write_bytes(content)
-    return vault.outbox.add(
-        Commit(path=str(vault.top), taken_at=2.0, identity=vault.ids["Top"], file=vault.top, origin=origin)
-    )
-
-
 def test_the_bom_of_a_file_that_is_there_already_does_not_undo_a_colleagues(vault: Vault) -> None:
     """The same file committed again makes no revision; its BOM is still that of the revision there is."""
-    file_only(vault, b"one", UNKNOWN)
-    vault.send()
-    mine(vault, b"one", sha(b"one"))
+    sent(vault, b"one")
+    mine(vault, b"one", b"one")
 
-    def hook(called: str) -> None:
-        if called == "merge_bom":
-            vault.silo.before = lambda _name: None
-            theirs(vault, b"one less", 1)
-
-    vault.silo.before = hook
+    once(vault, "merge_bom", lambda: theirs(vault, b"one less", 1))
     vault.send()
     assert (vault.waiting(), vault.lines()) == ((), {})
     assert "alice has committed revision 2 since" in vault.told[-1].entry.remark
@@ -306,45 +288,34 @@ def restored(vault: Vault, revision: int) -> None:
 
 def test_a_restored_server_gives_our_number_to_a_colleagues_file(vault: Vault) -> None:
     """Revision 2 was ours once. The one that is there now is not, and sending would undo it."""
-    file_only(vault, b"one", UNKNOWN)
-    file_only(vault, b"two", sha(b"one"))
-    vault.send()
+    sent(vault, b"one", b"two")
     restored(vault, 1)
     theirs(vault, b"one less", 1)
-    file_only(vault, b"three", sha(b"two"))
+    mine(vault, b"three", b"two", bom=False)
     vault.send()
-    (held,) = vault.waiting()
-    assert (held.state, held.newer["revision_number"]) == (State.HELD, 2)
-    assert contents(vault) == [b"one", b"one less"]
+    assert held(vault).newer["revision_number"] == 2
+    assert vault.files() == [b"one", b"one less"]
 
 
 def test_our_own_upload_to_a_restored_server_is_no_colleagues(vault: Vault) -> None:
     """Its answer was lost, and its number is below what the server had before it was restored."""
-    file_only(vault, b"one", UNKNOWN)
-    file_only(vault, b"two", sha(b"one"))
-    vault.send()
-    file_only(vault, b"three", sha(b"two"))
+    sent(vault, b"one", b"two")
+    mine(vault, b"three", b"two", bom=False)
 
-    def lose(called: str) -> None:
-        if called == "upload_file":
-            raise UnreachableError("no answer")
-
-    vault.silo.before = lose
+    once(vault, "upload_file", lose)
     vault.send()
     restored(vault, 0)
-    vault.silo.before, vault.silo.after = lambda _name: None, lose
+    once(vault, "upload_file", lose, after=True)
     vault.send(force=True)
-    vault.silo.after = lambda _name: None
     vault.send(force=True)
-    assert (vault.waiting(), contents(vault)) == ((), [b"three"])
+    assert (vault.waiting(), vault.files()) == ((), [b"three"])
 
 
 def test_another_server_knows_nothing_of_the_old_ones_revisions(vault: Vault) -> None:
     """Neither what was seen there, nor a comment on it, goes along."""
-    file_only(vault, b"one", UNKNOWN)
-    vault.send()
+    sent(vault, b"one")
     theirs(vault, b"one less", 1)
-    entry = file_only(vault, b"one other", sha(b"one"))
+    entry = mine(vault, b"one other", b"one", bom=False)
     vault.send()
     vault.outbox.retry(entry.id, "http://other.example")
     (moved,) = vault.waiting()
@@ -359,58 +330,39 @@ def test_another_server_knows_nothing_of_the_old_ones_revisions(vault: Vault) ->
 
 def test_a_copy_under_another_name_sends_neither_file_nor_bom_unasked(vault: Vault) -> None:
     """ "Save As" copies the identity along: the copy's BOM is not that of the item."""
-    mine(vault, b"one", UNKNOWN)
+    sent(vault, b"one", bom=True)
+    mine(vault, b"variant", b"one", path=vault.folder / "Variant.FCStd")
     vault.send()
-    copy = vault.folder / "Variant.FCStd"
-    copy.write_bytes(b"variant")
-    taken = vault.snapshot(vault.part("Bolt", 9))
-    vault.outbox.add(
-        Commit(
-            path=str(copy),
-            taken_at=9.0,
-            label="Top",
-            identity=vault.ids["Top"],
-            file=copy,
-            extraction=taken.extraction,
-            origin=sha(b"one"),
-        )
-    )
-    vault.send()
-    assert (contents(vault), vault.lines()) == ([b"one"], {"F01-0001": 3})
-    (held,) = vault.waiting()
-    assert (held.file_left, held.bom_left) == (True, True)
+    assert (vault.files(), vault.lines()) == ([b"one"], {"F01-0001": 3})
+    assert (held(vault).file_left, held(vault).bom_left) == (True, True)
 
 
 def test_on_top_of_what_a_person_saw_and_of_nothing_else(vault: Vault) -> None:
     """The server is restored between the person's word and the sending."""
-    file_only(vault, b"one", UNKNOWN)
-    vault.send()
+    sent(vault, b"one")
     theirs(vault, b"one less", 1)
-    entry = file_only(vault, b"one other", sha(b"one"))
+    entry = mine(vault, b"one other", b"one", bom=False)
     vault.send()
     vault.outbox.retry(entry.id)
     restored(vault, 1)
     theirs(vault, b"another one", 1)
     vault.send()
-    (held,) = vault.waiting()
-    assert (held.state, held.newer["file_checksum"]) == (State.HELD, sha(b"another one"))
-    assert contents(vault) == [b"one", b"another one"]
+    assert held(vault).newer["file_checksum"] == sha(b"another one")
+    assert vault.files() == [b"one", b"another one"]
 
 
 def test_a_revision_without_a_file_is_no_colleagues_work(vault: Vault) -> None:
     """Somebody typed a mass on the web page: the file is still the one that this was made from."""
-    file_only(vault, b"one", UNKNOWN)
-    vault.send()
+    sent(vault, b"one")
     vault.silo.update_item(vault.number, properties={"mass_kg": 2})
-    file_only(vault, b"two", sha(b"one"))
+    mine(vault, b"two", b"one", bom=False)
     vault.send()
-    assert (vault.waiting(), contents(vault)) == ((), [b"one", b"two"])
+    assert (vault.waiting(), vault.files()) == ((), [b"one", b"two"])
 
 
 def test_a_name_in_another_case_is_no_other_name(vault: Vault) -> None:
     """Windows and macOS show one file by both."""
-    file_only(vault, b"one", UNKNOWN)
-    vault.send()
+    sent(vault, b"one")
     known = vault.silo.revisions(vault.number)
     assert other_name("/elsewhere/TOP.fcstd", known) == ""
     assert other_name("/elsewhere/Top 2.FCStd", known) == "Top.FCStd"
@@ -418,10 +370,9 @@ def test_a_name_in_another_case_is_no_other_name(vault: Vault) -> None:
 
 def test_what_was_there_already_keeps_its_revision_over_a_hold(vault: Vault) -> None:
     """The BOM of a file that Silo had is refused; before its retry a colleague commits."""
-    file_only(vault, b"one", UNKNOWN)
-    vault.send()
-    entry = mine(vault, b"one", sha(b"one"))
-    refuse_next_merge(vault)
+    sent(vault, b"one")
+    entry = mine(vault, b"one", b"one")
+    once(vault, "merge_bom", refuse)
     vault.send()
     theirs(vault, b"one less", 1)
     vault.outbox.retry(entry.id)
@@ -432,33 +383,27 @@ def test_what_was_there_already_keeps_its_revision_over_a_hold(vault: Vault) -> 
 
 def test_a_bom_that_was_not_sent_makes_none_out_of_date(vault: Vault) -> None:
     """What the pane says of an older held one stays true: no newer commit of it has arrived."""
-    mine(vault, b"one", UNKNOWN)
-    refuse_next_merge(vault)
+    mine(vault, b"one")
+    once(vault, "merge_bom", refuse)
     vault.send()
-    mine(vault, b"longer", sha(b"one"))
+    mine(vault, b"longer", b"one")
 
-    def hook(called: str) -> None:
-        if called == "merge_bom":
-            vault.silo.before = lambda _name: None
-            theirs(vault, b"went further", 2)
-
-    vault.silo.before = hook
+    once(vault, "merge_bom", lambda: theirs(vault, b"went further", 2))
     vault.send()
-    (held,) = vault.waiting()
-    assert (held.bom_left, held.superseded) == (True, False)
+    assert (held(vault).bom_left, held(vault).superseded) == (True, False)
 
 
 def test_a_held_bom_does_not_go_after_a_file_with_a_colleagues_between(vault: Vault) -> None:
     """Sent on top of theirs at a person's word: the older BOM knows neither."""
-    entry = mine(vault, b"one", UNKNOWN)
-    refuse_next_merge(vault)
+    entry = mine(vault, b"one")
+    once(vault, "merge_bom", refuse)
     vault.send()
     theirs(vault, b"one less", 1)
-    on_top = file_only(vault, b"mine", sha(b"one"))
+    on_top = mine(vault, b"mine", b"one", bom=False)
     vault.send()
     vault.outbox.retry(on_top.id)
     vault.send()
-    assert contents(vault)[-1] == b"mine"
+    assert vault.files()[-1] == b"mine"
     vault.outbox.retry(entry.id)
     vault.send()
     assert (vault.waiting(), vault.lines()) == ((), {})
@@ -466,30 +411,23 @@ def test_a_held_bom_does_not_go_after_a_file_with_a_colleagues_between(vault: Va
 
 def test_a_lost_answer_is_found_behind_a_colleagues_commit(vault: Vault) -> None:
     """Ours arrived, theirs was made from it: ours is not held, and not sent again."""
-    file_only(vault, b"one", UNKNOWN)
-    vault.send()
-    file_only(vault, b"two", sha(b"one"))
+    sent(vault, b"one")
+    mine(vault, b"two", b"one", bom=False)
 
-    def lose(called: str) -> None:
-        if called == "upload_file":
-            vault.silo.after = lambda _name: None
-            raise UnreachableError("no answer")
-
-    vault.silo.after = lose
+    once(vault, "upload_file", lose, after=True)
     vault.send()
     theirs(vault, b"three", 2)
     vault.send(force=True)
-    assert (vault.waiting(), contents(vault)) == ((), [b"one", b"two", b"three"])
+    assert (vault.waiting(), vault.files()) == ((), [b"one", b"two", b"three"])
     assert vault.told[-1].revision == 2
 
 
 @pytest.mark.parametrize("colleague", [False, True])
 def test_a_bom_does_not_go_without_its_file(vault: Vault, *, colleague: bool) -> None:
     """The server was restored between the two. Its number may be free, or a colleague's by now."""
-    file_only(vault, b"one", UNKNOWN)
-    vault.send()
-    entry = mine(vault, b"longer", sha(b"one"))
-    refuse_next_merge(vault)
+    sent(vault, b"one")
+    entry = mine(vault, b"longer", b"one")
+    once(vault, "merge_bom", refuse)
     vault.send()
     restored(vault, 1)
     if colleague:
@@ -497,25 +435,20 @@ def test_a_bom_does_not_go_without_its_file(vault: Vault, *, colleague: bool) ->
     vault.outbox.retry(entry.id)
     vault.send()
     if colleague:
-        (held,) = vault.waiting()
-        assert (held.file_left, held.bom_left, held.newer["revision_number"]) == (True, True, 2)
-        assert (contents(vault), vault.lines()) == ([b"one", b"less"], {})
+        entry = held(vault)
+        assert (entry.file_left, entry.bom_left, entry.newer["revision_number"]) == (True, True, 2)
+        assert (vault.files(), vault.lines()) == ([b"one", b"less"], {})
     else:
-        assert (vault.waiting(), contents(vault)) == ((), [b"one", b"longer"])
+        assert (vault.waiting(), vault.files()) == ((), [b"one", b"longer"])
         assert vault.lines() == {"F01-0001": 6}
 
 
 def test_a_restore_between_the_look_and_the_merge_is_caught_by_the_server(vault: Vault) -> None:
     """The file goes once more with the next run, then its BOM."""
-    mine(vault, b"one", UNKNOWN)
+    mine(vault, b"one")
 
-    def hook(called: str) -> None:
-        if called == "merge_bom":
-            vault.silo.before = lambda _name: None
-            restored(vault, 0)
-
-    vault.silo.before = hook
+    once(vault, "merge_bom", lambda: restored(vault, 0))
     assert "is not on this server" in vault.send().failed[0].reason
-    assert (contents(vault), vault.lines()) == ([], {})
+    assert (vault.files(), vault.lines()) == ([], {})
     vault.send(force=True)
-    assert (vault.waiting(), contents(vault), vault.lines()) == ((), [b"one"], {"F01-0001": 3})
+    assert (vault.waiting(), vault.files(), vault.lines()) == ((), [b"one"], {"F01-0001": 3})
