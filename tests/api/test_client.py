@@ -150,6 +150,15 @@ def test_the_bom_of_another_item_is_no_answer(server: Any, client: SiloClient) -
             ask("A01-0002")
 
 
+def test_another_item_is_no_answer(server: Any, client: SiloClient) -> None:
+    """A file would be sent to it."""
+    server.on(f"GET /api/items/by-uuid/{UUIDS[0]}", item(UUIDS[1]))
+    server.on(f"GET /api/items/by-uuid/{UUIDS[1].upper()}", item(UUIDS[1]))
+    assert client.get_item_by_uuid(UUIDS[1].upper()) is not None
+    with pytest.raises(ServerFaultError, match=f"answered with the item {UUIDS[1]}"):
+        client.get_item_by_uuid(UUIDS[0])
+
+
 def test_one_malformed_identity_does_not_spoil_the_others(
     server: Any, client: SiloClient, answer: Any
 ) -> None:

@@ -43,6 +43,7 @@ VERDICTS = {
     "ConflictError": ENTRY_PERSON,
     "CycleError": ENTRY_PERSON,
     "VersionConflictError": ENTRY_PERSON,
+    "MissingRevisionError": ENTRY_PERSON,
     "NewerRevisionError": ENTRY_PERSON,
     "CancelledError": ALL_RETRY,
 }

@@ -109,7 +109,7 @@ class ItemCalls(FileCalls):
         if not uuid.strip(". ") or any(c in "/\\?#%" or c < " " for c in uuid):
             return None
         try:
-            return self._get(f"item {uuid}", "items", "by-uuid", uuid).model(Item)
+            item = self._get(f"item {uuid}", "items", "by-uuid", uuid).model(Item)
         except WebPageError:
             if self._speaks_silo():
                 return None
@@ -119,6 +119,9 @@ class ItemCalls(FileCalls):
             raise
         except (NotFoundError, RejectedError):
             return None
+        if _written(item.id) != _written(uuid):
+            raise ServerFaultError(f"item {uuid}: the server answered with the item {item.id}")
+        return item
 
     def get_items_by_uuid(
         self, uuids: Iterable[str], /, *, cancelled: Cancel | None = None
