@@ -115,7 +115,6 @@ class BannerWidget(QtWidgets.QFrame):  # type: ignore[misc]
         widgets.clear(self._layout)
         self.setStyleSheet(
             f"QFrame#siloBanner {{ background: {told.ground}; border-radius: 4px; }}"
-            f" QFrame#siloBanner QLabel {{ color: {told.ink}; }}"
             if told.ground
             # The ground of the boxes, for which the colours are chosen; a theme's own may have any shade.
             else f"QFrame#siloBanner {{ background: {_ground(self)}; border-radius: 4px; }}"
@@ -123,7 +122,8 @@ class BannerWidget(QtWidgets.QFrame):  # type: ignore[misc]
         text = widgets.label(told.text)
         self._layout.addWidget(text)
         if told.ground:
-            text.setStyleSheet(f"QLabel {{ color: {told.ink}; }}")
+            # A theme gives labels a ground of their own.
+            text.setStyleSheet(f"QLabel {{ color: {told.ink}; background: transparent; }}")
         else:
             widgets.paint(text, told.tone)
         if not told.actions:
