@@ -45,14 +45,6 @@ class Manipulator:
         """Append the commit to the File toolbar."""
         return [{"append": name, "toolBar": "File"} for name in self._names[:1]] if self._wanted() else []
 
-    def modifyDockWindows(self) -> list[dict[str, str]]:
-        """The dock is our own."""
-        return []
-
-    def modifyContextMenu(self, _recipient: str) -> list[dict[str, str]]:
-        """No context menu entries."""
-        return []
-
 
 class ByHand:
     """The same for FreeCAD 0.20, with actions of our own that run the commands."""

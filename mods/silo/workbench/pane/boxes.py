@@ -113,12 +113,9 @@ class BannerWidget(QtWidgets.QFrame):  # type: ignore[misc]
             return
         self._drawn = told
         widgets.clear(self._layout)
-        self.setStyleSheet(
-            f"QFrame#siloBanner {{ background: {told.ground}; border-radius: 4px; }}"
-            if told.ground
-            # The ground of the boxes, for which the colours are chosen; a theme's own may have any shade.
-            else f"QFrame#siloBanner {{ background: {_ground(self)}; border-radius: 4px; }}"
-        )
+        # Else the ground of the boxes, for which the colours are chosen; a theme's own may have any shade.
+        ground = told.ground or _ground(self)
+        self.setStyleSheet(f"QFrame#siloBanner {{ background: {ground}; border-radius: 4px; }}")
         text = widgets.label(told.text)
         self._layout.addWidget(text)
         if told.ground:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from silo.bom.errors import CancelledError, SiloError
@@ -59,12 +59,6 @@ class Job:
     same_as: str = ""
 
 
-@dataclass(eq=False)
-class _Queued:
-    job: Job
-    control: Control = field(init=False)
-
-
 class Worker:
     """A thread that does jobs one after another.
 
@@ -90,19 +84,18 @@ class Worker:
         self._on_bug = on_bug
         self._change = threading.Condition()
         self._thread: threading.Thread | None = None
-        self._current: _Queued | None = None
-        self._waiting: deque[_Queued] = deque()
+        self._current: tuple[Job, Control] | None = None
+        self._waiting: deque[tuple[Job, Control]] = deque()
         self._closed = False
 
     def submit(self, job: Job) -> bool:
         """Queue a job; False where an equal one (``same_as``) waits already, or the worker is closed."""
         with self._change:
-            twice = job.same_as and any(q.job.same_as == job.same_as for q in self._waiting)
+            twice = job.same_as and any(other.same_as == job.same_as for other, _ in self._waiting)
             if twice or self._closed:
                 return False
-            queued = _Queued(job)
-            queued.control = Control(lambda detail, fraction: self._tell(queued, detail, fraction))
-            self._waiting.append(queued)
+            control = Control(lambda detail, fraction: self._tell(job, detail, fraction))
+            self._waiting.append((job, control))
             if self._thread is None:
                 # A daemon: a server that does not answer must not keep FreeCAD from closing.
                 self._thread = threading.Thread(target=self._work, name=self._name, daemon=True)
@@ -114,7 +107,7 @@ class Worker:
         """Ask the running job to stop. Jobs that wait are kept."""
         with self._change:
             if self._current is not None:
-                self._current.control.cancelled.set()
+                self._current[1].cancelled.set()
 
     def left(self, seconds: float = 0.0) -> int:
         """How many jobs run or wait, after at most so many seconds for them to become none."""
@@ -128,7 +121,7 @@ class Worker:
             self._closed = True
             self._waiting.clear()
             if self._current is not None:
-                self._current.control.cancelled.set()
+                self._current[1].cancelled.set()
             thread = self._thread
             self._change.notify_all()
         if thread is not None:
@@ -140,7 +133,7 @@ class Worker:
         """True where nothing runs and nothing waits."""
         return not self.left()
 
-    def _next(self) -> _Queued | None:
+    def _next(self) -> tuple[Job, Control] | None:
         with self._change:
             self._change.wait_for(lambda: self._waiting or self._closed)
             self._current = self._waiting.popleft() if self._waiting else None
@@ -148,9 +141,9 @@ class Worker:
 
     def _work(self) -> None:
         while (queued := self._next()) is not None:
-            self._tell(queued, "", None)
+            self._tell(queued[0], "", None)
             with collection_off():
-                end = self._finish(queued)
+                end = self._finish(*queued)
             with self._change:
                 self._current = None
                 left = len(self._waiting)
@@ -160,10 +153,9 @@ class Worker:
             if not left:
                 self._deliver(lambda: self._on_busy(None))
 
-    def _finish(self, queued: _Queued) -> Callable[[], None] | None:
-        job = queued.job
+    def _finish(self, job: Job, control: Control) -> Callable[[], None] | None:
         try:
-            result = job.run(queued.control)
+            result = job.run(control)
         except SiloError as error:
             failure = error
         except Exception as error:  # noqa: BLE001  # a bug in one job must not end the thread for all others
@@ -173,6 +165,6 @@ class Worker:
             return lambda: job.done(result)
         return lambda: job.failed(failure)
 
-    def _tell(self, queued: _Queued, detail: str, fraction: float | None) -> None:
-        busy = Busy(queued.job.title, detail, fraction, len(self._waiting))
+    def _tell(self, job: Job, detail: str, fraction: float | None) -> None:
+        busy = Busy(job.title, detail, fraction, len(self._waiting))
         self._deliver(lambda: self._on_busy(busy))
