@@ -202,9 +202,13 @@ build_one() {
 own_freecad() { command -v freecadcmd || command -v FreeCADCmd || true; }
 
 own_answer() {
-  local command
+  local command home
   command=$(own_freecad)
-  if [ -n "$command" ]; then ask_freecad "$command" || true; fi
+  if [ -z "$command" ]; then return; fi
+  # Each FreeCAD writes its profile when it ends; several that are asked at once must not share one.
+  home=$(mktemp -d)
+  FREECAD_USER_HOME=$home ask_freecad "$command" || true
+  rm -rf "$home"
 }
 
 build() {

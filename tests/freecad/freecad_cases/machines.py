@@ -84,7 +84,7 @@ def freecads() -> Mapping[str, FreeCAD]:
     if os.name != "posix":
         return {}
     told = subprocess.run(
-        [ROOTS, "--list"], capture_output=True, text=True, timeout=60, check=False, env=_ENVIRONMENT
+        [ROOTS, "--list"], capture_output=True, text=True, timeout=300, check=False, env=_ENVIRONMENT
     )
     found: dict[str, FreeCAD] = {}
     for line in told.stdout.splitlines():
