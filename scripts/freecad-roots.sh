@@ -124,6 +124,7 @@ configure_apt() {
   mkdir -p "$root/etc/apt/apt.conf.d"
   cp -a /etc/apt/apt.conf.d/. "$root/etc/apt/apt.conf.d/" 2>/dev/null || true
   cp -L /etc/resolv.conf "$root/etc/resolv.conf" 2>/dev/null || true
+  echo 'Acquire::Retries "3";' >"$root/etc/apt/apt.conf.d/80-retries"
   # No service is to be started in a root.
   printf '#!/bin/sh\nexit 101\n' >"$root/usr/sbin/policy-rc.d"
   chmod +x "$root/usr/sbin/policy-rc.d"

@@ -12,7 +12,9 @@ loads() { "$1" -c 'import OCP.BRep' 2>/dev/null; }
 loads "$1" && exit 0
 if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
     echo "The geometry kernel needs libGL.so.1: installing libgl1" >&2
-    apt-get -qq update && DEBIAN_FRONTEND=noninteractive apt-get -qq install -y --no-install-recommends libgl1 >/dev/null
+    export DEBIAN_FRONTEND=noninteractive
+    apt="apt-get -qq -o Acquire::Retries=3"
+    $apt update && $apt install -y --no-install-recommends libgl1 >/dev/null
 fi
 loads "$1" && exit 0
 echo "The geometry kernel cannot be loaded; tests that need it are skipped." >&2

@@ -15,8 +15,9 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -49,19 +50,26 @@ def other_disk(folder: Path) -> Iterator[Path]:
     mount.mkdir()
     command = [sys.executable, __file__, str(root), str(mount)]
     path = os.pathsep.join(filter(None, sys.path))
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env={**os.environ, "PYTHONPATH": path}
-    ) as process:
+    # Its complaints go to a file: nobody reads a pipe, and a full one would stop it.
+    with (
+        tempfile.TemporaryFile() as told,
+        subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=told, env={**os.environ, "PYTHONPATH": path}
+        ) as process,
+    ):
         assert process.stdout is not None
-        assert process.stderr is not None
         if process.stdout.readline() != b"mounted\n":
             process.kill()
-            _cannot(f"needs the right to mount: {process.stderr.read().decode(errors='replace')[-300:]}")
+            told.seek(0)
+            _cannot(f"needs the right to mount: {told.read().decode(errors='replace')[-300:]}")
         try:
             yield mount
         finally:
             subprocess.run([umount, "-u", "-z", str(mount)], check=True, capture_output=True)
-            process.wait(timeout=30)
+            # It ends with the last program that has a file there open; the disk is not waited for longer.
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(timeout=30)
+            process.kill()
 
 
 class OtherDisk(fuse.Operations if fuse else object):  # type: ignore[misc]
