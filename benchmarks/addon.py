@@ -68,7 +68,6 @@ def main() -> None:
 def start(version: str, folder: Path, args: argparse.Namespace) -> None:
     """The start, paired."""
     with window(version, folder) as freecad:
-        freecad.prepare()
         addon = freecad.home / "Mod" / "Silo"
         aside = freecad.home / "Silo-aside"
         pairs: list[tuple[dict[str, float], dict[str, float]]] = []
@@ -100,7 +99,6 @@ def measure(freecad: Window) -> dict[str, float]:
 def commit(version: str, folder: Path, args: argparse.Namespace) -> None:
     """The commit, and the drawing."""
     with window(version, folder) as freecad:
-        freecad.prepare()
         build(freecad, args.links, args.parts)
         told: dict[str, Any] = freecad.run(str(INSIDE / "commit.py"))
     first, *others = told["commits"]
@@ -131,7 +129,6 @@ def build(freecad: Window, links: int, parts: int) -> None:
 def hostile(version: str, folder: Path, _args: argparse.Namespace) -> None:
     """The hostile document."""
     with window(version, folder) as freecad:
-        freecad.prepare()
         with freecad.server.client() as client:
             hostile_vault.write(freecad.vault, client, HOSTILE_LINKS)
         told = freecad.run(str(INSIDE / "hostile.py"))

@@ -47,9 +47,8 @@ def main() -> None:
     )
     with (
         tempfile.TemporaryDirectory(prefix="silo-pictures-") as scratch,
-        window(version, Path(scratch).resolve()) as freecad,
+        window(version, Path(scratch)) as freecad,
     ):
-        freecad.prepare()
         scale = os.environ.get("SILO_PICTURES_SCALE", "1")
         freecad.pixels = f"{round(1600 * float(scale))}x{round(1000 * float(scale))}"
         with freecad.server.client() as client:

@@ -4,8 +4,23 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
+
+import pytest
 
 # Test folders are no packages (import mode "importlib"), so the library is made known by its folder.
 if str(Path(__file__).parent) not in sys.path:
     sys.path.insert(0, str(Path(__file__).parent))
+
+from freecad_cases.machines import WANTED
+
+
+@pytest.fixture(name="freecad", scope="module", params=WANTED)
+def _freecad(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """A FreeCAD with a window and a server, kept for all tests of a file; each version in turn."""
+    from gui_cases.window import window
+
+    with window(request.param, tmp_path_factory.mktemp("window")) as made:
+        yield made

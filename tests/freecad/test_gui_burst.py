@@ -3,36 +3,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from freecad_cases.machines import WANTED
-from gui_cases.window import window
+from gui_cases.window import Window
 
 pytestmark = [pytest.mark.freecad, pytest.mark.slow]
 
 TIMES, OFFLINE = 5, 3
 
 
-@pytest.fixture(name="burst", scope="module", params=WANTED)
-def _burst(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[dict[str, Any]]:
-    with window(request.param, tmp_path_factory.mktemp("burst").resolve()) as freecad:
-        freecad.prepare()
-        said = freecad.run("burst.py")
-        with freecad.server.client() as client:
-            top, bolt = said["numbers"]["Top"], said["numbers"]["Bolt"]
-            said["files"] = sum(1 for r in client.revisions(top) if r.file_name)
-            said["quantity"] = {ln.child_part_number: ln.quantity for ln in client.get_bom(top)}[bolt]
-        freecad.run("burst.py", env={"SILO_TEST_SECOND": "1"})
-        with freecad.server.client() as client:
-            said["closed_files"] = {
-                name: [r.file_name for r in client.revisions(number) if r.file_name]
-                for name, number in said["closed"].items()
-            }
-        yield {**said, "url": freecad.server.url}
+@pytest.fixture(name="burst", scope="module")
+def _burst(freecad: Window) -> dict[str, Any]:
+    said = freecad.run("burst.py")
+    with freecad.server.client() as client:
+        top, bolt = said["numbers"]["Top"], said["numbers"]["Bolt"]
+        said["files"] = sum(1 for r in client.revisions(top) if r.file_name)
+        said["quantity"] = {ln.child_part_number: ln.quantity for ln in client.get_bom(top)}[bolt]
+    freecad.run("burst.py", env={"SILO_TEST_SECOND": "1"})
+    with freecad.server.client() as client:
+        said["closed_files"] = {
+            name: [r.file_name for r in client.revisions(number) if r.file_name]
+            for name, number in said["closed"].items()
+        }
+    return {**said, "url": freecad.server.url}
 
 
 def test_a_burst_ends_with_what_was_committed_last(burst: dict[str, Any]) -> None:

@@ -3,12 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from freecad_cases.machines import WANTED
-from gui_cases.window import window
+from gui_cases.window import Window
 
 from silo.workbench import commands
 
@@ -21,13 +19,9 @@ COMMANDS = sorted(
 )
 
 
-@pytest.fixture(name="said", scope="module", params=WANTED)
-def _said(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[dict[str, Any]]:
-    with window(request.param, tmp_path_factory.mktemp("clean").resolve()) as freecad:
-        freecad.prepare()
-        yield freecad.run("clean.py")
+@pytest.fixture(name="said", scope="module")
+def _said(freecad: Window) -> dict[str, Any]:
+    return freecad.run("clean.py")
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -3,14 +3,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
 import pytest
-from freecad_cases.machines import WANTED
-from gui_cases.window import Window, window
+from gui_cases.window import Window
 
 pytestmark = [pytest.mark.freecad, pytest.mark.slow]
 
@@ -37,25 +35,17 @@ class Day:
         return {names[line.child_part_number]: line.unreferenced_since is None for line in found}
 
 
-@pytest.fixture(name="day", scope="module", params=WANTED)
-def _day(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Day]:
-    folder = tmp_path_factory.mktemp("two").resolve()
-    (folder / "alice").mkdir()
-    (folder / "bob").mkdir()
-    with window(request.param, folder / "alice") as alice:
-        bob = Window(alice.freecad, folder / "bob", alice.server, {})
-        for one in (alice, bob):
-            one.prepare()
-        with ThreadPoolExecutor() as pool:
-            hers = pool.submit(alice.run, "colleague.py", env=environment(alice, "alice"))
-            his = pool.submit(bob.run, "colleague.py", env=environment(alice, "bob"))
-            # Where she fails he waits for her in vain, so her failure is the one to show.
-            day = Day(hers.result(), his.result(), alice)
-        yield day
-
-
-def environment(alice: Window, role: str) -> dict[str, str]:
-    return {"SILO_TEST_ROLE": role, "SILO_TEST_SHARED": str(alice.folder)}
+@pytest.fixture(name="day", scope="module")
+def _day(freecad: Window) -> Day:
+    alice, bob = freecad, Window(freecad.freecad, freecad.folder / "bob", freecad.server)
+    bob.folder.mkdir()
+    bob.prepare()
+    shared = {"SILO_TEST_SHARED": str(alice.folder)}
+    with ThreadPoolExecutor() as pool:
+        hers = pool.submit(alice.run, "colleague.py", env={**shared, "SILO_TEST_ROLE": "alice"})
+        his = pool.submit(bob.run, "colleague.py", env={**shared, "SILO_TEST_ROLE": "bob"})
+        # Where she fails he waits for her in vain, so her failure is the one to show.
+        return Day(hers.result(), his.result(), bob)
 
 
 def test_the_pane_says_who_committed_meanwhile(day: Day) -> None:
@@ -112,7 +102,7 @@ def test_theirs_is_taken_and_mine_is_kept(day: Day) -> None:
     assert day.bob["has"] == ["Bolts"]
     assert day.bob["linked"] == [True]
     assert len(day.revisions("Taken")) == 2
-    kept = list((day.window.folder.parent / "bob").rglob("kept-aside/**/*Taken.FCStd"))
+    kept = list(day.window.folder.rglob("kept-aside/**/*Taken.FCStd"))
     # The other one is of the window *Open from Silo*.
     assert len(kept) == 2
 
@@ -146,7 +136,7 @@ def test_a_held_commit_is_decided_in_the_pane(day: Day) -> None:
     assert day.bob["held_beside"] == day.bob["held_has"] == ["Bolts"]
     assert len(day.revisions("Held")) == 2
     # Hers, which his save replaced; what he committed; what he had open.
-    assert len(list((day.window.folder.parent / "bob").rglob("kept-aside/**/*Held.FCStd"))) == 3
+    assert len(list(day.window.folder.rglob("kept-aside/**/*Held.FCStd"))) == 3
 
 
 def test_get_this_revision_fetches_a_copy_with_its_links(day: Day) -> None:

@@ -6,13 +6,12 @@ from __future__ import annotations
 import importlib.util
 import shutil
 import zipfile
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from freecad_cases.machines import REPOSITORY, WANTED
-from gui_cases.window import window
+from gui_cases.window import Window, window
 
 pytestmark = [pytest.mark.freecad, pytest.mark.slow]
 
@@ -41,13 +40,9 @@ FreeCADGui.addWorkbench(ForkWorkbench())
 """
 
 
-@pytest.fixture(name="corners", scope="module", params=WANTED)
-def _corners(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[dict[str, Any]]:
-    with window(request.param, tmp_path_factory.mktemp("corners").resolve()) as freecad:
-        freecad.prepare()
-        yield freecad.run("corners.py")
+@pytest.fixture(name="corners", scope="module")
+def _corners(freecad: Window) -> dict[str, Any]:
+    return freecad.run("corners.py")
 
 
 def test_a_partly_loaded_document_with_edits_is_told_and_kept(corners: dict[str, Any]) -> None:
@@ -91,8 +86,7 @@ def test_the_same_part_is_counted_at_a_press_in_the_pane(corners: dict[str, Any]
 @pytest.mark.parametrize("version", WANTED)
 def test_a_forks_commit_is_hooked_and_not_replaced(version: str, tmp_path: Path) -> None:
     """By its QAction, by the save, by its origin; the BOM follows once each time."""
-    with window(version, tmp_path.resolve()) as freecad:
-        freecad.prepare()
+    with window(version, tmp_path) as freecad:
         fork = freecad.home / "Mod" / "AFork"
         fork.mkdir()
         (fork / "InitGui.py").write_text(FORK)
@@ -106,8 +100,7 @@ def test_a_forks_commit_is_hooked_and_not_replaced(version: str, tmp_path: Path)
 @pytest.mark.parametrize("version", WANTED)
 def test_missing_packages_are_installed_by_one_button(version: str, tmp_path: Path) -> None:
     """FreeCAD starts as ever, and the workbench is there; the first time pip finds nothing."""
-    with window(version, tmp_path.resolve()) as freecad:
-        freecad.prepare(dependencies=False)
+    with window(version, tmp_path, dependencies=False) as freecad:
         freecad.packages.mkdir(parents=True)
         wheels = tmp_path / "wheels"
         wheels.mkdir()
@@ -195,8 +188,7 @@ BESIDE_IN = {"ARealSilo": ("Silo_BOM", "Silo_Settings"), "ZRealSilo": ("Silo_Com
 @pytest.mark.parametrize("version", WANTED)
 def test_beside_the_real_silos_workbench(version: str, tmp_path: Path) -> None:
     """Whichever loads first, both menus have their own commands. Ours is the start-up workbench."""
-    with window(version, tmp_path.resolve()) as freecad:
-        freecad.prepare()
+    with window(version, tmp_path) as freecad:
         config = freecad.home / "user.cfg"
         config.write_text(config.read_text().replace("NoneWorkbench", "SiloModWorkbench"))
         for place, names in BESIDE_IN.items():
@@ -232,8 +224,7 @@ def test_beside_the_real_silos_workbench(version: str, tmp_path: Path) -> None:
 
 def test_an_assembly_of_a_newer_freecad_is_not_saved(tmp_path: Path) -> None:
     """FreeCAD 0.20 has dropped its assemblies already; saving would write that down."""
-    with window("0.20", tmp_path.resolve()) as freecad:
-        freecad.prepare()
+    with window("0.20", tmp_path) as freecad:
         shutil.copytree(REPOSITORY / "examples" / "gearbox", freecad.vault, dirs_exist_ok=True)
         said = freecad.run("newer.py")
     assert said["untouched"]

@@ -3,23 +3,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from freecad_cases.machines import WANTED
-from gui_cases.window import window
+from gui_cases.window import Window
 
 pytestmark = [pytest.mark.freecad, pytest.mark.slow]
 
 
-@pytest.fixture(name="said", scope="module", params=WANTED)
-def _said(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[dict[str, Any]]:
-    with window(request.param, tmp_path_factory.mktemp("counting").resolve()) as freecad:
-        freecad.prepare()
-        yield freecad.run("counting.py")
+@pytest.fixture(name="said", scope="module")
+def _said(freecad: Window) -> dict[str, Any]:
+    return freecad.run("counting.py")
 
 
 def test_what_is_modelled_in_the_file_is_declared_and_taken_back(said: dict[str, Any]) -> None:

@@ -3,21 +3,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from freecad_cases.machines import WANTED
-from gui_cases.window import Window, window
+from gui_cases.window import Window
 
 pytestmark = [pytest.mark.freecad, pytest.mark.slow]
-
-
-@pytest.fixture(name="freecad", scope="module", params=WANTED)
-def _freecad(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Window]:
-    with window(request.param, tmp_path_factory.mktemp("edited").resolve()) as freecad:
-        freecad.prepare()
-        yield freecad
 
 
 @pytest.fixture(name="said", scope="module")

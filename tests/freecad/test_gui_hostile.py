@@ -3,14 +3,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import pytest
-from freecad_cases.machines import WANTED
 from gui_cases import hostile_vault
-from gui_cases.window import Window, window
+from gui_cases.window import Window
 
 pytestmark = [pytest.mark.freecad, pytest.mark.slow]
 
@@ -27,13 +25,11 @@ class Told:
     said: dict[str, Any]
 
 
-@pytest.fixture(name="hostile", scope="module", params=WANTED)
-def _hostile(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Told]:
-    with window(request.param, tmp_path_factory.mktemp("hostile").resolve()) as freecad:
-        freecad.prepare()
-        with freecad.server.client() as client:
-            hostile_vault.write(freecad.vault, client, LINKS)
-        yield Told(freecad, freecad.run("hostile.py"))
+@pytest.fixture(name="hostile", scope="module")
+def _hostile(freecad: Window) -> Told:
+    with freecad.server.client() as client:
+        hostile_vault.write(freecad.vault, client, LINKS)
+    return Told(freecad, freecad.run("hostile.py"))
 
 
 @pytest.mark.parametrize("name", WINDOWS)

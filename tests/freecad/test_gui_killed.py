@@ -3,12 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from freecad_cases.machines import WANTED
-from gui_cases.window import Window, window
+from gui_cases.window import Window
 
 pytestmark = [pytest.mark.freecad, pytest.mark.slow]
 
@@ -22,32 +20,28 @@ def stand(freecad: Window, number: str) -> tuple[list[str], dict[str, float | No
         return files, {line.child_part_number: line.quantity for line in client.get_bom(number)}
 
 
-@pytest.fixture(name="told", scope="module", params=WANTED)
-def _told(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[dict[str, Any]]:
+@pytest.fixture(name="told", scope="module")
+def _told(freecad: Window) -> dict[str, Any]:
     """Four starts of FreeCAD; each but the last is killed, each but the first finishes what was begun."""
-    with window(request.param, tmp_path_factory.mktemp("killed").resolve()) as freecad:
-        freecad.prepare()
 
-        def run(kill: str, tasks: str = "") -> dict[str, Any]:
-            env = {"SILO_TEST_KILL": kill, "SILO_TEST_TASKS": tasks}
-            return freecad.run("killed.py", env=env, code=KILLED if kill else 0)
+    def run(kill: str, tasks: str = "") -> dict[str, Any]:
+        env = {"SILO_TEST_KILL": kill, "SILO_TEST_TASKS": tasks}
+        return freecad.run("killed.py", env=env, code=KILLED if kill else 0)
 
-        told: dict[str, Any] = {"numbers": run("upload_file")["numbers"]}
-        top = told["numbers"]["Top"]
-        told["upload_file"] = {**run("merge_bom", "finish"), "stand": stand(freecad, top)}
-        told["merge_bom"] = {**run("create_item", "finish"), "stand": stand(freecad, top)}
-        with freecad.server.client() as client:
-            told["items before"] = {item.name: item.id for item in client.search_items()}
-        run("", "register")
-        with freecad.server.client() as client:
-            told["items"] = [(item.name, item.id) for item in client.search_items()]
-            (frame,) = client.search_items("Frame")
-            (nut,) = client.search_items("Nut")
-            told["lines"] = [line.child_part_number for line in client.get_bom(frame.part_number)]
-            told["nut"] = nut.part_number
-        yield told
+    told: dict[str, Any] = {"numbers": run("upload_file")["numbers"]}
+    top = told["numbers"]["Top"]
+    told["upload_file"] = {**run("merge_bom", "finish"), "stand": stand(freecad, top)}
+    told["merge_bom"] = {**run("create_item", "finish"), "stand": stand(freecad, top)}
+    with freecad.server.client() as client:
+        told["items before"] = {item.name: item.id for item in client.search_items()}
+    run("", "register")
+    with freecad.server.client() as client:
+        told["items"] = [(item.name, item.id) for item in client.search_items()]
+        (frame,) = client.search_items("Frame")
+        (nut,) = client.search_items("Nut")
+        told["lines"] = [line.child_part_number for line in client.get_bom(frame.part_number)]
+        told["nut"] = nut.part_number
+    return told
 
 
 def test_killed_after_the_upload_before_the_bom(told: dict[str, Any]) -> None:

@@ -3,23 +3,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from freecad_cases.machines import WANTED
-from gui_cases.window import window
+from gui_cases.window import Window
 
 pytestmark = [pytest.mark.freecad, pytest.mark.slow]
 
 
-@pytest.fixture(name="told", scope="module", params=WANTED)
-def _told(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[dict[str, Any]]:
-    with window(request.param, tmp_path_factory.mktemp("mass").resolve()) as freecad:
-        freecad.prepare()
-        yield freecad.run("mass.py")
+@pytest.fixture(name="told", scope="module")
+def _told(freecad: Window) -> dict[str, Any]:
+    return freecad.run("mass.py")
 
 
 def test_the_table(told: dict[str, Any]) -> None:

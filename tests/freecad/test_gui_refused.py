@@ -4,14 +4,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import pytest
 import requests
-from freecad_cases.machines import WANTED
-from gui_cases.window import TOKEN, Window, window
+from gui_cases.window import TOKEN, Window
 
 pytestmark = [pytest.mark.freecad, pytest.mark.slow]
 
@@ -46,27 +44,23 @@ class Server:
         return True
 
 
-@pytest.fixture(name="told", scope="module", params=WANTED)
-def _told(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[dict[str, Any]]:
-    with window(request.param, tmp_path_factory.mktemp("refused").resolve()) as freecad:
-        freecad.prepare()
-        server = Server(freecad)
-        freecad.answers |= {
-            "number of other": lambda: server.number("Other"),
-            "number of gearbox": lambda: server.number("Gearbox"),
-            "break": server.break_it,
-            "mend": server.mend,
-            "read-only": lambda: server.mode("read-only"),
-            "normal": lambda: server.mode("normal"),
-        }
-        said = freecad.run("refused.py")
-        with freecad.server.client() as client:
-            number = server.number("Frame")
-            said["frame_lines"] = client.get_bom(number)
-            said["frame_files"] = [r.file_name for r in client.revisions(number) if r.file_name]
-        yield said
+@pytest.fixture(name="told", scope="module")
+def _told(freecad: Window) -> dict[str, Any]:
+    server = Server(freecad)
+    freecad.answers |= {
+        "number of other": lambda: server.number("Other"),
+        "number of gearbox": lambda: server.number("Gearbox"),
+        "break": server.break_it,
+        "mend": server.mend,
+        "read-only": lambda: server.mode("read-only"),
+        "normal": lambda: server.mode("normal"),
+    }
+    said = freecad.run("refused.py")
+    with freecad.server.client() as client:
+        number = server.number("Frame")
+        said["frame_lines"] = client.get_bom(number)
+        said["frame_files"] = [r.file_name for r in client.revisions(number) if r.file_name]
+    return said
 
 
 def test_a_refused_bom_stays_with_its_reason(told: dict[str, Any]) -> None:

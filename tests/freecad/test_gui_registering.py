@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 from freecad_cases import machines
 from freecad_cases.machines import WANTED
-from gui_cases.window import Window, window
+from gui_cases.window import Window
 
 from silo.bom.identity import walk_entries
 from silo.bom.links import extract
@@ -28,13 +28,6 @@ from silo.freecadcmd.run import run_freecad
 
 RESAVE = Path(__file__).parent / "freecad_cases" / "resave.py"
 pytestmark = [pytest.mark.freecad, pytest.mark.slow]
-
-
-@pytest.fixture(name="freecad", scope="module", params=WANTED)
-def _freecad(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Window]:
-    with window(request.param, tmp_path_factory.mktemp("registering").resolve()) as freecad:
-        freecad.prepare()
-        yield freecad
 
 
 @pytest.fixture(name="said", scope="module")

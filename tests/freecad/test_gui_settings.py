@@ -3,13 +3,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from freecad_cases.machines import WANTED
-from gui_cases.window import TOKEN, window
+from gui_cases.window import TOKEN, Window, window
 
 pytestmark = [pytest.mark.freecad, pytest.mark.slow]
 
@@ -43,16 +42,12 @@ def delete_password(service, name):
 """
 
 
-@pytest.fixture(name="page", scope="module", params=WANTED)
-def _page(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[dict[str, Any]]:
-    with window(request.param, tmp_path_factory.mktemp("settings").resolve()) as freecad:
-        freecad.prepare()
-        entered = {"SILO_TEST_URL": freecad.server.url, "SILO_TEST_TOKEN": TOKEN}
-        said = freecad.run("settings.py", env={**NO_ENVIRONMENT, **entered})
-        again = freecad.run("settings.py", env={**NO_ENVIRONMENT, **entered, "SILO_TEST_SECOND": "1"})
-        yield {**said, "url": freecad.server.url, "again": again}
+@pytest.fixture(name="page", scope="module")
+def _page(freecad: Window) -> dict[str, Any]:
+    entered = {"SILO_TEST_URL": freecad.server.url, "SILO_TEST_TOKEN": TOKEN}
+    said = freecad.run("settings.py", env={**NO_ENVIRONMENT, **entered})
+    again = freecad.run("settings.py", env={**NO_ENVIRONMENT, **entered, "SILO_TEST_SECOND": "1"})
+    return {**said, "url": freecad.server.url, "again": again}
 
 
 def test_without_a_server_it_says_how_to_get_one(page: dict[str, Any]) -> None:
@@ -114,8 +109,7 @@ def test_the_dock_is_where_the_user_left_it(page: dict[str, Any]) -> None:
 @pytest.mark.parametrize("version", WANTED)
 def test_a_working_keyring_is_preferred(version: str, tmp_path: Path) -> None:
     """The token goes there and is not written into FreeCAD's file; the page says which is in use."""
-    with window(version, tmp_path.resolve()) as freecad:
-        freecad.prepare()
+    with window(version, tmp_path) as freecad:
         # Each folder in Mod is on FreeCAD's path.
         safe = freecad.home / "Mod" / "AKeyring"
         safe.mkdir()

@@ -3,13 +3,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import pytest
-from freecad_cases.machines import WANTED
-from gui_cases.window import Window, window
+from gui_cases.window import Window
 
 from silo.api.wire import MergeEntry, MergeRequest
 
@@ -30,12 +28,10 @@ class Told:
         return str(self.said["numbers"][name])
 
 
-@pytest.fixture(name="day", scope="module", params=WANTED)
-def _day(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Told]:
-    with window(request.param, tmp_path_factory.mktemp("story").resolve()) as freecad:
-        freecad.prepare()
-        freecad.answers["other merge"] = lambda: other_merge(freecad)
-        yield Told(freecad, freecad.run("story.py"))
+@pytest.fixture(name="day", scope="module")
+def _day(freecad: Window) -> Told:
+    freecad.answers["other merge"] = lambda: other_merge(freecad)
+    return Told(freecad, freecad.run("story.py"))
 
 
 def other_merge(freecad: Window) -> str:

@@ -66,8 +66,7 @@ def test_a_clone_in_mod_works(version: str, tmp_path: Path) -> None:
     """Nothing of the working folder that is not in the repository is needed."""
     if not (REPOSITORY / ".git").exists() or shutil.which("git") is None:
         pytest.skip("not a clone of the repository")
-    with window(version, tmp_path.resolve()) as freecad:
-        freecad.prepare()
+    with window(version, tmp_path) as freecad:
         clone = freecad.home / "Mod" / "Silo"
         clone.unlink()
         subprocess.run(

@@ -32,7 +32,7 @@ _SEED = """<?xml version="1.0" encoding="UTF-8" standalone="no" ?>
 <FCParameters><FCParamGroup Name="Root"><FCParamGroup Name="BaseApp"><FCParamGroup Name="Preferences">
  <FCParamGroup Name="General"><FCText Name="AutoloadModule">NoneWorkbench</FCText></FCParamGroup>
  <FCParamGroup Name="NotificationArea"><FCBool Name="NotificationAreaEnabled" Value="0"/></FCParamGroup>
- <FCParamGroup Name="Mod">%s</FCParamGroup>
+ <FCParamGroup Name="Mod"></FCParamGroup>
 </FCParamGroup></FCParamGroup></FCParamGroup></FCParameters>
 """
 
@@ -81,10 +81,10 @@ class Window:
     def home(self) -> Path:
         return self.folder / "home"
 
-    def prepare(self, *, dependencies: bool = True, preferences: str = "") -> None:
+    def prepare(self, *, dependencies: bool = True) -> None:
         """A fresh profile with the add-on in ``Mod``."""
         self.freecad.profile(self.home, dependencies=dependencies)
-        (self.home / "user.cfg").write_text(_SEED % preferences)
+        (self.home / "user.cfg").write_text(_SEED)
         (self.home / "Mod").mkdir()
         (self.home / "Mod" / "Silo").symlink_to(REPOSITORY, target_is_directory=True)
         self.vault.mkdir()
@@ -192,15 +192,22 @@ def _display(pixels: str) -> Iterator[str]:
 
 
 @contextmanager
-def window(version: str, folder: Path) -> Iterator[Window]:
-    """A FreeCAD of this version with a running server; skips loudly where the machine has none."""
+def window(version: str, folder: Path, *, dependencies: bool = True) -> Iterator[Window]:
+    """A FreeCAD of this version with a running server; skips loudly where the machine has none.
+
+    dependencies
+        with the Python packages that the add-on needs.
+    """
     freecad = machines.need(version)
     if shutil.which("Xvfb") is None:
         machines.miss("Xvfb is not installed")
+    folder = folder.resolve()
     with reserved_port() as port:
         server = Server(folder, port)
+        made = Window(freecad, folder, server, {"server down": server.down, "server up": server.up})
+        made.prepare(dependencies=dependencies)
         server.up()
         try:
-            yield Window(freecad, folder, server, {"server down": server.down, "server up": server.up})
+            yield made
         finally:
             server.down()

