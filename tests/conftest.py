@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import shutil
 import signal
 from pathlib import Path
 from typing import Any
@@ -108,6 +109,12 @@ def needs_case(tmp_path_factory: pytest.TempPathFactory) -> None:
     folder = tmp_path_factory.mktemp("case")
     (folder / "a").touch()
     _needs("a disk that distinguishes upper and lower case", not (folder / "A").exists())
+
+
+@pytest.fixture(scope="session")
+def needs_git() -> None:
+    """The program, for tests that make a repository."""
+    _needs("git", shutil.which("git") is not None)
 
 
 @pytest.fixture(scope="session")

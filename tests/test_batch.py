@@ -84,7 +84,7 @@ PATTERNS = (
 )
 
 
-@pytest.mark.skipif(shutil.which("git") is None, reason="git is not on this machine")
+@pytest.mark.usefixtures("needs_git")
 @pytest.mark.usefixtures("needs_case")
 @pytest.mark.filterwarnings("ignore::FutureWarning")
 @settings(max_examples=25)

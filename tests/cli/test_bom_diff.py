@@ -53,6 +53,7 @@ def test_markdown_for_a_pull_request(run: Any, changed: tuple[Path, Path]) -> No
     assert "| quantity changed | M8x20 Bolt | 12 → 16 | parts/M8x20Bolt.FCStd |" in out
 
 
+@pytest.mark.usefixtures("needs_git")
 def test_two_revisions_and_the_work_tree(run: Any, changed: tuple[Path, Path], tmp_path: Path) -> None:
     old, new = changed
     repository = tmp_path / "repo"
@@ -120,6 +121,7 @@ def test_a_folder_that_is_not_there_is_an_error(run: Any, tmp_path: Path) -> Non
     assert "nowhere" in ran.err
 
 
+@pytest.mark.usefixtures("needs_git")
 def test_a_folder_that_uses_what_lies_beside_it(run: Any, tmp_path: Path) -> None:
     """Its parts are read, though only its own BOMs are compared; also where it is gone by now."""
 
