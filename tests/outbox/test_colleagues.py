@@ -14,7 +14,7 @@ from silo.api.address import canonical
 from silo.api.files import Origin
 from silo.api.revisions import other_name
 from silo.api.wire import Revision
-from silo.bom.errors import RejectedError, UnreachableError
+from silo.bom.errors import RejectedError, RouteMissingError, UnreachableError
 from silo.outbox.entry import UNKNOWN, Commit, Entry, State
 from silo.testing import FakeSilo
 
@@ -452,3 +452,37 @@ def test_a_restore_between_the_look_and_the_merge_is_caught_by_the_server(vault:
     assert (vault.files(), vault.lines()) == ([], {})
     vault.send(force=True)
     assert (vault.waiting(), vault.files(), vault.lines()) == ((), [b"one"], {"F01-0001": 3})
+
+
+def test_a_file_that_went_once_more_is_found_below_a_colleagues(vault: Vault) -> None:
+    """The server was restored to before all of its files, the answer to our upload was lost, and somebody went
+    on from it: the numbers of before say nothing."""
+    sent(vault, b"one")
+    entry = mine(vault, b"two", b"one")
+    once(vault, "merge_bom", refuse)
+    vault.send()
+    restored(vault, 0)
+    vault.outbox.retry(entry.id)
+    once(vault, "upload_file", lose, after=True)
+    vault.send()
+    theirs(vault, b"three", 1)
+    vault.send(force=True)
+    assert (vault.waiting(), vault.files(), vault.lines()) == ((), [b"two", b"three"], {})
+
+
+def test_a_server_without_revisions_gets_the_file_once(vault: Vault) -> None:
+    """It cannot say whether the file is still there; its BOM is sent all the same."""
+
+    class Bare(FakeSilo):
+        def revisions(self, *_arguments: object, **_more: object) -> list[Revision]:
+            raise RouteMissingError("no such route")
+
+    entry = mine(vault, b"one")
+    silo, known = vault.silo, vault.silo.revisions
+    silo.__class__ = Bare
+    once(vault, "merge_bom", refuse)
+    vault.send()
+    vault.outbox.retry(entry.id)
+    vault.send()
+    silo.__class__ = FakeSilo
+    assert (vault.waiting(), len(known(vault.number)), vault.lines()) == ((), 1, {"F01-0001": 3})
