@@ -455,8 +455,8 @@ def test_a_restore_between_the_look_and_the_merge_is_caught_by_the_server(vault:
 
 
 def test_a_file_that_went_once_more_is_found_below_a_colleagues(vault: Vault) -> None:
-    """The server was restored to before all of its files, the answer to our upload was lost, and somebody went
-    on from it: the numbers of before say nothing."""
+    """The server was restored to before all of its files, the answer to our upload lost, and somebody went on
+    from it: the numbers of before say nothing."""
     sent(vault, b"one")
     entry = mine(vault, b"two", b"one")
     once(vault, "merge_bom", refuse)
@@ -482,7 +482,31 @@ def test_a_server_without_revisions_gets_the_file_once(vault: Vault) -> None:
     silo.__class__ = Bare
     once(vault, "merge_bom", refuse)
     vault.send()
+    for stored in silo.items.values():
+        stored.uploads.clear()  # nor does it know a repeat
     vault.outbox.retry(entry.id)
     vault.send()
     silo.__class__ = FakeSilo
     assert (vault.waiting(), len(known(vault.number)), vault.lines()) == ((), 1, {"F01-0001": 3})
+
+
+def test_a_bom_alone_whose_file_is_gone_is_a_persons_question(vault: Vault) -> None:
+    """There is no copy of the file to send once more."""
+    sent(vault, b"one")
+    vault.commit(vault.snapshot(vault.part("Bolt", 4)), content=None, origin=sha(b"one"))
+    once(vault, "merge_bom", lambda: restored(vault, 0))
+    vault.send()
+    assert "is not on this server" in held(vault).reason
+    assert (held(vault).file_left, vault.lines()) == (False, {})
+
+
+def test_a_request_that_is_sent_again_names_the_file_as_it_is_numbered_now(vault: Vault) -> None:
+    """It was written down with the number of before the restore, which is a colleague's by now."""
+    sent(vault, b"one")
+    mine(vault, b"two", b"one")
+    once(vault, "merge_bom", lose)
+    vault.send()
+    restored(vault, 0)
+    once(vault, "merge_bom", lambda: theirs(vault, b"three", 1))
+    vault.send(force=True)
+    assert (vault.waiting(), vault.files(), vault.lines()) == ((), [b"two", b"three"], {})
