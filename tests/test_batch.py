@@ -9,6 +9,7 @@ import shutil
 import subprocess
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import pytest
 from hypothesis import assume, example, given, settings
@@ -16,10 +17,10 @@ from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
 from silo.batch import Options, TopResult, stopped_by, sync_top
-from silo.batch_report import Markdown, Summary, cell
+from silo.batch_report import JUnit, Markdown, Summary, cell
 from silo.bom.errors import AuthError, DocumentError, InputError, NotFoundError, SiloError
 from silo.bom.model import BomEntry, Extraction
-from silo.bom_sync import Status
+from silo.bom_sync import Outcome, Resolved, Status
 from silo.fcstd import Library
 from silo.files import documents_in
 from silo.folders import scratch_folder
@@ -249,3 +250,25 @@ def test_a_sentence_of_the_report_is_followed_by_the_files_that_it_does_not_name
     summary = Summary(warnings={"One bolt is too many.": ["asm/T.FCStd"], "b.FCStd is odd.": ["b.FCStd"]})
     lines = Markdown().end(summary).splitlines()
     assert {"- One bolt is too many. (asm/T.FCStd)", "- b.FCStd is odd."} <= set(lines)
+
+
+@given(st.lists(st.one_of(st.none(), st.lists(st.sampled_from(Status), max_size=3)), max_size=5))
+def test_the_counts_of_a_ci_report_are_those_of_its_cases(files: list[list[Status] | None]) -> None:
+    """An assembly that failed was counted twice, a file beside two blocked assemblies not at all.
+
+    files
+        the assemblies of each; None for a file that cannot be read.
+    """
+    form, summary, cases = JUnit(), Summary(), ""
+    for number, statuses in enumerate(files):
+        top = f"{number}.FCStd"
+        one = Resolved(BomEntry(top, object_name="Top"), (), (), ())
+        outcomes = tuple(Outcome(status, one) for status in statuses or ())
+        error = DocumentError(top, "it is no FreeCAD document") if statuses is None else None
+        result = TopResult(top, outcomes=outcomes, error=error)
+        summary.add(result)
+        cases += form.one(result, number)
+    suite = ElementTree.fromstring(form.head(summary) + cases + form.end(summary)).find("testsuite")  # noqa: S314
+    assert suite is not None
+    told = [int(suite.get(name, "")) for name in ("tests", "failures", "errors")]
+    assert told == [len(suite.findall(f".//{name}")) for name in ("testcase", "failure", "error")]

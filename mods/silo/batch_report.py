@@ -11,7 +11,7 @@ import json
 import os
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from io import BytesIO
@@ -23,17 +23,24 @@ from silo.batch import TopResult, result_json
 from silo.bom.errors import Exit, InputError, RemoteError
 from silo.bom.findings import Finding, FindingCode, Severity
 from silo.bom.naming import display_name
-from silo.bom.report import finding_json, shorten
+from silo.bom.report import diff_rows, finding_json, shorten
 from silo.bom_sync import Outcome, Status, blocking
 
 _LEFT = (Status.BLOCKED, Status.UNREGISTERED, Status.FAILED)
-_WORDS = {
-    Status.MERGED: "merged",
-    Status.UNCHANGED: "no change",
+STATUS_WORDS = {
+    Status.MERGED: "BOM merged",
+    Status.UNCHANGED: "no change, nothing was sent",
     Status.DRY_RUN: "preview only, nothing was sent",
-    Status.BLOCKED: "not synced",
-    Status.UNREGISTERED: "not synced: no part number yet",
+    Status.BLOCKED: "not synced: links are broken (see below; --allow-missing syncs all the same)",
+    Status.UNREGISTERED: "not synced: the assembly has no Silo part number (silo-mod register)",
     Status.FAILED: "not synced",
+}
+# What changed, by the field of the diff.
+_CHANGES = {
+    "added": "added",
+    "quantity_changed": "quantity",
+    "conflicts": "a person decides",
+    "removed": "not in the assembly",
 }
 
 
@@ -51,9 +58,9 @@ def cell(text: str) -> str:
 class Summary:
     """A run in numbers, and what it leaves to people.
 
-    files, fine, remote, parts
-        all that were asked for; those in order; those that only the server kept from it; those without
-        components of others.
+    files, fine, unread, remote, parts
+        all that were asked for; those in order; those that could not be read; those that only the server kept
+        from it; those without components of others.
     statuses
         how many assemblies ended how.
     errors, warnings
@@ -69,6 +76,7 @@ class Summary:
     base: str = ""
     files: int = 0
     fine: int = 0
+    unread: int = 0
     remote: int = 0
     parts: int = 0
     statuses: Counter[str] = field(default_factory=Counter)
@@ -97,6 +105,7 @@ class Summary:
         if result.skipped:
             self.parts += 1
         if result.error is not None:
+            self.unread += 1
             self._note(self.errors, str(result.error), result.top)
         for outcome in result.outcomes:
             self.statuses[outcome.status.value] += 1
@@ -248,8 +257,15 @@ class Markdown:
     def _assembly(self, outcome: Outcome, base: str) -> str:
         head = outcome.assembly
         who = " ".join(filter(None, (head.part_number, head.name))) or display_name(head) or head.object_name
-        lines = ["", f"## {cell(who)}: {_WORDS[outcome.status]}", "", cell(shorten(head.doc_path, base)), ""]
-        rows = [f"| {' | '.join(map(cell, row))} |" for row in changes_of(outcome)]
+        title = f"## {cell(who)}: {STATUS_WORDS[outcome.status]}"
+        lines = ["", title, "", cell(shorten(head.doc_path, base)), ""]
+        # Nothing changed in a BOM that was not sent.
+        plan = outcome.plan if outcome.status not in _LEFT else None
+        rows = [
+            f"| {' | '.join(map(cell, (_CHANGES[kind], number, outcome.names.get(number, ''), quantity)))} |"
+            for kind, number, quantity in (diff_rows(plan.diff) if plan is not None else ())
+            if kind in _CHANGES
+        ]
         if rows:
             lines += ["| | Part number | Name | Quantity |", "|---|---|---|---:|", *rows, ""]
         lines += [f"- {cell(shorten(reason, base))}" for reason in reasons_of(outcome)]
@@ -286,32 +302,11 @@ def _others(words: str, files: Iterable[str]) -> str:
     return " " + cell(f"({', '.join(named[:5])}{more})") if named else ""
 
 
-def changes_of(outcome: Outcome) -> Iterator[tuple[str, str, str, str]]:
-    """What changed, part by part: what, part number, name, quantity. Nothing for a BOM that was not sent."""
-    if outcome.plan is None or outcome.status in _LEFT:
-        return
-    diff, names = outcome.plan.diff, outcome.names
-    for line in diff.added:
-        yield "added", line.part_number, names.get(line.part_number, ""), _number(line.quantity)
-    for change in diff.quantity_changed:
-        quantity = f"{_number(change.remote_quantity)} → {_number(change.local_quantity)}"
-        yield "quantity", change.part_number, names.get(change.part_number, ""), quantity
-    for line in diff.removed:
-        yield "not in the assembly", line.part_number, names.get(line.part_number, ""), _number(line.quantity)
-    for change in diff.conflicts:
-        quantity = f"CAD {_number(change.local_quantity)}, Silo {_number(change.remote_quantity)}"
-        yield "a person decides", change.part_number, names.get(change.part_number, ""), quantity
-
-
 def reasons_of(outcome: Outcome) -> list[str]:
     """Why an assembly was not synced."""
     if outcome.error is not None:
         return [str(outcome.error)]
     return [finding.message for finding in blocking(outcome.resolved)] if outcome.status in _LEFT else []
-
-
-def _number(value: float | None) -> str:
-    return "?" if value is None else f"{value:g}"
 
 
 # --- for machines ---------------------------------------------------------------------------------------
@@ -338,13 +333,13 @@ class JUnit:
     """For CI: a test case per assembly, and per file that could not be read."""
 
     def head(self, summary: Summary) -> str:
-        left = sum(summary.statuses[status.value] for status in (Status.BLOCKED, Status.UNREGISTERED))
-        errors = summary.files - summary.fine
-        tests = sum(summary.statuses.values()) + max(0, errors - left)
+        count = summary.statuses
+        left = count[Status.BLOCKED] + count[Status.UNREGISTERED]
+        tests, errors = count.total() + summary.unread, count[Status.FAILED] + summary.unread
         # Of one length, so that the numbers can be put in at the end.
         return (
             '<?xml version="1.0" encoding="UTF-8"?>\n<testsuites>\n<testsuite name="silo-mod sync" '
-            f'tests="{tests:09d}" failures="{left:09d}" errors="{max(0, errors - left):09d}">'
+            f'tests="{tests:09d}" failures="{left:09d}" errors="{errors:09d}">'
         )
 
     def one(self, result: TopResult, number: int) -> str:
@@ -358,7 +353,7 @@ class JUnit:
             if outcome.status not in _LEFT:
                 cases.append(self._case(path, name))
                 continue
-            why = "; ".join(reasons_of(outcome)) or _WORDS[outcome.status]
+            why = "; ".join(reasons_of(outcome)) or STATUS_WORDS[outcome.status]
             kind = "error" if outcome.status is Status.FAILED else "failure"
             cases.append(self._case(path, name, kind, shorten(why, result.base)))
         return "".join(cases)

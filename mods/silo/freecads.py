@@ -47,10 +47,7 @@ def _command_places(env: Mapping[str, str], platform: str) -> tuple[str, ...]:
         "/usr/local/bin/freecadcmd",
         "~/.local/bin/freecadcmd",
         *(f"{base}/exports/bin/{_FLATPAK}" for base in _flatpak_bases()),
-        *(
-            f"{folder}/FreeCAD*.AppImage"
-            for folder in ("~/Applications", "~/AppImages", "~/.local/bin", "/opt")
-        ),
+        *(f"{folder}/FreeCAD*.AppImage" for folder in _APPIMAGES),
     )
 
 

@@ -9,7 +9,6 @@ import re
 import time
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -27,8 +26,7 @@ log = logging.getLogger("silo.api")
 KEPT_S = 24 * 3600.0
 
 
-@dataclass
-class Abilities:
+class Abilities(BaseModel):
     """What a server can do, kept for a day, so that each run need not try it again; None: nobody tried yet.
 
     Rights and modes are not kept, they change.
@@ -52,7 +50,11 @@ class Abilities:
     look_alikes: bool | None = None
     strict: bool = False
     keeps_item_ids: bool = False
-    schemas: dict[str, str] = field(default_factory=dict)
+    schemas: dict[str, str] = {}
+
+
+class _Kept(Abilities):
+    learned_at: float
 
 
 def abilities_path() -> Path:
@@ -62,15 +64,12 @@ def abilities_path() -> Path:
 
 def load_abilities(path: Path, server: str, *, clock: Callable[[], float] = time.time) -> Abilities:
     """What is known of a server; nothing where that is older than a day."""
-    known = _read_memory(path).get(server)
-    if not isinstance(known, dict) or not 0 <= clock() - _seconds(known.get("learned_at")) < KEPT_S:
+    try:
+        known = _Kept.model_validate(_read_memory(path).get(server), strict=True)
+    except ValidationError:
         return Abilities()
-    values = {f.name: known[f.name] for f in fields(Abilities) if f.name in known}
-    maybe = (bool, type(None))
-    wanted = {"strict": bool, "keeps_item_ids": bool, "schemas": dict}
-    if not all(isinstance(value, wanted.get(name, maybe)) for name, value in values.items()):
-        return Abilities()
-    return Abilities(**values)
+    fresh = 0 <= clock() - known.learned_at < KEPT_S
+    return Abilities(**known.model_dump(exclude={"learned_at"})) if fresh else Abilities()
 
 
 def save_abilities(
@@ -80,7 +79,7 @@ def save_abilities(
 
     It is only a memory: a file that is lost, old or damaged costs some requests, never an answer.
     """
-    content = {**_read_memory(path), server: {**asdict(known), "learned_at": clock()}}
+    content = {**_read_memory(path), server: {**known.model_dump(), "learned_at": clock()}}
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with replacing(path) as file:
@@ -95,10 +94,6 @@ def _read_memory(path: Path) -> dict[str, Any]:
     except (OSError, ValueError):
         return {}
     return data if isinstance(data, dict) else {}
-
-
-def _seconds(value: Any) -> float:
-    return float(value) if isinstance(value, (int, float)) else 0.0
 
 
 T = TypeVar("T")

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol, Self
 
@@ -74,7 +73,7 @@ class SiloClient(ItemCalls, BomCalls):
         self._memory = memory
         self._asked_for_item_ids = False
         self.abilities = load_abilities(memory, self.base_url) if memory is not None else Abilities()
-        self._known_before = replace(self.abilities, schemas=dict(self.abilities.schemas))
+        self._known_before = self.abilities.model_copy(deep=True)
         self._transport = Transport(
             self._address,
             token,

@@ -10,7 +10,7 @@ and a tree written out in full could be exponentially larger. What a look-up add
 from __future__ import annotations
 
 import os.path
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, fields
 from types import ModuleType
 from typing import Any
@@ -192,6 +192,29 @@ def diff_json(diff: BomDiff) -> dict[str, Any]:
         "conflicts": rows_as_dicts(diff.conflicts),
         "kept": rows_as_dicts(diff.kept),
     }
+
+
+_TOLD = ("added", "quantity_changed", "conflicts", "removed", "kept", "manual")
+
+
+def diff_rows(diff: BomDiff) -> Iterator[tuple[str, str, str]]:
+    """Each line that differs or is a person's own: (field of the diff, part number, quantity in words)."""
+    disputed = {change.part_number for change in diff.conflicts}
+    for kind in _TOLD:
+        for change in getattr(diff, kind):
+            if kind == "quantity_changed":
+                quantity = f"{_quantity(change.remote_quantity)} → {_quantity(change.local_quantity)}"
+            elif kind == "conflicts":
+                quantity = f"CAD {_quantity(change.local_quantity)}, Silo {_quantity(change.remote_quantity)}"
+            elif kind == "manual" and change.part_number in disputed:
+                continue
+            else:
+                quantity = _quantity(change.quantity)
+            yield kind, change.part_number, quantity
+
+
+def _quantity(value: float | None) -> str:
+    return "?" if value is None else f"{value:g}"
 
 
 FORMAT = 1

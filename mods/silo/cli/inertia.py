@@ -216,7 +216,7 @@ def run_links(args: argparse.Namespace) -> int:
         raise InputError(f"--clusters: wanted a number of links above 0, got {args.clusters}")
     if args.clusters is not None and args.urdf:
         raise InputError("--clusters groups by position and --urdf by names; give one of them")
-    shared.check_outputs([*args.preview, *([args.out] if args.out else [])], args.preview)
+    shared.check_outputs(args)
     from silo.inertia.links import ROOT_LINK, claim
     from silo.inertia.output.files import write_whole
     from silo.inertia.output.urdf import link_meshes, read_urdf, root_link

@@ -177,25 +177,27 @@ def check_options(args: argparse.Namespace, *, asks_server: bool) -> None:
         from silo.api.config import resolve_server
 
         resolve_server(args.server, args.token)
-    _check_targets(args)
+    check_outputs(args)
 
 
-def _check_targets(args: argparse.Namespace) -> None:
-    bad = [name for name in args.report if Path(name).suffix.lower() not in REPORTS]
-    if bad:
+def check_outputs(args: argparse.Namespace) -> None:
+    """InputError for files that cannot be written, or that must not: what is read, and one file twice."""
+    report: list[str] = getattr(args, "report", [])
+    single = (getattr(args, name, None) for name in ("urdf_out", "html", "out"))
+    written = [*report, *args.preview, *filter(None, single)]
+    if bad := [name for name in report if Path(name).suffix.lower() not in REPORTS]:
         raise InputError(f"--report writes {', '.join(REPORTS)}; got {', '.join(bad)}")
-    urdf = getattr(args, "urdf_out", None)
-    check_outputs([*args.report, *args.preview, *(name for name in (urdf, args.html) if name)], args.preview)
-
-
-def check_outputs(names: Sequence[str], previews: Sequence[str]) -> None:
-    """InputError where a file to be written has no folder, or a preview a suffix that is no picture."""
-    bad = [name for name in previews if Path(name).suffix.lower() not in (".glb", ".png")]
-    if bad:
+    if bad := [name for name in args.preview if Path(name).suffix.lower() not in (".glb", ".png")]:
         raise InputError(f"--preview writes .glb and .png; got {', '.join(bad)}")
-    for name in names:
+    read = [getattr(args, "top", args.assembly), *getattr(args, "materials", [])]
+    read += filter(None, (getattr(args, name, None) for name in ("bom", "links", "urdf")))
+    known = {os.path.realpath(name) for name in read}
+    for name in written:
         if not Path(name).absolute().parent.is_dir():
             raise InputError(f"{name}: there is no folder {Path(name).parent}")
+        if (real := os.path.realpath(name)) in known:
+            raise InputError(f"{name} is read by this command, or written twice; write to another file")
+        known.add(real)
 
 
 def read_options(args: argparse.Namespace, **more: Any) -> ReadOptions:

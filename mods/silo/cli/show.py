@@ -16,12 +16,13 @@ from rich.tree import Tree
 
 from silo.activity import ActivityText
 from silo.api.merging import unusual
+from silo.batch_report import STATUS_WORDS
 from silo.bom.declare import Modelled
 from silo.bom.findings import Finding, Severity
 from silo.bom.model import BomDiff, BomEntry, Extraction
 from silo.bom.naming import Proposal, display_name
 from silo.bom.paths import relative
-from silo.bom.report import base_of, shorten
+from silo.bom.report import base_of, diff_rows, shorten
 from silo.bom_sync import Outcome, Status
 from silo.cli import common
 from silo.registering.items import Registration
@@ -30,6 +31,15 @@ _MARK = {
     Severity.ERROR: ("✗", "bold red"),
     Severity.WARNING: ("⚠", "yellow"),
     Severity.INFO: ("·", "dim"),
+}
+# A line of a comparison, by the field of the diff.
+_DIFFERENCE = {
+    "added": ("+", "green", "new in the assembly"),
+    "quantity_changed": ("~", "yellow", "quantity changed"),
+    "conflicts": ("⚡", "magenta", "manual line; a person decides"),
+    "removed": ("⚠", "yellow", "not referenced by the assembly; kept"),
+    "kept": ("?", "red", "its file is missing; the line is kept"),
+    "manual": ("✎", "blue", "manual line; not touched"),
 }
 _MOST_MODELLED = 40
 # A tree longer than this helps nobody on a terminal; --json has it all.
@@ -119,10 +129,6 @@ def findings_text(findings: Iterable[Finding], base: str = "") -> Group:
     return Group(*lines)
 
 
-def _quantity(value: float | None) -> str:
-    return "?" if value is None else f"{value:g}"
-
-
 def diff_table(diff: BomDiff, names: Mapping[str, str], *, whole: bool = True) -> RenderableType:
     """CAD against server, one row per line that differs or is a person's own.
 
@@ -139,31 +145,10 @@ def diff_table(diff: BomDiff, names: Mapping[str, str], *, whole: bool = True) -
     ):
         table.add_column(title, justify=justify)  # type: ignore[arg-type]
 
-    def row(mark: str, style: str, number: str, quantity: str, note: str) -> None:
-        table.add_row(
-            Text(mark, style),
-            Text(plain(number), style),
-            Text(plain(names.get(number, ""))),
-            quantity,
-            Text(note, "dim"),
-        )
-
-    for line in diff.added:
-        row("+", "green", line.part_number, _quantity(line.quantity), "new in the assembly")
-    for change in diff.quantity_changed:
-        quantity = f"{_quantity(change.remote_quantity)} → {_quantity(change.local_quantity)}"
-        row("~", "yellow", change.part_number, quantity, "quantity changed")
-    for change in diff.conflicts:
-        quantity = f"CAD {_quantity(change.local_quantity)}, Silo {_quantity(change.remote_quantity)}"
-        row("⚡", "magenta", change.part_number, quantity, "manual line; a person decides")
-    for line in diff.removed:
-        row("⚠", "yellow", line.part_number, _quantity(line.quantity), "not referenced by the assembly; kept")
-    for line in diff.kept:
-        row("?", "red", line.part_number, _quantity(line.quantity), "its file is missing; the line is kept")
-    disputed = {change.part_number for change in diff.conflicts}
-    for line in diff.manual:
-        if line.part_number not in disputed:
-            row("✎", "blue", line.part_number, _quantity(line.quantity), "manual line; not touched")
+    for kind, number, quantity in diff_rows(diff):
+        mark, style, note = _DIFFERENCE[kind]
+        name = Text(plain(names.get(number, "")))
+        table.add_row(Text(mark, style), Text(plain(number), style), name, quantity, Text(note, "dim"))
     if not table.row_count and not whole:
         return Text(f"Lines that agree: {len(diff.unchanged)}; the others cannot be compared.", "yellow")
     if not table.row_count:
@@ -175,29 +160,22 @@ def diff_table(diff: BomDiff, names: Mapping[str, str], *, whole: bool = True) -
 
 
 _STATUS = {
-    Status.MERGED: ("✓", "green", "BOM merged"),
-    Status.UNCHANGED: ("✓", "green", "no change, nothing was sent"),
-    Status.DRY_RUN: ("·", "cyan", "preview only, nothing was sent"),
-    Status.BLOCKED: (
-        "✗",
-        "red",
-        "not synced: links are broken (see below; --allow-missing syncs all the same)",
-    ),
-    Status.UNREGISTERED: (
-        "⚠",
-        "yellow",
-        "not synced: the assembly has no Silo part number (silo-mod register)",
-    ),
-    Status.FAILED: ("✗", "red", "not synced"),
+    Status.MERGED: ("✓", "green"),
+    Status.UNCHANGED: ("✓", "green"),
+    Status.DRY_RUN: ("·", "cyan"),
+    Status.BLOCKED: ("✗", "red"),
+    Status.UNREGISTERED: ("⚠", "yellow"),
+    Status.FAILED: ("✗", "red"),
 }
 
 
 def outcome_text(outcome: Outcome) -> Text:
     """One line: which assembly, and what became of it."""
-    mark, style, words = _STATUS[outcome.status]
+    mark, style = _STATUS[outcome.status]
     head = outcome.assembly
     who = " ".join(filter(None, (head.part_number, head.name))) or display_name(head)
-    text = Text().append(f"{mark} ", style).append(plain(who), "bold").append(f": {words}")
+    text = Text().append(f"{mark} ", style).append(plain(who), "bold")
+    text.append(f": {STATUS_WORDS[outcome.status]}")
     if outcome.error is not None:
         text.append(f": {plain(str(outcome.error))}")
     for message in unusual(outcome.result):

@@ -13,7 +13,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from silo.batch import Options, TopResult, result_json, stopped_by, sync_top
+from silo.batch import Options, TopResult, stopped_by, sync_top
 from silo.bom.errors import DocumentError, InputError, SiloError
 from silo.cli import common
 from silo.cli.common import Commands
@@ -204,23 +204,22 @@ class _Shown:
     """What standard output gets: JSON as the run goes, or what changed, and errors last."""
 
     def __init__(self, args: argparse.Namespace, summary: Summary, *, many: bool) -> None:
-        self._json, self._many, self._summary = args.json, many, summary
-        self._count = 0
-        if args.json:
-            print('{"results": [', end="")
+        from silo.batch_report import Json
+
+        self._json, self._many, self._count = Json() if args.json else None, many, 0
+        if self._json is not None:
+            print(self._json.head(summary), end="")
 
     def add(self, result: TopResult) -> None:
-        if self._json:
-            print("," if self._count else "", common.json_text(result_json(result)), sep="\n", end="")
+        if self._json is not None:
+            print(self._json.one(result, self._count), end="")
             self._count += 1
         else:
             _show(result, whole=not self._many)
 
     def close(self, summary: Summary | None) -> None:
-        if self._json:
-            from silo.batch_report import Json
-
-            print(Json().end(summary), end="")
+        if self._json is not None:
+            print(self._json.end(summary), end="")
         elif summary is not None and self._many:
             _show_summary(summary)
 

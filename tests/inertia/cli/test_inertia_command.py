@@ -270,6 +270,31 @@ def test_mistakes_are_one_plain_sentence(
     assert len(ran.err.strip().splitlines()) == 1
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        "links arm.step --out arm.step",
+        "links arm.step --urdf arm.urdf --out ./arm.urdf",
+        "inertia arm.step --html arm.step",
+        "inertia arm.step --bom bom.csv --report linked.csv",
+        "inertia arm.step --urdf arm.urdf --urdf-out arm.urdf",
+        "inertia arm.step --html new.md --report new.md",
+        "mass arm.step --html arm.step",
+    ],
+)
+def test_what_is_read_is_never_overwritten(
+    run: Run, arm: Path, monkeypatch: pytest.MonkeyPatch, words: str
+) -> None:
+    """The map of links was written over the CAD file; a report over the BOM that it was made from."""
+    monkeypatch.chdir(arm)
+    os.symlink("bom.csv", "linked.csv")
+    before = {path.name: path.read_bytes() for path in arm.iterdir()}
+    ran = run(*words.split())
+    assert (ran.code, ran.out) == (2, "")
+    assert "write to another file" in ran.err
+    assert {path.name: path.read_bytes() for path in arm.iterdir()} == before
+
+
 @pytest.mark.parametrize("command", ["inertia", "links", "mass"])
 def test_jobs_say_how_many_processes_read(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     """The processors by default; a number that is none is refused."""
