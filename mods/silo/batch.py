@@ -177,16 +177,12 @@ def _outcomes(whole: Resolved, api: SyncApi, options: Options) -> Iterable[Outco
     return sync_tree(
         whole,
         api,
-        sync_id=_new_id,
+        sync_id=lambda: str(uuid.uuid4()),
         describe=lambda entry: source_document(entry, whole.assembly.doc_path),
         allow_missing=options.allow_missing,
         dry_run=options.dry_run,
         recursive=options.recursive,
     )
-
-
-def _new_id() -> str:
-    return str(uuid.uuid4())
 
 
 def source_document(entry: BomEntry, top: str = "") -> SourceDocument:

@@ -18,6 +18,7 @@ import os.path
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import partial
 from typing import Any, Protocol
 
 from silo.api.wire import (
@@ -269,8 +270,7 @@ def sync(
     sync_id: str,
     allow_missing: bool = False,
     dry_run: bool = False,
-    document: SourceDocument | None = None,
-    describe: Callable[[], SourceDocument | None] | None = None,
+    describe: Callable[[], SourceDocument | None] = lambda: None,
     lines: Sequence[Mapping[str, Any]] | None = None,
 ) -> Outcome:
     """Bring one assembly's direct children to the server.
@@ -279,8 +279,8 @@ def sync(
         names this attempt; the same id sent again gives the same answer and changes nothing twice.
     dry_run
         compare, and send nothing.
-    document, describe
-        the file of the BOM, or what finds it where there is something to send.
+    describe
+        finds the file of the BOM, where there is something to send.
     lines
         the server's lines of the assembly; None asks for them.
     """
@@ -292,8 +292,8 @@ def sync(
             return replace(outcome, status=Status.DRY_RUN)
         if outcome.status is not Status.MERGED or number is None:
             return outcome
-        document = describe() if describe is not None else document
-        return replace(outcome, result=api.merge_bom(number, merge_request(resolved, sync_id, document)))
+        request = merge_request(resolved, sync_id, describe())
+        return replace(outcome, result=api.merge_bom(number, request))
     except SiloError as error:
         return Outcome(Status.FAILED, resolved, error=error)
 
@@ -370,18 +370,13 @@ def sync_tree(
         if stopped is not None:
             yield Outcome(Status.FAILED, one, error=stopped)
             continue
-        try:
-            document = describe(one.assembly)
-        except SiloError as error:
-            yield Outcome(Status.FAILED, one, error=error)
-            continue
         outcome = sync(
             one,
             api,
             sync_id=sync_id(),
             allow_missing=allow_missing,
             dry_run=dry_run,
-            document=document,
+            describe=partial(describe, one.assembly),
         )
         stopped = outcome.error if outcome.error is not None and ends_run(outcome.error, api) else None
         yield outcome
