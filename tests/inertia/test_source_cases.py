@@ -200,3 +200,43 @@ def test_a_guessed_or_varying_material_of_a_sub_assembly_is_reported(
         report = compute(asm, HEAD + f"1,1,P-7,{material},,arm\n", links=one)
         assert codes(report, "a") == [code]
         assert report.links["l"].parts[0].part_number == ""
+
+
+def test_a_stated_density_within_what_the_material_varies_by_is_no_contradiction(
+    assemble: Fixture, compute: Fixture, codes: Fixture
+) -> None:
+    """EPS of 28 kg/m³ is EPS; of 60 it is something else."""
+    for stated, wanted in ((28.0, ["density_varies"]), (60.0, ["density_varies", "step_density_differs"])):
+        asm = assemble(("l/a", cube("a", 0.1, step_density=stated)))
+        assert codes(compute(asm, HEAD + "1,1,,EPS,,a\n")) == wanted
+
+
+def test_a_part_whose_own_row_says_nothing_gets_no_material_from_around_it(
+    assemble: Fixture, compute: Fixture, part: Fixture, codes: Fixture
+) -> None:
+    """A row around it stands for the parts that have no row themselves."""
+    asm = assemble(("arm/print/a", cube("a")), ("arm/print/b", cube("b")))
+    report = compute(asm, HEAD + "1,1,,PLA,,print\n2,1,,,,b\n")
+    assert part(report, "a").mass == pytest.approx(1250 * V)
+    assert (part(report, "b").mass, codes(report, "b")) == (0.0, ["no_mass_no_material"])
+
+
+def test_where_parts_disagree_about_quantities_either_reading_holds(
+    assemble: Fixture, compute: Fixture, codes: Fixture
+) -> None:
+    """Two arms with three bolts each, and four pins in all: one row counts per parent, the other in all."""
+    bolts = [(f"arm{i % 2}/bolt{i}", cube("bolt"), None, "arm/bolt") for i in range(6)]
+    pins = [(f"arm{i % 2}/pin{i}", cube("pin", 0.02), None, "arm/pin") for i in range(4)]
+    report = compute(assemble(*bolts, *pins), HEAD + "1,2,,,,arm\n1.1,3,,,1.0 g,bolt\n1.2,4,,,2.0 g,pin\n")
+    assert "count_differs" not in codes(report)
+
+
+def test_of_two_shapes_of_one_name_the_row_is_that_of_the_one_that_weighs_it(
+    assemble: Fixture, compute: Fixture, part: Fixture
+) -> None:
+    """One piece, and both shapes are there once; the mass of steel fits the small one only."""
+    asm = assemble(("l/x", cube("x", key="small")), ("l/y", cube("x", 0.03, key="large")))
+    report = compute(asm, HEAD + "1,1,,steel,7.85 g,x\n")
+    masses = {p.paths[0]: (p.mass, str(p.decided_by)) for _, p in report.parts()}
+    assert masses["l/x"] == (pytest.approx(7850 * V), "mass")
+    assert masses["l/y"] == (pytest.approx(27 * 1000 * V), "only")  # not in the BOM

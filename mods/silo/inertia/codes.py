@@ -40,9 +40,7 @@ class MassCode(StrEnum):
     IN_ROOT_LINK = "in_root_link"  # in no first-level sub-assembly: the root link has it
     CLAIMED_TWICE = "claimed_twice"
     PATTERN_UNUSED = "pattern_unused"
-    FRAME_FAR = (
-        "frame_far"  # a frame far outside of the assembly, or turned by 90 rad: another unit was meant
-    )
+    FRAME_FAR = "frame_far"  # far outside of the assembly, or turned by 90 rad: another unit was meant
     FRAME_DIFFERS = "frame_differs"  # the numbers' frame is not that of the URDF's link
     ZERO_MASS_LINK = "zero_mass_link"
     BAD_TENSOR = "bad_tensor"

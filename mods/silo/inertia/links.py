@@ -153,10 +153,17 @@ def _yaml(text: str, source: str) -> Any:
     """
     import yaml
 
+    twice: list[str] = []
+
+    class Loader(yaml.BaseLoader):
+        def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+            lines = {k.value: k.start_mark.line + 1 for k, _ in node.value if isinstance(k, yaml.ScalarNode)}
+            count = Counter(k.value for k, _ in node.value if isinstance(k, yaml.ScalarNode))
+            twice.extend(f"“{key}” (line {lines[key]})" for key, n in count.items() if n > 1)
+            return super().construct_mapping(node, deep)
+
     try:
-        tree = yaml.compose(text, Loader=yaml.SafeLoader)
-        twice = _keys_given_twice(tree)
-        data = yaml.load(text, Loader=yaml.BaseLoader)
+        data = yaml.load(text, Loader)
     except (yaml.YAMLError, RecursionError) as error:
         raise ConfigError(f"{source}: this is no YAML ({' '.join(str(error).split())})") from error
     if twice:
@@ -164,26 +171,6 @@ def _yaml(text: str, source: str) -> Any:
             f"{source}: given twice: {', '.join(twice)}; write all parts of a link in one place"
         )
     return data
-
-
-def _keys_given_twice(tree: Any) -> list[str]:
-    import yaml
-
-    found: list[str] = []
-    waiting, seen = [tree], set()
-    while waiting:
-        node = waiting.pop()
-        if not isinstance(node, yaml.CollectionNode) or id(node) in seen:
-            continue
-        seen.add(id(node))
-        if isinstance(node, yaml.MappingNode):
-            keys = [key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode)]
-            lines = {k.value: k.start_mark.line + 1 for k, _ in node.value if isinstance(k, yaml.ScalarNode)}
-            found += [f"“{key}” (line {lines[key]})" for key, n in Counter(keys).items() if n > 1]
-            waiting += [value for _, value in node.value]
-        else:
-            waiting += node.value
-    return found
 
 
 def as_link_map(links: LinkMap | Mapping[str, Any] | Path | str | None) -> LinkMap | None:

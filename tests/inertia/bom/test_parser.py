@@ -438,3 +438,6 @@ def test_indented_names_are_a_structure() -> None:
         table = BOMParser().parse_bytes((head + rows).encode())
         assert {row.parent for row in table.rows} == {None}
         assert not table.warnings
+    table = BOMParser().parse_bytes(b"Item,Name,Material,Mass (g)\n1,A,,\n1.1,  B,,\n2,  C,,\n")
+    assert [row.parent for row in table.rows] == [None, 0, None]
+    assert not table.warnings

@@ -22,7 +22,7 @@ from rich.console import Console
 from silo.bom.errors import InputError
 from silo.inertia.core import MassProps, combine
 from silo.inertia.links import ASSEMBLY_FRAME, link_map, origin_frame
-from silo.inertia.output.data import CSV_HEADER, report_csv, report_data, report_json
+from silo.inertia.output.data import CSV_COLUMNS, report_csv, report_data, report_json
 from silo.inertia.output.snippets import SNIPPETS, document, snippets
 from silo.inertia.output.text import report_markdown, report_tables
 from silo.inertia.output.values import number, settled, writable
@@ -330,7 +330,7 @@ def test_part_masses_of_the_json_sum_up(report: Any) -> None:
 def test_csv_has_one_row_per_link_and_part(report: Any) -> None:
     """Readable by any spreadsheet, complete, and safe from formulae."""
     rows = list(csv.reader(io.StringIO(report_csv(report))))
-    assert tuple(rows[0]) == CSV_HEADER
+    assert rows[0] == list(CSV_COLUMNS)
     assert [row[:2] for row in rows[1:]] == [
         ["base", "plate"], ["base", "rod"], ["arm", "rod"], ["arm", "block"], ["pad", "pad"],
         ["", "loose | part"],

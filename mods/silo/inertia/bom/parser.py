@@ -103,7 +103,6 @@ def _entry(
         material=None if is_empty(material) else material,
         mass_kg=mass.kg,
         part_number=number,
-        description=text,
         quantity=quantity,
         quantum_kg=mass.quantum_kg,
         overridden=mass.overridden,

@@ -63,7 +63,6 @@ class BOMEntry:
     material: str | None
     mass_kg: float | None
     part_number: str = ""
-    description: str = ""
     quantity: float | None = None
     quantum_kg: float = 0.0
     overridden: bool = False

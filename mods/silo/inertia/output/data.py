@@ -6,6 +6,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+from collections.abc import Callable
 from typing import Any
 
 from silo.bom.headers import safe_cell
@@ -63,7 +64,7 @@ def _part(part: PartResult) -> dict[str, Any]:
     return {
         "name": part.name,
         "part_number": part.part_number,
-        "path": part.paths[0] if part.paths else "",
+        "path": part.paths[0],
         "paths": list(part.paths),
         "quantity": part.quantity,
         "mass": part.mass,
@@ -97,48 +98,30 @@ def _sub_assembly(one: SubAssemblyResult) -> dict[str, Any]:
     }
 
 
-CSV_HEADER = (
-    "Link",
-    "Part",
-    "Part number",
-    "Quantity",
-    "Mass (kg)",
-    "Total mass (kg)",
-    "Volume (m3)",
-    "Density (kg/m3)",
-    "Source",
-    "Rule",
-    "Decided by",
-    "Material",
-    "BOM lines",
-    "Path",
-    "Warnings",
-)
+CSV_COLUMNS: dict[str, Callable[[str, PartResult], object]] = {
+    "Link": lambda link, part: link,
+    "Part": lambda link, part: part.name,
+    "Part number": lambda link, part: part.part_number,
+    "Quantity": lambda link, part: part.quantity,
+    "Mass (kg)": lambda link, part: part.mass,
+    "Total mass (kg)": lambda link, part: part.total_mass,
+    "Volume (m3)": lambda link, part: part.volume,
+    "Density (kg/m3)": lambda link, part: part.density,
+    "Source": lambda link, part: part.source,
+    "Rule": lambda link, part: part.rule,
+    "Decided by": lambda link, part: part.decided_by,
+    "Material": lambda link, part: part.material,
+    "BOM lines": lambda link, part: " ".join(map(str, part.lines)),
+    "Path": lambda link, part: part.paths[0],
+    "Warnings": lambda link, part: " ".join(dict.fromkeys(str(w.code) for w in part.warnings)),
+}
 
 
 def report_csv(report: InertiaReport) -> str:
     """One row per link and part (RFC 4180); text that a spreadsheet would take for a formula is quoted."""
     out = io.StringIO()
     writer = csv.writer(out)
-    writer.writerow(CSV_HEADER)
+    writer.writerow(CSV_COLUMNS)
     for link, part in report.parts():
-        writer.writerow(
-            [
-                safe_cell(link),
-                safe_cell(part.name),
-                safe_cell(part.part_number),
-                part.quantity,
-                repr(part.mass),
-                repr(part.total_mass),
-                repr(part.volume),
-                "" if part.density is None else repr(part.density),
-                part.source,
-                part.rule,
-                part.decided_by,
-                safe_cell(part.material or ""),
-                " ".join(str(line) for line in part.lines),
-                safe_cell(part.paths[0] if part.paths else ""),
-                " ".join(dict.fromkeys(str(w.code) for w in part.warnings)),
-            ]
-        )
+        writer.writerow([safe_cell(cell(link, part)) for cell in CSV_COLUMNS.values()])
     return out.getvalue()
