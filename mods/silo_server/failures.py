@@ -93,7 +93,7 @@ async def _validation_error(request: Request, error: Exception) -> Response:
 
 def _problem(entry: Mapping[str, Any]) -> str:
     where = [str(part) for part in entry["loc"] if part not in ("body", "query", "path", "header")]
-    return f"{'.'.join(where) or 'body'}: {entry['msg']}"
+    return f"{'.'.join(where) or 'body'}: {entry['msg'].removeprefix('Value error, ')}"
 
 
 async def _http_exception(request: Request, error: Exception) -> Response:

@@ -7,7 +7,7 @@ import asyncio
 import re
 import time
 
-from starlette.datastructures import MutableHeaders
+from starlette.datastructures import Headers, MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.middleware.gzip import GZipMiddleware
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -88,7 +88,10 @@ class BodyLimit:
         limit = self._limit(scope["path"])
         message = f"the request is larger than this server takes ({limit / MIB:g} MiB)"
         # A browser gets its answer from inside, where errors become pages.
-        if self._told(scope) > limit and not _from_browser(scope):
+        headers = Headers(scope=scope)
+        length = headers.get("content-length", "")
+        from_browser = "text/html" in headers.get("accept", "")
+        if length.isdigit() and int(length) > limit and not from_browser:
             await error_answer(413, "too_large", message)(scope, receive, send)
             return
         taken = 0
@@ -118,14 +121,3 @@ class BodyLimit:
         if UPLOAD_PATH.match(path):
             return self.settings.max_file_bytes + 64 * 1024
         return self.settings.max_body_bytes
-
-    @staticmethod
-    def _told(scope: Scope) -> int:
-        for name, value in scope["headers"]:
-            if name == b"content-length" and value.isdigit():
-                return int(value)
-        return 0
-
-
-def _from_browser(scope: Scope) -> bool:
-    return any(name == b"accept" and b"text/html" in value for name, value in scope["headers"])

@@ -11,6 +11,7 @@ import pytest
 from silo_server.services.events import LoggedEvent
 from silo_server.values import LineState
 from silo_server.web.activity_page import entry_of
+from silo_server.web.line_form import changes
 from silo_server.web.render import (
     bdi,
     closed,
@@ -24,7 +25,6 @@ from silo_server.web.render import (
     size,
     when,
 )
-from silo_server.web.words import changes
 
 LINE = LineState(4.0, "assembly")
 

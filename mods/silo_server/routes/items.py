@@ -89,10 +89,7 @@ def search_items(
     call: Viewer, q: Word = "", item_type: Word | None = None, limit: Limit = 20, offset: Offset = 0
 ) -> Response:
     """Search as you type: every word must be somewhere in number, name or description."""
-    query = service.ItemQuery(search=q, item_type=item_type, limit=limit, offset=offset)
-    with call.read() as tx:
-        found, total = service.list_items(tx, query)
-    return json_answer([item_to_wire(item) for item in found], headers={"X-Total-Count": str(total)})
+    return list_items(call, q, item_type=item_type, limit=limit, offset=offset)
 
 
 @router.post(

@@ -140,9 +140,10 @@ def list_items(tx: Tx, query: ItemQuery) -> tuple[list[Item], int]:
         order = [column.desc() for column in order]
     found = search_for(tx, query.search)
     if found is not None:
-        conditions.append(found.condition)
+        condition, rank = found
+        conditions.append(condition)
         if not query.sort:
-            order.insert(0, found.rank)
+            order.insert(0, rank)
     if query.item_type:
         conditions.append(items.c.item_type == query.item_type)
     if query.category:

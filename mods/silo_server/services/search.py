@@ -19,7 +19,19 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-from sqlalchemy import ColumnElement, Integer, case, column, func, literal_column, or_, select, table, text
+from sqlalchemy import (
+    ColumnElement,
+    Integer,
+    and_,
+    case,
+    column,
+    func,
+    literal_column,
+    or_,
+    select,
+    table,
+    text,
+)
 from sqlalchemy.dialects.postgresql import TSQUERY, TSVECTOR
 from sqlalchemy.sql.expression import cast, literal
 
@@ -43,21 +55,15 @@ _fts = table("item_search", column("rowid", Integer))
 _vectors = table("item_search", column("item_id", Integer), column("words", TSVECTOR))
 
 
-@dataclass(frozen=True, slots=True)
-class Found:
-    """How to find and rank: a condition on ``items``, and what to order by (best first)."""
-
-    condition: ColumnElement[bool]
-    rank: ColumnElement[int]
-
-
 def words_of(written: str) -> list[str]:
     """The words of a text as the index has them."""
     return [word[:LONGEST_WORD] for word in _WORD.findall(_plain(written))]
 
 
-def search_for(tx: Tx, written: str) -> Found | None:
-    """What finds the items with all words of ``written``; None where it says nothing to search for.
+def search_for(tx: Tx, written: str) -> tuple[ColumnElement[bool], ColumnElement[int]] | None:
+    """What finds the items with all words of ``written``: a condition on ``items``, and what to order by.
+
+    None where it says nothing to search for.
 
     A single letter or digit finds the numbers that begin with it. A SHA-256 finds the items that have, or
     had, the file with this content, or were registered from it. Best first: the very number, then the words
@@ -78,7 +84,7 @@ def search_for(tx: Tx, written: str) -> Found | None:
     if len(key) == 1 and key.isascii() and words:
         # Nearly every item has a word that begins so; of these only numbers are worth their time.
         begins = (items.c.part_number_key >= key) & (items.c.part_number_key < chr(ord(key) + 1))
-        return Found(begins, literal(0))
+        return begins, literal(0)
     if words:
         conditions.append(_matches(tx, words, ""))
     elif not conditions:
@@ -92,10 +98,7 @@ def search_for(tx: Tx, written: str) -> Found | None:
         rank = case(
             (number, 0), (_matches(tx, words, "number"), 1), (_matches(tx, words, "number name"), 2), else_=3
         )
-    condition = conditions[0]
-    for more in conditions[1:]:
-        condition = condition & more
-    return Found(condition, rank)
+    return and_(*conditions), rank
 
 
 def index_item(tx: Tx, item_id: int) -> None:

@@ -181,13 +181,9 @@ def create_token(call: Reader, form: Form) -> Response:
     name, ends, wanted = text(form, "name"), text(form, "days"), text(form, "scope") or Scope.WRITE
     if not 0 < len(name) <= 200:
         return _own_page(call, problem="A token needs a name of at most 200 characters.")
-    if ends not in LIFETIMES:
-        return _own_page(call, problem="Choose one of the lifetimes.")
-    try:
-        scope = Scope(wanted)
-    except ValueError:
-        return _own_page(call, problem="Choose one of the scopes.")
-    days, secret = LIFETIMES[ends], None
+    if ends not in LIFETIMES or wanted not in list(Scope):
+        return _own_page(call, problem="Choose one of the lifetimes, and one of the scopes.")
+    days, scope, secret = LIFETIMES[ends], Scope(wanted), None
     if key := text(form, "key"):
         secret = credentials.secret_of_form(call.actor, key, name, ends, wanted)
     try:

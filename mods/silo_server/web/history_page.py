@@ -13,11 +13,11 @@ from silo_server.routes.context import Call, PageFrom
 from silo_server.services.bom import history
 from silo_server.services.items import get_item
 from silo_server.web.forms import Form, back, text, whole
+from silo_server.web.line_form import changes, sentences
 from silo_server.web.login_page import Reader, Writer
 from silo_server.web.merge_page import bom_path
 from silo_server.web.render import page, plural
 from silo_server.web.tables import part_of
-from silo_server.web.words import changes, sentences
 
 router = APIRouter(include_in_schema=False)
 

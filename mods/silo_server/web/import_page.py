@@ -27,10 +27,10 @@ from silo_server.services.bom import imports
 from silo_server.services.bom.imports import Layout
 from silo_server.services.items import get_item
 from silo_server.web.forms import Form, back, text, whole
+from silo_server.web.line_form import changes
 from silo_server.web.login_page import Writer
 from silo_server.web.merge_page import bom_path
 from silo_server.web.render import isolate, page, sentence
-from silo_server.web.words import changes
 
 router = APIRouter(include_in_schema=False)
 

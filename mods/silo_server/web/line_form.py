@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""The forms of BOM lines: what they show, what a person changed or decided, and what others did meanwhile.
+"""BOM lines for people: their changes in words, and their forms, with what others did meanwhile.
 
 A form sends each field twice: as it stands now, and as it was shown. So only what the person changed is
 written, whatever happened to the line since, and only a field that two people changed needs a choice.
@@ -25,9 +25,23 @@ from silo_server.services.bom.history import Change, ChangedLine
 from silo_server.services.bom.review import Action, Decision, Review, told_quantities
 from silo_server.values import Item, Line, LineState
 from silo_server.web.forms import Edit, amount, compared, same_text, text, texts, whole
-from silo_server.web.render import quantity
-from silo_server.web.words import FIELDS, by_whom, changes
+from silo_server.web.render import isolate, plural, quantity
 
+# What a person fills in on a line, with its label.
+FIELDS = {
+    "quantity": "Quantity",
+    "unit": "Unit",
+    "reference_designators": "Reference designators",
+    "find_number": "Find number",
+    "notes": "Notes",
+}
+_NAMES = {
+    "reference_designators": "reference designators",
+    "find_number": "find number",
+    "notes": "notes",
+    "child_revision": "revision",
+    "rel_type": "type",
+}
 MOST = {"quantity": 100, "unit": 32, "find_number": 32}
 MOST_TEXT = 10_000
 # "6" and "m" mean something only together.
@@ -179,22 +193,16 @@ def meanwhile(tx: Tx, parent: Item, line_ids: Sequence[str], after: int) -> dict
     }
 
 
-@dataclass(frozen=True, slots=True)
-class Disputed:
-    """Line id → who set its quantity here, and what CAD says of it, both in words."""
-
-    by_hand: Mapping[str, str]
-    cad_words: Mapping[str, str]
-
-
-def disputed(tx: Tx, parent: Item, lines: Sequence[Line], found: Review) -> Disputed:
-    """What is known of the quantities that a person changed."""
+def disputed(
+    tx: Tx, parent: Item, lines: Sequence[Line], found: Review
+) -> tuple[dict[str, str], dict[str, str]]:
+    """Line id → who set its quantity here, and line id → what CAD says of it; both in words."""
     told = told_quantities(tx, [parent.id]).get(parent.id, {})
     overrides = [line for line in lines if line.state.override]
     asked = {*(line.id for line in overrides), *(conflict.line.id for conflict in found.conflicts)}
     stories = history.stories(tx, parent, asked)
     by_hand = {line_id: who for line_id, story in stories.items() if (who := _quantity_by(story))}
-    return Disputed(
+    return (
         {line_id: by_whom(change) for line_id, change in by_hand.items()},
         {line.id: _cad_words(line, told, by_hand.get(line.id), found.last_merge) for line in overrides},
     )
@@ -240,3 +248,61 @@ def _same(name: str, a: str, b: str) -> bool:
 def _text(form: FormData, name: str) -> str:
     """A field of any length: :func:`values_of` refuses a long one by the name that the page shows."""
     return text(form, name, sys.maxsize)
+
+
+def by_whom(change: Change) -> str:
+    """``by ann, 2026-02-08 22:15: one spare``; a sync names its file."""
+    from_file = f", from {isolate(change.document_file)}" if change.document_file else ""
+    what = "sync " if change.kind == ChangeKind.MERGE else ""
+    why = f": {isolate(change.reason)}" if change.reason else ""
+    return f"{what}by {isolate(change.username)}, {change.at[:16].replace('T', ' ')}{from_file}{why}"
+
+
+def sentence(line: ChangedLine) -> tuple[str, str]:
+    """(mark, words) of what one change made of one line: ``~``, ``F01-0001 M8x20 Bolt: quantity 8 → 12``."""
+    who = f"{isolate(line.child.part_number)} {isolate(line.child.name)}".strip()
+    if line.before is None and line.after is not None:
+        return "added", f"{who}: added, quantity {quantity(line.after.quantity, line.after.unit)}"
+    if line.after is None:
+        return "removed", f"{who}: removed"
+    assert line.before is not None  # a changed line has both states
+    gone = line.after.unreferenced_since is not None and line.before.unreferenced_since is None
+    said = ", ".join(changes(line.before, line.after)) or "no visible change"
+    return ("warn" if gone else "changed"), f"{who}: {said}"
+
+
+def changes(before: LineState, after: LineState) -> list[str]:
+    """What differs between two states of a line."""
+    said: list[str] = []
+    if (before.quantity, before.unit) != (after.quantity, after.unit):
+        old, new = quantity(before.quantity, before.unit), quantity(after.quantity, after.unit)
+        said.append(f"quantity {old} → {new}")
+    if before.unreferenced_since is None and after.unreferenced_since is not None:
+        said.append("no longer referenced by the assembly")
+    back = before.unreferenced_since is not None and after.unreferenced_since is None
+    if back and after.source == "assembly":
+        said.append("referenced again")
+    if before.source != after.source:
+        said.append("now a manual line" if after.source == "manual" else "owned by the assembly again")
+    if before.reason != after.reason and after.reason:
+        said.append(f"reason: {isolate(after.reason)}")
+    for name, words in _NAMES.items():
+        old, new = (_shown(getattr(state, name)) for state in (before, after))
+        if old != new:
+            said.append(f"{words} {old} → {new}")
+    return said
+
+
+def sentences(
+    lines: Sequence[ChangedLine], most: int = 30, count: int | None = None
+) -> list[tuple[str, str]]:
+    """The lines of a change, which has ``count`` of them; beyond ``most`` only how many more."""
+    told = [sentence(line) for line in lines[:most]]
+    rest = (len(lines) if count is None else count) - most
+    return [*told, ("", f"and {plural(rest, 'more line', 'more lines')}")] if rest > 0 else told
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, tuple):
+        return isolate(" ".join(map(str, value))) or "none"
+    return "none" if value is None or value == "" else f"“{isolate(str(value))}”"

@@ -29,11 +29,10 @@ from silo_server.services.items import get_item
 from silo_server.values import Line, LineState
 from silo_server.web import line_form
 from silo_server.web.forms import AmbiguousError, Form, back, text, texts, whole
-from silo_server.web.line_form import LineForm
+from silo_server.web.line_form import FIELDS, LineForm, by_whom, sentences
 from silo_server.web.login_page import Reader, Writer
 from silo_server.web.render import isolate, page, plural, segment, sentence
 from silo_server.web.tables import Address, Page, arranged, fits, page_of
-from silo_server.web.words import FIELDS, by_whom, sentences
 
 router = APIRouter(include_in_schema=False)
 
@@ -268,7 +267,7 @@ def _show(call: Call, part_number: str, asked: Asked, status: int = 200) -> Resp
         merged = history.get_change(tx, item, merge.id)[1] if merge else []
         recent = history.list_changes(tx, item, LATER_CHANGES)
         seen = events.head(tx)
-        disputed = line_form.disputed(tx, item, lines, found)
+        by_hand, cad_words = line_form.disputed(tx, item, lines, found)
     conflicts = {conflict.line.id: conflict for conflict in found.conflicts}
     editing = _editing(lines, asked, item)
     problem = asked.problem
@@ -297,8 +296,8 @@ def _show(call: Call, part_number: str, asked: Asked, status: int = 200) -> Resp
         labels=FIELDS,
         group_of=line_form.group_of,
         at=recent[0].id if recent else 0,
-        by_hand=disputed.by_hand,
-        cad_words=disputed.cad_words,
+        by_hand=by_hand,
+        cad_words=cad_words,
         by_sync=by_whom(merge) if merge else "",
         last=last,
         gaps=in_sentences(last.gaps),

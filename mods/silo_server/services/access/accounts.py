@@ -67,13 +67,14 @@ def list_users(tx: Tx) -> list[User]:
 
 def get_user(tx: Tx, username: str) -> User:
     """The user, in whatever case; NotFoundError where there is none."""
-    row = _row_of(tx, username)
+    row = row_of(tx, username)
     if row is None:
         raise NotFoundError(f"there is no user {username!r}")
     return to_user(row)
 
 
-def _row_of(tx: Tx, username: str) -> Any:
+def row_of(tx: Tx, username: str) -> Any:
+    """The row of this user, None where there is none."""
     return tx.conn.execute(select(users).where(users.c.username_key == username.casefold())).one_or_none()
 
 
@@ -86,7 +87,7 @@ def create_user(
             "username: wanted 1 to 64 letters, digits or . _ @ - beginning with a letter or digit, "
             f"got {username!r}"
         )
-    if _row_of(tx, username) is not None:
+    if row_of(tx, username) is not None:
         raise DuplicateError(f"username {username} is taken")
     tx.conn.execute(
         insert(users).values(
@@ -157,38 +158,27 @@ def _what_changed(user: User, values: Mapping[str, object]) -> str:
 def make_admin(tx: Tx, username: str) -> User:
     """The user as an active admin; made where there is none."""
     tx.lock(ADMIN_LOCK)
-    if _row_of(tx, username) is None:
+    if row_of(tx, username) is None:
         return create_user(tx, username, Role.ADMIN)
     return change_user(tx, username, role=Role.ADMIN, active=True)
 
 
-@dataclass(frozen=True, slots=True)
-class Claimed:
-    """The user that somebody says to be, with the hash of the password that would prove it."""
-
-    user: User
-    password_hash: str | None
-
-
-def claimed_user(tx: Tx, username: str) -> Claimed | None:
-    """The user of this name, to be checked with :func:`password_fits` once the transaction is over."""
-    row = _row_of(tx, username)
-    return None if row is None else Claimed(to_user(row), row.password_hash)
-
-
-def password_fits(claimed: Claimed | None, password: str) -> bool:
+def password_fits(claimed: Any, password: str) -> bool:
     """True where the password is that of an active user; takes as long for an unknown name.
+
+    claimed
+        the row of :func:`row_of` for the name that somebody gave.
 
     Not to be called inside a transaction: a hash takes long, and 64 MiB. BusyError where too many wait.
     """
-    known = claimed is not None and claimed.password_hash is not None
-    stored = claimed.password_hash if claimed is not None and claimed.password_hash else _decoy()
+    stored = claimed.password_hash if claimed is not None else None
+    checked = stored or _decoy()  # before a place is taken: the decoy takes one of its own
     with _HASHING.enter():
         try:
-            _hasher().verify(stored, password[:MAX_PASSWORD])
+            _hasher().verify(checked, password[:MAX_PASSWORD])
         except (VerificationError, InvalidHashError):
             return False
-    return known and claimed is not None and claimed.user.active
+    return bool(stored and claimed.active)
 
 
 def hash_password(password: str) -> str:

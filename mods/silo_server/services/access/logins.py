@@ -65,15 +65,14 @@ def _proved(db: Database, username: str, password: str, address: str) -> account
         tx.lock(LOGIN_LOCK)
         _check_rate(tx, username, address)
         attempt = _note_attempt(tx, username, address)
-        claimed = accounts.claimed_user(tx, username)
+        claimed = accounts.row_of(tx, username)
     if not accounts.password_fits(claimed, password):
         with db.write(actor, even_when_read_only=True) as tx:
             audit.note(tx, "login.failed", username[:64])
         raise AuthError(WRONG)
-    assert claimed is not None  # a password fits nobody else
     with db.write(actor, even_when_read_only=True) as tx:
         tx.conn.execute(delete(login_failures).where(login_failures.c.id == attempt))
-    return claimed.user
+    return accounts.to_user(claimed)
 
 
 def create_login_link(tx: Tx, username: str) -> str:
