@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
@@ -20,24 +19,10 @@ HEADERS = {
 HEARTBEAT = b"event: heartbeat\ndata: {}\n\n"
 
 
-@dataclass(frozen=True, slots=True)
-class ItemFilter:
-    """Only events of these items (UUIDs or case-folded part numbers); empty = all.
-
-    Events of no item (``server.state``, ``reset``) always pass.
-    """
-
-    keys: frozenset[str] = frozenset()
-
-    def passes(self, frame: Frame) -> bool:
-        if not self.keys or (frame.item_uuid is None and frame.part_number_key is None):
-            return True
-        return frame.item_uuid in self.keys or frame.part_number_key in self.keys
-
-
 class EventStream(Response):
     """The stream. ``last``: what the client saw last, None = only what is new from now on.
 
+    ``items`` (UUIDs or part numbers) lets only their events through, and those of no item.
     ``still_allowed`` is asked with every heartbeat: a stream must not outlive the token that opened it.
     """
 
@@ -55,7 +40,7 @@ class EventStream(Response):
         self._hub = hub
         self._last = last
         self._still_allowed = still_allowed
-        self._filter = ItemFilter(frozenset(item.casefold() for item in items))
+        self._items = frozenset(item.casefold() for item in items)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         await send({"type": "http.response.start", "status": 200, "headers": self.raw_headers})
@@ -97,8 +82,14 @@ class EventStream(Response):
                 await hub.wait()
         await send({"type": "http.response.body", "body": b"", "more_body": False})
 
+    def _passes(self, frame: Frame) -> bool:
+        if not self._items:
+            return True
+        about = {frame.item_uuid, frame.part_number_key} - {None}
+        return not about or bool(about & self._items)
+
     def _payload(self, batch: Batch) -> bytes:
-        frames = b"".join(frame.payload for frame in batch.frames if self._filter.passes(frame))
+        frames = b"".join(frame.payload for frame in batch.frames if self._passes(frame))
         return _reset(batch.cursor) + frames if batch.reset else frames
 
 
