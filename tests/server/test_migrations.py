@@ -143,7 +143,7 @@ def test_a_released_database_comes_up_with_its_data(
     with released.read() as tx:
         found = search_for(tx, "unicode7")
         assert found is not None
-        assert tx.conn.scalars(select(items.c.part_number).where(found.condition)).all() == ["Ünïcode-7"]
+        assert tx.conn.scalars(select(items.c.part_number).where(found[0])).all() == ["Ünïcode-7"]
         assert set(tx.conn.scalars(select(items.c.version))) <= set(range(1, 9))
         assert not any(tx.conn.scalars(select(sessions.c.by_link)))
         top = last_sync(tx, get_item(tx, "ASM-TOP"))
