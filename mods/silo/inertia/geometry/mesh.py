@@ -104,8 +104,7 @@ def _centred(mesh: Mesh) -> tuple[Floats, Floats]:
 def welded(vertices: Floats, faces: Indices) -> Mesh:
     """Equal vertices made one (an STL repeats each six times), triangles without area taken out.
 
-    Where edges are open then, vertices closer than a millionth of the mesh are made one as well, if that
-    closes them.
+    Where edges are open then, vertices closer than a millionth of the mesh are made one as well.
     """
     mesh = _merged(vertices, faces)
     if not len(mesh) or not open_edges(mesh):
@@ -115,8 +114,7 @@ def welded(vertices: Floats, faces: Indices) -> Mesh:
         return mesh
     grid = np.round(mesh.vertices / step)
     _, first, place = np.unique(grid, axis=0, return_index=True, return_inverse=True)
-    closer = _merged(mesh.vertices[first[place.reshape(-1)]], mesh.faces)
-    return closer if not open_edges(closer) else mesh
+    return _merged(mesh.vertices[first[place.reshape(-1)]], mesh.faces)
 
 
 def _merged(vertices: Floats, faces: Indices) -> Mesh:

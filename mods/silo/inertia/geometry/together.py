@@ -249,7 +249,7 @@ def _tell(
 
 def _minus(body: SolidProps, cavity: SolidProps) -> SolidProps:
     nothing = replace(cavity, volume_m3=-cavity.volume_m3, inertia_unit=-cavity.inertia_unit)
-    return replace(combined([body, nothing]), reversed=body.reversed)
+    return combined([body, nothing])
 
 
 def combined(solids: Sequence[SolidProps]) -> SolidProps:

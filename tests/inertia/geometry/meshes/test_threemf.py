@@ -89,6 +89,8 @@ def test_components_are_placed_by_their_transforms(write: Any, read_in: Any) -> 
     turned = assembly.instances[0].transform
     np.testing.assert_allclose(turned[:3, :3] @ [0.010, 0, 0], [0, 0.010, 0], atol=1e-15)
     np.testing.assert_allclose(turned[:3, 3], [0.1, 0, 0.005])
+    with pytest.raises(DocumentError, match=f"{path.name}: it unfolds to 2 placed parts"):
+        read_in(path, max_instances=1)
 
 
 def test_objects_may_lie_in_other_parts(write: Any, read_in: Any) -> None:

@@ -293,12 +293,12 @@ def test_a_part_twice_at_one_place_is_reported(
     document = step()
     top, part = document.assembly("top"), document.part(box(10, 10, 10), "cube")
     # An exporter that multiplies placements leaves rounding behind.
-    for name, at in (("one", (0, 0, 0)), ("two", (1e-9, 0, 0)), ("three", (20, 0, 0))):
-        document.place(top, part, trsf(at), name)
+    for name, along in (("one", 0), ("two", 1e-9), ("three", 20), ("near", 20.01)):
+        document.place(top, part, trsf((along, 0, 0)), name)
     assembly = read_in(document.write(tmp_path / "twice.step"))
     assert codes_of(assembly) == [GeometryCode.COINCIDENT_PARTS]
     assert "1 (two)" in assembly.problems[0].message
-    assert len(assembly.instances) == 3
+    assert len(assembly.instances) == 4
 
 
 def test_a_product_without_any_name_is_reported(

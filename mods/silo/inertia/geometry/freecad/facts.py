@@ -13,21 +13,14 @@ import numpy as np
 
 from silo.bom.document import LinkProblem, own
 from silo.bom.errors import DocumentError
-from silo.inertia.geometry.freecad.places import (
-    Entries,
-    StoredShape,
-    list_places,
-    placement,
-    shape_entry,
-)
-from silo.inertia.geometry.freecad.stated_materials import Material, material_of
+from silo.inertia.geometry.freecad.stated_materials import Material
 from silo.inertia.geometry.graph import Floats
 
 MAX_ELEMENTS = 1_000_000
 
 
 class Facts(Protocol):
-    """One source of the facts: :class:`StoredFacts`, or FreeCAD itself (``silo.workbench.mass.shapes``)."""
+    """One source of the facts: files (``places.StoredFacts``) or FreeCAD (``silo.workbench.mass.shapes``)."""
 
     def placement(self, obj: Any, name: str = "Placement") -> Floats:
         """(4, 4) of an object's own placement; the identity where it has none."""
@@ -48,35 +41,6 @@ class Facts(Protocol):
     def problem(self, link: Any) -> LinkProblem | None:
         """Why a link has no target, as far as that is known."""
         ...
-
-
-class StoredFacts:
-    """The facts from FCStd files."""
-
-    def __init__(self, entries: Entries) -> None:
-        self._entries = entries
-
-    def placement(self, obj: Any, name: str = "Placement") -> Floats:
-        """See :class:`Facts`."""
-        return placement(obj, name)
-
-    def places(self, obj: Any) -> list[Floats]:
-        """See :class:`Facts`. DocumentError where they are damaged."""
-        return list_places(obj, self._entries)
-
-    def shape(self, obj: Any) -> StoredShape | None:
-        """The entry that holds it."""
-        entry = shape_entry(obj)
-        return StoredShape(file_of(obj), entry) if entry is not None else None
-
-    def material(self, obj: Any) -> Material:
-        """See :class:`Facts`."""
-        return material_of(obj)
-
-    def problem(self, link: Any) -> LinkProblem | None:
-        """What the reader of files left on the link."""
-        problem = getattr(link, "LinkProblem", None)
-        return problem if isinstance(problem, LinkProblem) else None
 
 
 def file_of(obj: Any) -> str:

@@ -18,9 +18,8 @@ from silo.fcstd import Library
 from silo.folders import scratch_folder
 from silo.inertia.core import is_rigid
 from silo.inertia.geometry.freecad.assembly import assembled
-from silo.inertia.geometry.freecad.facts import StoredFacts
 from silo.inertia.geometry.freecad.members import top_object
-from silo.inertia.geometry.freecad.places import Entries
+from silo.inertia.geometry.freecad.places import Entries, StoredFacts
 from silo.inertia.geometry.freecad.walk import Leaf, Walk
 from silo.inertia.geometry.graph import Floats
 from silo.inertia.geometry.helpers import WORTH_HELP, Helpers, Task

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""Placements and side entries of objects in an FCStd file, which a BOM does not need and a mass does.
+"""What a mass needs of objects in an FCStd file and a BOM does not: placements, shapes, materials.
 
 Sources: FreeCAD ``src/App/PropertyGeo.cpp`` (PropertyPlacement, PropertyPlacementList),
 ``src/Mod/Part/App/PropertyTopoShape.cpp``. Lengths are mm here, as FreeCAD has them.
@@ -16,7 +16,15 @@ from typing import Any
 
 import numpy as np
 
+from silo.bom.document import LinkProblem
 from silo.bom.errors import DocumentError
+from silo.inertia.geometry.freecad.facts import file_of
+from silo.inertia.geometry.freecad.stated_materials import (
+    NOTHING,
+    Material,
+    card_material,
+    linked_material,
+)
 from silo.inertia.geometry.graph import Floats
 
 MAX_ENTRY_BYTES = 1_000_000_000
@@ -33,21 +41,6 @@ class StoredShape:
 
     path: str
     entry: str
-
-
-def placement(obj: Any, name: str = "Placement") -> Floats:
-    """(4, 4) [mm] of an object's own placement; the identity where it has none or one that is no number."""
-    found = _PLACEMENT.search(_piece(obj, name))
-    matrix = np.eye(4)
-    if found is None:
-        return matrix
-    values = {key.decode(): value for key, value in _ATTRIBUTE.findall(found[1])}
-    try:
-        point = [float(values[key]) for key in ("Px", "Py", "Pz")]
-        turn = [float(values[key]) for key in ("Q0", "Q1", "Q2", "Q3")]
-    except (KeyError, ValueError):
-        return matrix
-    return placed(np.array([*point, *turn]))
 
 
 def placed(numbers: Floats) -> Floats:
@@ -67,36 +60,6 @@ def placed(numbers: Floats) -> Floats:
     return matrix
 
 
-def list_places(obj: Any, files: Entries) -> list[Floats]:
-    """The placements in an object's ``PlacementList``."""
-    found = _FILE.search(_piece(obj, "PlacementList"))
-    if found is None:
-        return []
-    data = files.read(obj.Document.FileName, _name(found))
-    if len(data) < 4:
-        return []
-    (count,) = struct.unpack_from("<I", data)
-    for form, width in (("<f8", 56), ("<f4", 28)):
-        if len(data) == 4 + count * width:
-            rows = np.frombuffer(data, dtype=form, offset=4).reshape(-1, 7).astype(np.float64)
-            return [placed(row) for row in rows]
-    raise DocumentError(
-        obj.Document.FileName, f"the placements of {obj.Name} are damaged (their length is wrong)"
-    )
-
-
-def shape_entry(obj: Any) -> str | None:
-    """The name of the entry that holds the object's shape, None where it has none."""
-    found = _FILE.search(_piece(obj, "Shape"))
-    return _name(found) if found is not None else None
-
-
-def material_uuid(obj: Any) -> str | None:
-    """The id of the object's ``ShapeMaterial`` (FreeCAD >= 1.0)."""
-    found = _UUID.search(_piece(obj, "ShapeMaterial"))
-    return found[1].decode("ascii").lower() if found is not None else None
-
-
 def _piece(obj: Any, name: str) -> bytes:
     table = getattr(obj, "properties", None)
     if table is None or name not in table.names:
@@ -109,21 +72,75 @@ def _name(found: re.Match[bytes]) -> str:
     return html.unescape(found[1].decode("utf-8", errors="replace"))
 
 
+class StoredFacts:
+    """The facts from FCStd files; see :class:`silo.inertia.geometry.freecad.facts.Facts`."""
+
+    def __init__(self, entries: Entries) -> None:
+        self._entries = entries
+
+    def placement(self, obj: Any, name: str = "Placement") -> Floats:
+        """(4, 4) [mm] of the object's own placement; the identity where it has none that is a number."""
+        found = _PLACEMENT.search(_piece(obj, name))
+        if found is None:
+            return np.eye(4)
+        values = {key.decode(): value for key, value in _ATTRIBUTE.findall(found[1])}
+        try:
+            names = ("Px", "Py", "Pz", "Q0", "Q1", "Q2", "Q3")
+            return placed(np.array([float(values[key]) for key in names]))
+        except (KeyError, ValueError):
+            return np.eye(4)
+
+    def places(self, obj: Any) -> list[Floats]:
+        """The placements in the object's ``PlacementList``. DocumentError where they are damaged."""
+        found = _FILE.search(_piece(obj, "PlacementList"))
+        data = self._entries.read(obj.Document.FileName, _name(found)) if found is not None else b""
+        if len(data) < 4:
+            return []
+        (count,) = struct.unpack_from("<I", data)
+        for form, width in (("<f8", 56), ("<f4", 28)):
+            if len(data) == 4 + count * width:
+                rows = np.frombuffer(data, dtype=form, offset=4).reshape(-1, 7).astype(np.float64)
+                return [placed(row) for row in rows]
+        raise DocumentError(
+            obj.Document.FileName, f"the placements of {obj.Name} are damaged (their length is wrong)"
+        )
+
+    def shape(self, obj: Any) -> StoredShape | None:
+        """The entry that holds the object's shape, None where it has none."""
+        found = _FILE.search(_piece(obj, "Shape"))
+        return StoredShape(file_of(obj), _name(found)) if found is not None else None
+
+    def material(self, obj: Any) -> Material:
+        """The material that is linked to the object, or its ``ShapeMaterial`` (FreeCAD >= 1.0)."""
+        if (linked := linked_material(obj)) is not None:
+            return linked
+        found = _UUID.search(_piece(obj, "ShapeMaterial"))
+        return card_material(found[1].decode("ascii").lower()) if found is not None else NOTHING
+
+    def problem(self, link: Any) -> LinkProblem | None:
+        """What the reader of files left on the link."""
+        problem = getattr(link, "LinkProblem", None)
+        return problem if isinstance(problem, LinkProblem) else None
+
+
 class Entries:
     """Side entries of FCStd files. Files stay open until :meth:`close`."""
 
     def __init__(self) -> None:
         self._open: dict[str, zipfile.ZipFile] = {}
 
+    def _info(self, path: str, name: str) -> tuple[zipfile.ZipFile, zipfile.ZipInfo]:
+        if path not in self._open:
+            self._open[path] = zipfile.ZipFile(path)
+        return self._open[path], self._open[path].getinfo(name)
+
     def read(self, path: str, name: str) -> bytes:
         """The bytes of one entry. Raises DocumentError."""
         try:
-            if path not in self._open:
-                self._open[path] = zipfile.ZipFile(path)
-            info = self._open[path].getinfo(name)
+            archive, info = self._info(path, name)
             if info.file_size > MAX_ENTRY_BYTES:
                 raise DocumentError(path, f"its {name} would unpack to {info.file_size / 1e9:.1f} GB")
-            return self._open[path].read(info)
+            return archive.read(info)
         except KeyError as error:
             raise DocumentError(path, f"its {name} is missing") from error
         except (OSError, zipfile.BadZipFile, NotImplementedError, RuntimeError) as error:
@@ -132,9 +149,7 @@ class Entries:
     def size(self, path: str, name: str) -> int:
         """How many bytes :meth:`read` would return; 0 where it would raise."""
         try:
-            if path not in self._open:
-                self._open[path] = zipfile.ZipFile(path)
-            return self._open[path].getinfo(name).file_size
+            return self._info(path, name)[1].file_size
         except (KeyError, OSError, zipfile.BadZipFile):
             return 0
 

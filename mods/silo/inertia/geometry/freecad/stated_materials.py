@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from silo.bom.document import own
-from silo.inertia.geometry.freecad.places import material_uuid
 from silo.inertia.materials.cards import card_of
 from silo.inertia.materials.density import DENSEST, LIGHTEST, parse_density
 
@@ -30,17 +29,6 @@ class Material:
 
 
 NOTHING = Material()
-
-
-def material_of(obj: Any) -> Material:
-    """The material of one stored object; one that is linked to it goes before its ``ShapeMaterial``."""
-    linked = linked_material(obj)
-    if linked is not None:
-        return linked
-    uuid = material_uuid(obj)
-    if uuid is None or uuid == NO_MATERIAL:
-        return NOTHING
-    return _from_card(uuid)
 
 
 def linked_material(obj: Any) -> Material | None:
@@ -69,7 +57,10 @@ def _from_map(told: dict[str, str]) -> Material:
     return Material(name, density, problem)
 
 
-def _from_card(uuid: str) -> Material:
+def card_material(uuid: str) -> Material:
+    """The material of a card in an installed FreeCAD, or what is wrong with it."""
+    if uuid == NO_MATERIAL:
+        return NOTHING
     card = card_of(uuid)
     if card is None:
         return Material(
