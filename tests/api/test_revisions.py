@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from silo.api.revisions import MayHaveArrivedError, SentFile, find_arrived
+from silo.api.revisions import MayHaveArrivedError, SentFile, find_arrived, is_there
 from silo.api.wire import Revision
 from silo.bom.errors import NotFoundError, UnreachableError
 from silo.outbox.entry import Commit, State
@@ -114,3 +114,23 @@ def test_retry_after_a_look_sends_the_file(tmp_path: Path) -> None:
     outbox.retry(entry.id)
     assert send_all(outbox, silo, force=True).sent
     assert (outbox.entries(), len(stored.revisions)) == ((), 2)
+
+
+@pytest.mark.parametrize(
+    ("file_name", "number", "checksum", "there"),
+    [
+        ("Top.FCStd", 2, "aa", True),
+        ("Top.FCStd", 7, "aa", True),  # the very file, by another number
+        ("Top.FCStd", 2, "bb", False),  # the number is another file's by now
+        ("Top.FCStd", 2, None, True),
+        ("Top.FCStd", 3, None, False),
+        ("Top.kc", 2, "bb", True),  # the server packs it anew
+        ("Top.kc", 3, "bb", False),
+    ],
+)
+def test_a_file_that_was_sent_is_still_there(
+    file_name: str, number: int, checksum: str | None, there: bool
+) -> None:
+    """A server that was restored from a backup may have lost it. It was revision 2 with the SHA-256 "aa"."""
+    known = [Revision(revision_number=number, file_name=file_name, file_checksum=checksum)]
+    assert is_there(known, file_name, "aa", 2) is there
