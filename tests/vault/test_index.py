@@ -27,7 +27,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 
 from silo.bom.errors import InputError
 from silo.fcstd.library import Contents
-from silo.vault.answers import Known
+from silo.vault.answers import Known, Seen
 from silo.vault.index import Index
 from silo.vault.reading import Question, Reading, Session
 
@@ -238,6 +238,26 @@ def test_an_edit_within_one_tick_of_the_clock_is_seen(vault: Path, tmp_path: Pat
     os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
     assert path.stat().st_size == status.st_size
     assert indexed(vault, index, Contents())[0] == truth(vault)
+
+
+def test_a_state_counts_as_settled_only_well_after_its_last_change(vault: Path) -> None:
+    """The clock of a file system has ticks of up to 2 s: two changes in one tick look like one."""
+    status = (vault / "a.FCStd").stat()
+    changed = max(status.st_mtime_ns, status.st_ctime_ns)
+    state = (status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns)
+    looks = {after: Seen("", *state, changed + after * 10**9).still(status) for after in (-1, 0, 2, 3)}
+    assert looks == {-1: False, 0: False, 2: False, 3: True}
+
+
+def test_one_assembly_is_asked_and_what_it_uses_has_changed(vault: Path, tmp_path: Path) -> None:
+    """Nobody asked for the part itself since: what is known of it is what it was."""
+    index, asked = tmp_path / "index", Question(str(vault / "c.FCStd"))
+    indexed(vault, index)
+    part("b", uuid="new").save(vault / "b.FCStd")
+    with Index(index, contents=Contents(clock=later)) as memory:
+        found = Reading(memory).ask(asked)
+    assert found.plain == json.loads(Session().ask(asked).answer)
+    assert "new" in found.known.answer
 
 
 def odd_target() -> Doc:

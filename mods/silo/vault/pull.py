@@ -13,7 +13,7 @@ from __future__ import annotations
 import os
 import posixpath
 import shutil
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -230,11 +230,3 @@ def pulled_json(pulled: Pulled, base: Path) -> dict[str, Any]:
             {"file": lost.position, "link": lost.path, "reason": lost.reason} for lost in pulled.lost
         ],
     }
-
-
-def counts(pulled: Pulled) -> Mapping[State, int]:
-    """How many files of each state."""
-    found: dict[State, int] = {}
-    for one in pulled.files:
-        found[one.state] = found.get(one.state, 0) + 1
-    return found
