@@ -240,3 +240,16 @@ def test_of_two_shapes_of_one_name_the_row_is_that_of_the_one_that_weighs_it(
     masses = {p.paths[0]: (p.mass, str(p.decided_by)) for _, p in report.parts()}
     assert masses["l/x"] == (pytest.approx(7850 * V), "mass")
     assert masses["l/y"] == (pytest.approx(27 * 1000 * V), "only")  # not in the BOM
+
+
+def test_a_mass_in_another_unit_is_in_doubt_also_where_the_material_is_known(
+    assemble: Fixture, compute: Fixture, codes: Fixture
+) -> None:
+    """Only what is in doubt is not pushed: 7.85 g for a litre of steel differs, and nothing weighs that."""
+    from silo.inertia.output.push import plan_push
+
+    asm = assemble(("l/a", cube("a", 0.1)))
+    report = compute(asm, HEAD + "1,1,P-1,steel,7.85 g,a\n")
+    assert codes(report) == ["mass_differs", "mass_implausible"]
+    assert plan_push(report).items == ()
+    assert codes(compute(asm, HEAD + "1,4,P-1,steel,31.4 kg,a\n"), "a") == ["row_total", "count_differs"]

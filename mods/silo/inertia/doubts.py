@@ -76,7 +76,9 @@ def mass_doubts(given: GivenMass, prototype: Prototype, expected: Expectation | 
         )
         return
     contradicted = list(_against(given, prototype.volume_m3, expected)) if expected is not None else []
-    yield from contradicted or implausible(given, prototype.volume_m3)
+    yield from contradicted
+    if not any(note.code == MassCode.ROW_TOTAL for note in contradicted):
+        yield from implausible(given, prototype.volume_m3)
 
 
 def _rounding(given: GivenMass) -> Iterator[Note]:
