@@ -13,6 +13,7 @@ import pytest
 from desk import Office
 from server_testing import wait_until
 
+from silo.api.sse import RESET, ServerEvent
 from silo.bom.errors import SiloError, UnreachableError
 from silo.durable import stamp_of
 from silo.outbox.entry import UNKNOWN, Commit, State
@@ -40,6 +41,21 @@ def test_a_commit_is_kept_and_sent(office: Office) -> None:
     office.settle()
     assert office.files("Bolt") == [b"content"]
     assert (office.session.shown.waiting, [sent.part_number for sent in office.sent]) == ((), ["M01-0001"])
+
+
+def test_a_restored_server_that_counts_anew_gives_our_number_to_a_colleague(office: Office) -> None:
+    """Before it says so, an event with that number is our own."""
+    made = commit(office, "Bolt")
+    office.session.keep(made, failing)
+    office.settle()
+    online = office.session._need_online()
+    data = {"id": made.identity, "part_number": "M01-0001", "revision_number": 1, "user": "alice"}
+    announced = ServerEvent("9", "revision.created", data)
+    for events, names in (((announced,), []), ((ServerEvent(None, RESET, {}), announced), ["alice"])):
+        for event in events:
+            online._heard(event, online.address)
+        office.gui.run_all()
+        assert [one.who for one in office.session.shown.newer.values()] == names
 
 
 class SlowStore(Store):
