@@ -137,6 +137,16 @@ def pane() -> list[str]:
     return [entry_text(entry) for entry in addon().session.shown.activity.entries]
 
 
+def in_property_editor() -> list[str]:
+    """The names of the properties that FreeCAD's property editor shows, as it spells them."""
+    found = []
+    for view in Gui.getMainWindow().findChildren(QtWidgets.QTreeView, "propertyEditorData"):
+        model = view.model()
+        for group in (model.index(row, 0) for row in range(model.rowCount())):
+            found += [str(model.index(row, 0, group).data()) for row in range(model.rowCount(group))]
+    return found
+
+
 def boxes(title: str) -> list[str]:
     """The boxes whose title begins so."""
     return [text for text in pane() if text.startswith(title)]

@@ -26,6 +26,7 @@ from inside import (
     ask,
     boxes,
     dialog,
+    in_property_editor,
     run,
     settled,
     unmark,
@@ -278,7 +279,7 @@ def commit(one: Any, top: Any) -> None:
     # Its number and state are in the property editor.
     bolt = top.getObject("FlangeBolt1")
     Gui.Selection.addSelection(bolt)
-    wait(lambda: "SiloState" in bolt.PropertiesList)
+    wait(lambda: "Silo State" in in_property_editor())
     photograph_window("window")
     Gui.Selection.clearSelection()
 
