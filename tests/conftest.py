@@ -15,15 +15,23 @@ from hypothesis import HealthCheck, settings
 from sharing import scheduler
 
 # Time is measured in benchmarks; a test on a busy machine is not wrong for being slow. The examples are the
-# same in each run, so that no landing fails by chance; SILO_LONG=1 hunts with new ones.
+# same in each run, so that no landing fails by chance; SILO_LONG=1 hunts with new ones, and more of them.
+LONG = bool(os.environ.get("SILO_LONG"))
 settings.register_profile(
     "unhurried",
     deadline=None,
-    derandomize=not os.environ.get("SILO_LONG"),
+    derandomize=not LONG,
+    max_examples=500 if LONG else 60,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
 )
 settings.load_profile("unhurried")
 
+
+# What a person has set for herself is no matter here: her server, her terminal, her proxy for loopback.
+for name in ("SILO_API_URL", "SILO_API_TOKEN", "COLUMNS", "LINES", "NO_COLOR", "FORCE_COLOR"):
+    os.environ.pop(name, None)
+for name in ("no_proxy", "NO_PROXY"):
+    os.environ[name] = ",".join(filter(None, (os.environ.get(name), "127.0.0.1,localhost,::1")))
 
 # A shell that runs tests in the background ignores Ctrl-C for them; their programs would inherit that.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

@@ -83,6 +83,8 @@ def test_this_computer_is_asked_without_a_proxy(server: Any, monkeypatch: pytest
     """Otherwise a company's proxy setting would break the embedded server."""
     for name in ("HTTP_PROXY", "http_proxy", "ALL_PROXY", "all_proxy"):
         monkeypatch.setenv(name, "http://127.0.0.1:9")
+    for name in ("NO_PROXY", "no_proxy"):
+        monkeypatch.delenv(name)
     server.on("*", ITEM)
     with SiloClient(server.url) as client:
         assert client.get_item("F01-0001").part_number == "F01-0001"

@@ -39,7 +39,7 @@ def _proxy(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Proxy]:
 @pytest.fixture(name="client")
 def _client(proxy: Proxy, request: pytest.FixtureRequest) -> Iterator[SiloClient]:
     """Patient with a busy machine; with the fault "slow" not too patient."""
-    patience = 2.0 if "slow" in request.node.name else 60.0
+    patience = 4.0 if "slow" in request.node.name else 60.0
     with SiloClient(proxy.url, "silo_faults", retries=Retries(tries=1), timeout=(5.0, patience)) as client:
         yield client
 

@@ -13,7 +13,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 from urllib.parse import urlsplit
 
-SLOW_S = 5.0
+SLOW_S = 8.0
 
 
 @dataclass(frozen=True)
