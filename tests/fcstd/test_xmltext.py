@@ -257,6 +257,18 @@ def test_a_property_twice_is_refused(tmp_path: Path) -> None:
         _ = box and box.PropertiesList
 
 
+@pytest.mark.parametrize("form", ["<!--{}-->", "<?was {}?>"])
+def test_what_is_taken_out_of_the_text_is_not_there(tmp_path: Path, form: str) -> None:
+    """Also where the number of properties still counts it."""
+    xml = part().xml()
+    height = re.search(r' *<Property name="Height".*?</Property>\n', xml, re.DOTALL)
+    assert height is not None
+    path = save_xml(tmp_path / "out.FCStd", xml.replace(height[0], form.format(height[0])))
+    box = open_document(path).getObject("Box")
+    assert box is not None
+    assert box.PropertiesList == ("Label", "Visibility")
+
+
 DOCTYPES = [
     '<!DOCTYPE Document SYSTEM "file:///etc/passwd">',
     '<!DOCTYPE Document [<!ENTITY x SYSTEM "file:///etc/passwd">]>',
