@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from desk import Document, Office
+from desk import Document, Office, Silo
 from fcstd_writer import Doc as File
 from fcstd_writer import locals_, part
 
 from silo.api.files import Origin
+from silo.api.wire import Revision
 from silo.bom.changes import ThreeLines
 from silo.bom.errors import ServerFaultError
 from silo.bom.model import BomEntry
@@ -89,8 +90,20 @@ class Person:
         return Answer(tuple(rows), "mine", choices=tuple(choices))
 
 
-def test_nothing_is_asked_where_nobody_else_committed(office: Office, flow: CommitFlow) -> None:
+class NoChecksums(Silo):
+    """A server that does not name the files' checksums."""
+
+    def revisions(self, part_number: str, /, *, newest: int | None = None, after: int = 0) -> list[Revision]:
+        found = super().revisions(part_number, newest=newest, after=after)
+        return [one.model_copy(update={"file_checksum": None}) for one in found]
+
+
+@pytest.mark.parametrize("kind", [Silo, NoChecksums])
+def test_nothing_is_asked_where_nobody_else_committed(
+    office: Office, flow: CommitFlow, kind: type[Silo]
+) -> None:
     """Own commits, one after the other."""
+    office.silo.__class__ = kind
     doc = committed(office, flow, "Plate", b"one")
     person = Person(office)
     for content in (b"two", b"three"):
