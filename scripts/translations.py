@@ -26,7 +26,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 SOURCES = ROOT / "mods" / "silo" / "workbench"
 # Words that the command line shows too.
-SHARED = (ROOT / "mods" / "silo" / "api" / "activity.py",)
+SHARED = (ROOT / "mods" / "silo" / "activity.py",)
 FOLDER = SOURCES / "resources" / "translations"
 CONTEXT = "Silo"
 
