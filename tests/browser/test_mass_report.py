@@ -13,7 +13,7 @@ from playwright.sync_api import Browser, Page, expect
 from server_testing import wait_until
 from settled import box_of, measured, picture_of
 
-pytest.importorskip("OCP.BRep")
+pytest.importorskip("OCP.BRep", exc_type=ImportError)
 
 from silo.cli.main import main
 

@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import threading
 from typing import Any
 
 import pytest
-from server_testing import Api, bom, merge_body
+from server_testing import Api, bom, form_body, merge_body
 
 
 def test_the_same_request_twice_gives_the_same_state(api: Api) -> None:
@@ -208,7 +209,10 @@ def test_unknown_keys_are_ignored_and_every_entry_is_the_assembly_s(api: Api) ->
 def test_the_merge_says_who_and_from_which_file(api: Api) -> None:
     """``document`` goes into the history with user and time."""
     parent, a = api.items(2)
-    document = {"file": "Gearbox.FCStd", "sha256": "ab" * 32, "revision": 7}
+    body, headers = form_body({"file": ("Gearbox.FCStd", b"gearbox")})
+    api.good("POST", f"/api/items/{parent}/file", body=body, headers=headers)
+    sha256 = hashlib.sha256(b"gearbox").hexdigest()
+    document = {"file": "Gearbox.FCStd", "sha256": sha256, "revision": 1}
     api.merge(parent, {a: 1}, document=document, sync_id="with-document")
     change = api.get(bom(parent, "history"))[0]
     assert change["document"] == document

@@ -72,12 +72,15 @@ def main(argv: Sequence[str] | None = None) -> int:
         signal.signal(signal.SIGTERM, signal.default_int_handler)
     output, errors = sys.stdout, sys.stderr
     sys.stdout = kept = _Output(output)
-    sys.stderr = _Output(errors)
+    sys.stderr = told = _Output(errors)
     try:
         code = _run(argv)
         kept.flush()
     finally:
         sys.stdout, sys.stderr = output, errors
+        for one in (kept, told):  # else each is when it is collected, and its stream may be closed by then
+            with suppress(OSError, ValueError):
+                one.close()
     if kept.failure is None or isinstance(kept.failure, BrokenPipeError):
         return code
     return max(code, _system_said_no(kept.failure))
