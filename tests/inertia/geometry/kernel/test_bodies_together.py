@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from OCP.BRep import BRep_Builder
 from OCP.BRepBuilderAPI import (
+    BRepBuilderAPI_Copy,
     BRepBuilderAPI_MakeFace,
     BRepBuilderAPI_MakePolygon,
     BRepBuilderAPI_Transform,
@@ -198,6 +199,26 @@ def test_the_mesh_of_a_mirrored_solid_is_not_inside_out(box: Any) -> None:
     assert found.mesh is not None
     assert mesh_volume(found.mesh) == pytest.approx(6e-9)
     assert combined(found.solids).volume_m3 == pytest.approx(6e-9)
+
+
+def test_nearly_equal_bodies_are_no_copy(part: Callable[..., Prototype], box: Any) -> None:
+    """A cube, and one at its place that is 1e-4 longer: they overlap, and the longer one is what there is."""
+    found = part(box(20, 20, 20), box(20, 20, 20.002))
+    assert codes(found) == [OVER]
+    assert found.volume_m3 == pytest.approx(400 * 20.002e-9)
+
+
+def test_a_face_that_looks_inwards_is_an_open_shell(box: Any) -> None:
+    """Faces that share no edges close when they are sewn; sewing turns the one that looks the wrong way."""
+    builder, shell, solid = BRep_Builder(), TopoDS_Shell(), TopoDS_Solid()
+    builder.MakeShell(shell)
+    first, *others = (BRepBuilderAPI_Copy(face).Shape() for face in occt.faces_of(box(10, 20, 30)))
+    for face in (first.Reversed(), *others):
+        builder.Add(shell, face)
+    builder.MakeSolid(solid)
+    builder.Add(solid, shell)
+    found = measure([solid], eps=1e-8, mesh_check=False)
+    assert GeometryCode.OPEN_SHELL in [problem.code for problem in found.problems]
 
 
 def test_equal_moments_are_no_copy(part: Callable[..., Prototype], box: Any) -> None:

@@ -89,7 +89,10 @@ def test_components_are_placed_by_their_transforms(write: Any, read_in: Any) -> 
     turned = assembly.instances[0].transform
     np.testing.assert_allclose(turned[:3, :3] @ [0.010, 0, 0], [0, 0.010, 0], atol=1e-15)
     np.testing.assert_allclose(turned[:3, 3], [0.1, 0, 0.005])
-    with pytest.raises(DocumentError, match=f"{path.name}: it unfolds to 2 placed parts"):
+    items = '<item objectid="2"/><item objectid="2" transform="1 0 0 0 1 0 0 0 1 0 0 50"/>'
+    frames = read_in(write({"3D/3dmodel.model": model(resources, items)})).frames
+    np.testing.assert_allclose(frames[("pair<2>",)][:3, 3], [0, 0, 0.05])
+    with pytest.raises(DocumentError, match=f"{path.name}: it unfolds to 4 placed parts"):
         read_in(path, max_instances=1)
 
 

@@ -35,7 +35,7 @@ from silo.inertia.geometry.kernel import occt
 from silo.inertia.geometry.kernel.closure import beside_edges
 from silo.inertia.geometry.kernel.moments import solid_moments
 from silo.inertia.geometry.measured import Notes
-from silo.inertia.geometry.step.read import stated_totals
+from silo.inertia.geometry.step.read import against_stated, stated_totals
 from silo.inertia.geometry.step.xcaf import Stated, StepFile
 from silo.inertia.model import GeometryCode, Prototype
 
@@ -213,6 +213,12 @@ def test_a_stated_total_counts_scaled_parts_as_they_stand(stated: float | None, 
     step = StepFile(Path("x.step"), nodes=nodes, stated=stating, roots=[Child("top", "top")])
     found = stated_totals(step, {"part": Prototype("part", "part", volume_m3=1e-6)})
     assert [problem.code for problem in found] == doubts * [GeometryCode.STATED_VOLUME]
+
+
+@pytest.mark.parametrize(("stated", "codes"), [(1.0005e-6, []), (1.002e-6, [GeometryCode.STATED_VOLUME])])
+def test_a_stated_volume_may_be_off_by_a_thousandth(stated: float, codes: list[GeometryCode]) -> None:
+    """A file's own figure for a part, and where it begins to speak against what was measured."""
+    assert [p.code for p in against_stated(1e-6, np.zeros(3), Stated(stated))] == codes
 
 
 def test_a_solid_inside_out_is_turned_and_said(box: Any, tmp_path: Path, read_in: Any, codes_of: Any) -> None:
