@@ -288,3 +288,16 @@ def test_a_dask_cluster_gives_the_same_answers(tmp_path: Path) -> None:
         pool_of(1, cluster.scheduler_address, worth=0) as pool,
     ):
         assert answers(tmp_path, pool) == answers(tmp_path, None)
+
+
+@pytest.mark.parametrize("uuid", ["assembly", None])
+def test_parts_in_the_file_of_an_assembly_are_its_bom_where_it_is_registered(
+    tmp_path: Path, uuid: str | None
+) -> None:
+    """Without an identity such a file is a library, from which others take parts."""
+    doc = Doc("own", meta={} if uuid is None else {"SiloUUID": uuid})
+    doc.add("Part::Box", "One", SiloItemId="one").add("Part::Box", "Two", SiloItemId="two")
+    doc.add("Assembly::AssemblyObject", "Assembly", Group=locals_("One", "Two")).save(tmp_path / "own.FCStd")
+    with Index(None) as memory:
+        plan = make_plan(documents_in([str(tmp_path)]), Reading(memory))
+    assert (len(plan.nodes), plan.parts) == ((1, 0) if uuid else (0, 1))
