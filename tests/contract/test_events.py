@@ -214,3 +214,10 @@ def test_listeners_are_counted_and_let_go(api: Api, server: RunningServer) -> No
 def test_a_last_event_id_is_a_number(api: Api, last: str) -> None:
     """Anything else is refused rather than guessed."""
     api.bad(400, "GET", "/api/events", headers={"Last-Event-ID": last})
+
+
+def test_what_is_about_no_item_comes_to_all(api: Api) -> None:
+    """The server's mode is news for whoever listens to one item."""
+    with api.events(f"?item={api.item()}") as events:
+        api.good("PUT", "/api/admin/mode", {"mode": "normal"})
+        assert events.next("server.state").data == {"mode": "normal"}

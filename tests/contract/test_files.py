@@ -149,6 +149,8 @@ def test_a_file_is_found_by_its_content(api: Api) -> None:
         found = api.get(f"/api/items/search?q={query}")
         assert {item["part_number"] for item in found} == {older, newer}
     assert api.get(f"/api/items/search?q={'0' * 64}") == []
+    both = api.get(f"/api/items/search?q={checksum}%20bracket")
+    assert [item["part_number"] for item in both] == [older]
 
 
 def test_revisions_come_in_pages(api: Api) -> None:

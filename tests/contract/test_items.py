@@ -398,3 +398,13 @@ def test_a_part_number_has_no_character_that_nobody_sees(api: Api, hidden: str) 
         problem = api.bad(400, method, path, body)
         assert f"U+{ord(hidden):04X}" in problem["message"]
     assert api.get(f"/api/items/{number}")["part_number"] == number
+
+
+def test_a_change_counts_the_item_s_version_once(api: Api) -> None:
+    """Also where it makes a revision, which counts the version itself; not where nothing differs."""
+    name = api.item()
+    for change in ({"properties": {"a": 1}}, {"description": "new"}, {"properties": {"a": 1}}):
+        before = api.get(f"/api/items/{name}")
+        after = api.good("PUT", f"/api/items/{name}", change)
+        differs = any(before[key] != value for key, value in change.items())
+        assert after["version"] == before["version"] + differs

@@ -125,6 +125,9 @@ def test_a_line_that_comes_back() -> None:
     """Unreferenced before, referenced now; owned by the assembly again."""
     gone = replace(LINE, unreferenced_since="2026")
     assert changes(gone, LINE) == ["referenced again"]
+    # A person keeps it: no component uses it for that.
+    before = replace(gone, source="assembly")
+    assert changes(before, replace(LINE, source="manual")) == ["now a manual line"]
     assert changes(replace(LINE, source="manual"), LINE) == ["owned by the assembly again"]
 
 
