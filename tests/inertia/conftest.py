@@ -28,7 +28,7 @@ except ImportError as error:
 else:
     NO_KERNEL = ""
 
-NEED_KERNEL = ("cli", "test_calculator.py", "test_docs.py", "test_real_files.py")
+NEED_KERNEL = ("cli", "test_calculator.py", "test_docs.py", "test_python_objects.py", "test_real_files.py")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
