@@ -360,15 +360,16 @@ def test_facts_that_somebody_changed_in_the_index_are_not_there(vault: Path, tmp
     assert indexed(vault, index)[0] == truth(vault)
 
 
-def test_only_what_changed_is_read_again(vault: Path, tmp_path: Path) -> None:
-    """Of what an assembly links to the facts are known from before."""
+@pytest.mark.parametrize("waiting", [0, 1, 100])
+def test_only_what_changed_is_read_again(vault: Path, tmp_path: Path, waiting: int) -> None:
+    """Of what an assembly links to the facts are known from before, however few answers may wait."""
     index = tmp_path / "index"
     asked = [Question(str(vault / name)) for name in ("a.FCStd", "b.FCStd", "c.FCStd", "d.FCStd")]
     for change, reads in (("", 4), ("", 0), ("d.FCStd", 1)):
         if change:
             assembly("d", {"a.FCStd": 3, "b.FCStd": 1}).save(vault / change)
         with Index(index, contents=Contents(clock=later)) as memory:
-            reading = Reading(memory)
+            reading = Reading(memory, waiting=waiting)
             found = [answer.known.answer for answer in reading.ask_many(asked)]
             assert found == [Session().ask(question).answer for question in asked]
             assert reading.reads == reads
@@ -435,7 +436,7 @@ def test_an_index_that_cannot_be_written_costs_time_only(vault: Path, tmp_path: 
         small = tmp_path / "small"
         with Index(small, contents=Contents(clock=later)) as memory:
             memory._database._database.execute("PRAGMA max_page_count = 1")
-            found = [answer.plain for answer in Reading(memory).ask_many(questions(vault))]
+            found = [answer.plain for answer in Reading(memory, waiting=0).ask_many(questions(vault))]
             memory.save()
             assert "full" in memory.trouble
             assert found == truth(vault)

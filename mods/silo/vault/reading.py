@@ -45,8 +45,6 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 CHUNK = 64
 _RECALLED = 256  # answers that are held on the way from the index
-# Questions that are worked on together; of the files of others an assembly has no facts yet.
-_TOGETHER = 20_000
 # Bytes of assemblies' files that are kept from the first step to the second.
 _HELD = 48 << 20
 _TRIES = 3
@@ -267,12 +265,15 @@ class Reading:
 
     pool
         where files are read when they are many; None: in this process.
+    waiting
+        answers that are held until their turn; more are asked of the index once more.
     asked, reads, seconds
         questions that the index did not answer, files read for them, seconds of processor of workers.
     """
 
-    def __init__(self, index: Index, pool: Pool | None = None) -> None:
+    def __init__(self, index: Index, pool: Pool | None = None, *, waiting: int = 20_000) -> None:
         self.index = index
+        self._waiting = waiting
         self.asked = 0
         self.seconds = 0.0
         self._elsewhere = 0
@@ -294,43 +295,60 @@ class Reading:
 
     def ask_many(self, questions: Iterable[Question]) -> Iterator[Answer]:
         """The answers in the order of the questions."""
-        for some in grouped(questions, _TOGETHER):
-            known: dict[int, Known] = {}
-            for numbers in grouped(range(len(some)), _RECALLED):
-                asked = [(some[number].path, some[number].name) for number in numbers]
-                for number, found in zip(numbers, self.index.recall_all(asked), strict=True):
-                    if found is not None:
-                        known[number] = found
-            if left := [number for number in range(len(some)) if number not in known]:
-                self._find_out(some, left, known)
-            for number, question in enumerate(some):
-                yield Answer(question, known.pop(number))
-
-    def _find_out(self, some: Sequence[Question], left: Sequence[int], known: dict[int, Known]) -> None:
-        """Read the files of the questions that are left, then walk the assemblies among them."""
+        asked = list(questions)
+        waiting: dict[int, Known] = {}
+        left: list[int] = []
+        for number, found in self._recalled(asked, range(len(asked))):
+            if found is None:
+                left.append(number)
+            elif len(waiting) < self._waiting:
+                waiting[number] = found
         self.asked += len(left)
         pool = self._pool if self._pool is not None and len(left) >= self._pool.worth else None
         size = CHUNK if pool is None else pool.chunk
         contents, linked, held = dict[str, Content](), dict[int, First](), 0
-        chunks = (_Chunk([some[number] for number in group], None) for group in grouped(left, size))
+        chunks = (_Chunk([asked[number] for number in group], None) for group in grouped(left, size))
         for number, first in zip(left, self._worked_on(chunks, pool), strict=True):
             if first.facts:
                 self.index.remember_facts(first.path, first.facts)
             if first.known is not None:
-                known[number] = self._remembered(some[number], first.known)
+                self._remember(asked[number], first.known)
+                if len(waiting) < self._waiting or not first.known.lasting:
+                    waiting[number] = first.known
             else:
                 linked[number] = First(None, first.path, linked=first.linked)
                 if first.content is not None and held < _HELD:  # else it is read again
                     contents[first.path] = first.content
                     held += first.content.size
-        walks = (self._walk(some, group, linked, contents) for group in grouped(linked, size))
-        for number, first in zip(list(linked), self._worked_on(walks, pool), strict=True):
-            assert first.known is not None  # since supplies were given
-            known[number] = self._remembered(some[number], first.known)
+        walks = (self._walk(asked, group, linked, contents) for group in grouped(linked, size))
+        walked = self._worked_on(walks, pool)
+        rest = [number for number in range(len(asked)) if number not in linked and number not in waiting]
+        again = self._recalled(asked, rest)
+        for number, question in enumerate(asked):
+            if number in linked:
+                known = next(walked).known
+                assert known is not None  # since supplies were given
+                self._remember(question, known)
+            elif number in waiting:
+                known = waiting.pop(number)
+            else:
+                known = next(again)[1] or self.ask(question).known
+            yield Answer(question, known)
+
+    def _recalled(
+        self, asked: Sequence[Question], numbers: Iterable[int]
+    ) -> Iterator[tuple[int, Known | None]]:
+        """What the index has, question by question."""
+        for group in grouped(numbers, _RECALLED):
+            yield from zip(
+                group,
+                self.index.recall_all([(asked[number].path, asked[number].name) for number in group]),
+                strict=True,
+            )
 
     def _walk(
         self,
-        some: Sequence[Question],
+        asked: Sequence[Question],
         group: Sequence[int],
         linked: Mapping[int, First],
         contents: dict[str, Content],
@@ -338,11 +356,10 @@ class Reading:
         own = dict.fromkeys(linked[number].path for number in group)
         given = {path: contents.pop(path) for path in own if path in contents}
         paths = {path: None for number in group for path in linked[number].linked}
-        return _Chunk([some[number] for number in group], Supplies(given, self.index.facts([*own, *paths])))
+        return _Chunk([asked[number] for number in group], Supplies(given, self.index.facts([*own, *paths])))
 
-    def _remembered(self, question: Question, known: Known) -> Known:
+    def _remember(self, question: Question, known: Known) -> None:
         self.index.remember(question.path, question.name, known)
-        return known
 
     def _worked_on(self, chunks: Iterable[_Chunk], pool: Pool | None) -> Iterator[First]:
         """What the chunks gave, in their order."""
