@@ -59,7 +59,7 @@ class Spelling:
         return Spelt(os.path.join(real_folder, listed), os.path.join(plain, name), True)
 
     def is_plain(self, path: str) -> bool:
-        """True for the one path of what is there and is no symlink."""
+        """True where what is known to lie there, and to be no symlink, has no other path."""
         folder, _, name = path.rpartition(os.sep)
         if name.isascii() and folder in self._exact and self._folders.get(folder) == (folder, folder):
             return True

@@ -13,7 +13,7 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 
 from silo_server import failures
-from silo_server.background import Probe, note_uses
+from silo_server.background import Probe, TokenUses
 from silo_server.clock import Clock, utc_now
 from silo_server.db.engine import WRITERS_WAITING, Database
 from silo_server.events.hub import Hub
@@ -52,18 +52,19 @@ def create_app(settings: Settings, clock: Clock = utc_now) -> FastAPI:
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         # Changes that wait hold a thread each; what is left is for those who read.
         anyio.to_thread.current_default_thread_limiter().total_tokens = WRITERS_WAITING + READING_THREADS
-        hub, files = Hub(db), FileStore(settings.storage)
+        hub, files, uses = Hub(db), FileStore(settings.storage), TokenUses(db)
         probe = Probe(db, files)
         app.state.server = Server(settings, db, hub, files, probe)
         await hub.start()
+        uses.start()
         ending = asyncio.Event()
-        beside = (keep_tidy(db, files, ending), note_uses(db, ending))
-        tasks = [asyncio.create_task(one) for one in beside]
+        tidying = asyncio.create_task(keep_tidy(db, files, ending))
         yield
         ending.set()
-        await asyncio.gather(*tasks)
+        await tidying
         await hub.stop()
         probe.stop()
+        await asyncio.to_thread(uses.stop)
         db.close()
 
     # The interactive pages of FastAPI load scripts from elsewhere, which our CSP forbids; the document stays.

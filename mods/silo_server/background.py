@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""What a server does beside its requests: nobody waits for it, it waits for nobody.
+"""What a server does beside its requests, on threads of its own: nobody waits for it, it waits for nobody.
 
-:func:`note_uses` writes down when tokens were used. :class:`Probe` looks whether the database and the file
+:class:`TokenUses` writes down when tokens were used. :class:`Probe` looks whether the database and the file
 store are there, so that ``/health`` and ``/ready`` answer while every other thread and connection is taken.
 """
 
@@ -10,8 +10,8 @@ from __future__ import annotations
 import asyncio
 import logging
 import shutil
+import threading
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -32,15 +32,31 @@ HEALTH_SECONDS, READY_SECONDS = 0.2, 2.0
 MIN_FREE = 64 * 1024 * 1024
 
 
-async def note_uses(db: Database, ending: asyncio.Event) -> None:
-    """Write down every second when tokens were used last, and a last time at the end."""
-    while not ending.is_set():
-        with suppress(TimeoutError):
-            await asyncio.wait_for(ending.wait(), USES_SECONDS)
-        try:
-            await asyncio.to_thread(note_token_uses, db)
-        except (SQLAlchemyError, SiloError) as error:
-            logger.debug("the last use of tokens is noted later: %s", cause_of(error))
+class TokenUses:
+    """The thread that writes down when tokens were used last."""
+
+    def __init__(self, db: Database) -> None:
+        self._db = db
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="silo-token-uses", daemon=True)
+
+    def start(self) -> None:
+        """Begin."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Write the rest down, and end; a database that hangs is not waited for."""
+        self._stopping.set()
+        self._thread.join(timeout=2)
+
+    def _run(self) -> None:
+        ending = False
+        while not ending:
+            ending = self._stopping.wait(USES_SECONDS)
+            try:
+                note_token_uses(self._db)
+            except (SQLAlchemyError, SiloError) as error:
+                logger.debug("the last use of tokens is noted later: %s", cause_of(error))
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
-"""JSON that users give us (properties, a line's metadata): what is let in, how it is stored, how it is read.
+"""JSON that users give us (properties, a line's metadata): what is let in, and how it is stored.
 
 One guard (:func:`json_problem`) stands on every way in. What it accepts, :func:`dumps` and
 ``routes.context.json_answer`` can always write.

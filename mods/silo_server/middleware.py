@@ -91,7 +91,7 @@ class BodyLimit:
         headers = Headers(scope=scope)
         length = headers.get("content-length", "")
         from_browser = "text/html" in headers.get("accept", "")
-        if length.isdigit() and int(length) > limit and not from_browser:
+        if length.isdecimal() and int(length) > limit and not from_browser:
             await error_answer(413, "too_large", message)(scope, receive, send)
             return
         taken = 0

@@ -13,13 +13,15 @@ import sqlite3
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from typing import NoReturn
 
 import psycopg
 import pytest
 from server_testing import Api, Databases, bom, wait_until
 from sqlalchemy import make_url
 
-from silo_server.background import Probe
+from silo.bom.errors import RejectedError
+from silo_server.background import Probe, TokenUses
 from silo_server.db.engine import WRITERS_WAITING, Database
 from silo_server.files import FileStore
 from silo_server.run import running_server
@@ -117,6 +119,27 @@ def test_the_last_use_of_a_token_is_noted_when_it_can_be(db: Database) -> None:
     assert db.token_uses == {}
     with db.read() as tx:
         assert credentials.list_tokens(tx)[0].last_used_at is not None
+
+
+def test_a_server_that_stops_does_not_wait_for_a_write_that_hangs(tmp_path: Path) -> None:
+    """A supervisor kills a service that takes long to stop; the last use of a token is not worth that."""
+    trying, free = threading.Event(), threading.Event()
+
+    class Stuck(Database):
+        def write(self, *_: object, **__: object) -> NoReturn:
+            trying.set()
+            free.wait(60)
+            raise RejectedError("nothing can be written")
+
+    db = Stuck(Settings(database_url=f"sqlite:///{tmp_path / 'x.db'}"))
+    db.token_uses[1] = "2026"
+    uses = TokenUses(db)
+    uses.start()
+    assert trying.wait(60)
+    uses.stop()
+    assert any(thread.name == "silo-token-uses" for thread in threading.enumerate())
+    free.set()
+    db.close()
 
 
 @pytest.mark.postgres
