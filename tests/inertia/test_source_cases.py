@@ -202,6 +202,25 @@ def test_a_guessed_or_varying_material_of_a_sub_assembly_is_reported(
         assert report.links["l"].parts[0].part_number == ""
 
 
+def test_each_part_under_a_row_with_a_varying_material_has_its_own_uncertainty(
+    assemble: Fixture, compute: Fixture, part: Fixture
+) -> None:
+    """Two parts that the BOM does not have: ± 50 % of each, and not of the first for both."""
+    asm = assemble(("arm/large", cube("large", 0.1)), ("arm/small", cube("small")))
+    report = compute(asm, HEAD + "1,1,P-7,EPS,,arm\n")
+    for name in ("large", "small"):
+        assert part(report, name).quantum == pytest.approx(0.5 * part(report, name).mass)
+
+
+def test_pieces_of_a_varying_material_that_are_alike_are_one_part(
+    assemble: Fixture, compute: Fixture
+) -> None:
+    """An exporter writes each rubber foot as a product of its own, with the rounding of its place."""
+    feet = [(f"l/foot{n}", cube("foot", 0.01 * (1 + n * 1e-13), key=f"foot{n}")) for n in range(4)]
+    report = compute(assemble(*feet), HEAD + "1,4,,rubber,,foot\n")
+    assert [one.quantity for one in report.links["l"].parts] == [4]
+
+
 def test_a_stated_density_within_what_the_material_varies_by_is_no_contradiction(
     assemble: Fixture, compute: Fixture, codes: Fixture
 ) -> None:

@@ -183,7 +183,8 @@ class MassRule:
             base,
             source=kind,
             density=density,
-            quantum_kg=spread * density * prototype.volume_m3,
+            # Six digits: pieces that are alike up to the last bit stay one part of the report.
+            quantum_kg=float(f"{spread * density * prototype.volume_m3:.6g}"),
             material_name=name,
             density_source=where,
             notes=tuple(notes),

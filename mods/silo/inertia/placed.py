@@ -63,7 +63,7 @@ class Groups:
     decisions: list[Decision]
     counted: NDArray[np.bool_]
     rule: MassRule
-    _made: dict[tuple[Match, Decision, bool], Decision] = field(default_factory=dict)
+    _made: dict[tuple[Match, Decision, str], Decision] = field(default_factory=dict)
 
     def apply(self, matches: Mapping[str, Match]) -> Iterator[Occurrence]:
         """Use or compare every matched row, once per placed sub-assembly. ``matches``: by product name."""
@@ -165,7 +165,7 @@ class Groups:
 
     def _set(self, index: int, match: Match, new: Decision) -> None:
         """One decision per (row, product): instances of one product stay one part in the report."""
-        key = (match, self.decisions[index], bool(self.volume[index] > 0))
+        key = (match, self.decisions[index], self.assembly.instances[index].prototype)
         self.decisions[index] = self._made.setdefault(key, new)
 
 

@@ -16,6 +16,7 @@ from silo.inertia.bom import BomCode, BOMParser
 
 openpyxl = pytest.importorskip("openpyxl")
 HEAD = ["Name", "Qty", "Material", "Mass (g)"]
+SHEET = "xl/worksheets/sheet1.xml"
 
 
 def xlsx(**sheets: list[list[Any]]) -> bytes:
@@ -162,7 +163,7 @@ def test_a_workbook_with_a_doctype_or_broken_parts_is_read_without_a_look_inside
     good = xlsx(BOM=[HEAD, ["a", 1, "steel", 1]])
     for path, old, new in (
         ("xl/workbook.xml", b"<workbook", b"<!DOCTYPE workbook><workbook"),
-        ("xl/worksheets/sheet1.xml", b' r="2"', b""),
+        (SHEET, b' r="2"', b""),
     ):
         table = BOMParser().parse_bytes(patched(good, path, old, new))
         assert [row.name for row in table.rows] == ["a"]
@@ -172,7 +173,7 @@ def test_a_formula_whose_value_is_an_empty_text_is_an_empty_cell() -> None:
     """IF(A1="", "", …): that a program found nothing to show is an answer."""
     book = xlsx(BOM=[HEAD, ["a", 1, "=1", 1]])
     old, new = b'<c r="C2"><f>', b'<c r="C2" t="str"><f>'
-    table = BOMParser().parse_bytes(patched(book, "xl/worksheets/sheet1.xml", old, new))
+    table = BOMParser().parse_bytes(patched(book, SHEET, old, new))
     assert table["a"].material is None
     assert not table.warnings
 
@@ -185,6 +186,56 @@ def patched(book: bytes, path: str, old: bytes, new: bytes) -> bytes:
             assert name != path or old in data
             target.writestr(name, data.replace(old, new, 1) if name == path else data)
     return out.getvalue()
+
+
+def test_a_second_sheet_with_a_bom_is_named() -> None:
+    """Which of two revisions was meant, the file does not say."""
+    table = BOMParser().parse_bytes(xlsx(A=[HEAD, ["a", 1, "steel", 1]], B=[HEAD, ["a", 1, "steel", 2]]))
+    assert table["a"].mass_kg == pytest.approx(1e-3)
+    (warning,) = table.warnings
+    assert "sheet “A”" in warning.message
+    assert "sheet “B”" in warning.message
+
+
+def test_a_stray_cell_in_a_far_corner_is_named() -> None:
+    """Read as a full table it would be 17 thousand million cells; a long or a wide sheet is none."""
+
+    def note(sheet: Any) -> None:
+        sheet.cell(40, 500, "note")
+
+    far = edited(HEAD, ["a", 1, "steel", 1], change=lambda sheet: sheet.cell(1_048_576, 16_384, "x"))
+    assert BOMParser().parse_bytes(edited(HEAD, ["a", 1, "steel", 1], change=note))["a"].mass_kg
+    doctype = patched(far, SHEET, b"<worksheet", b"<!DOCTYPE worksheet><worksheet")
+    for data in (far, doctype, patched(far, "xl/workbook.xml", b"<workbook", b"<!DOCTYPE w><workbook")):
+        with pytest.raises(InputError, match="reaches to XFD1048576"):
+            BOMParser().parse_bytes(data)
+
+
+@pytest.mark.parametrize("cell", ['"A900000000"', '"ZZZZZZ2"', "'XFD1048576'", '"xfd1048576"'])
+def test_a_reference_that_no_sheet_can_have_is_refused(cell: str) -> None:
+    """The reader asks for the memory of all cells up to there, and its failure ends the program."""
+    book = xlsx(BOM=[HEAD, ["a", 1, "steel", 1]])
+    error = f'<row r="2"><c r={cell} t="e"><v>#N/A</v></c>'.encode()
+    with pytest.raises(InputError, match=f"reaches to {cell[1:-1]}"):
+        BOMParser().parse_bytes(patched(book, SHEET, b'<row r="2">', error))
+
+
+def test_a_line_number_that_is_none_is_a_workbook_that_cannot_be_read() -> None:
+    """Its cells say where they are; what is wrong is the reader's to say."""
+    book = xlsx(BOM=[HEAD, ["a", 1, "steel", "=1+1"]])
+    with pytest.raises(InputError, match="cannot be read"):
+        BOMParser().parse_bytes(patched(book, SHEET, b'<row r="2"', b'<row r="two" hidden="1"'))
+    far = BOMParser().parse_bytes(patched(book, SHEET, b'<row r="2"', b'<row r="900000000"'))
+    assert "1 formula without a value" in far.warnings[0].message
+    assert far.rows[0].line == 2
+
+
+def test_a_workbook_that_unpacks_without_end_is_refused() -> None:
+    with zipfile.ZipFile(out := io.BytesIO(), "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("xl/worksheets/sheet1.xml", b" ")
+        archive.filelist[0].file_size = 10**10
+    with pytest.raises(InputError, match="unpacked"):
+        BOMParser().parse_bytes(out.getvalue())
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ STARTS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 """How XLSX and ODS files begin, and XLS files."""
 
 MAX_UNPACKED, MOST_CELLS = 512 * 1024 * 1024, 20_000_000
-_REFERENCE = re.compile(rb'\sr="([A-Z]{1,3})([0-9]{1,7})"')
+_REFERENCE = re.compile(rb"""\sr\s*=\s*["']([A-Za-z]+)([0-9]+)["']""")
 
 
 class SheetText(NamedTuple):
@@ -102,19 +102,21 @@ def _shown(value: object) -> str:
 def _look_inside(data: bytes, source: str) -> dict[str, _Hidden]:
     """Sheet → what an XLSX file says beside the values; nothing for the other kinds.
 
-    InputError where a stray cell in a far corner would cost the reader more memory than there is.
+    InputError where a stray cell in a far corner would cost the reader more memory than there is: it ends the
+    whole program then.
     """
+    found: dict[str, _Hidden] = {}
     try:
         archive = zipfile.ZipFile(io.BytesIO(data))
         if sum(info.file_size for info in archive.infolist()) > MAX_UNPACKED:
             raise InputError(f"{source}: unpacked, the workbook is larger than {MAX_UNPACKED / 1e6:.0f} MB")
-        found: dict[str, _Hidden] = {}
+        for name in archive.namelist():
+            _check_extent(archive.read(name), f"{source}: {name}")
         for name, path in _sheet_files(archive):
-            _check_extent(archive.read(path), f"{source}: {name}")
             found[name] = _hidden(_xml(archive, path))
-        return found
-    except (zipfile.BadZipFile, zlib.error, OSError, EOFError, RuntimeError, KeyError, SyntaxError):
-        return {}  # the reader says what is wrong with it
+    except (zipfile.BadZipFile, zlib.error, OSError, EOFError, RuntimeError, LookupError, SyntaxError):
+        pass  # the reader says what is wrong with it
+    return found
 
 
 def _sheet_files(archive: zipfile.ZipFile) -> Iterator[tuple[str, str]]:
@@ -139,32 +141,34 @@ def _xml(archive: zipfile.ZipFile, path: str) -> ElementTree.Element:
 
 
 def _check_extent(xml: bytes, what: str) -> None:
-    cells = _REFERENCE.findall(xml)
-    row = max((int(number) for _, number in cells), default=0)
-    column = max((letters.rjust(3, b"@") for letters, _ in cells), default=b"@@@")
-    if row * _column(column.decode()) > MOST_CELLS:
-        last = f"{column.decode().strip('@')}{row}"
-        raise InputError(f"{what} reaches to {last}; delete what stands outside of the table")
+    row = width = 0
+    for letters, digits in (cell.groups() for cell in _REFERENCE.finditer(xml)):
+        # No sheet has longer references; the reader would follow them all the same.
+        if len(letters) <= 3 and len(digits) <= 7:
+            row, width = max(row, int(digits)), max(width, _column(letters.decode()))
+        if len(letters) > 3 or len(digits) > 7 or row * width > MOST_CELLS:
+            last = (letters + digits)[:20].decode()
+            raise InputError(f"{what} reaches to {last}; delete what stands outside of the table")
 
 
 def _column(letters: str) -> int:
-    return reduce(lambda number, letter: number * 26 + ord(letter) - 64, letters, 0)
+    return reduce(lambda number, letter: number * 26 + ord(letter) - 64, letters.upper(), 0)
 
 
 def _hidden(sheet: ElementTree.Element) -> _Hidden:
     found = _Hidden()
     for row in sheet.findall("{*}sheetData/{*}row"):
-        number = int(row.get("r") or 0) - 1
-        if number >= 0 and row.get("hidden") in ("1", "true"):
-            found.rows.append(number)
+        if row.get("hidden") in ("1", "true") and (number := row.get("r", "")).isdecimal():
+            found.rows.append(int(number) - 1)
         for cell in row.findall("{*}c"):
-            column = _column("".join(filter(str.isalpha, cell.get("r", "")))) - 1
-            formula, value = cell.find("{*}f"), cell.findtext("{*}v")
-            if number < 0 or column < 0:
+            place = re.fullmatch("([A-Za-z]{1,3})([1-9][0-9]{0,6})", cell.get("r", ""))
+            if place is None:
                 continue
+            here = int(place[2]) - 1, _column(place[1]) - 1
+            formula, value = cell.find("{*}f"), cell.findtext("{*}v")
             if cell.get("t") == "e":
-                found.cells[number, column] = value or "#ERROR"
+                found.cells[here] = value or "#ERROR"
             elif formula is not None and not value and cell.get("t") != "str":
-                found.cells[number, column] = f"={formula.text or '…'}"
+                found.cells[here] = f"={formula.text or '…'}"
                 found.formulas += 1
     return found

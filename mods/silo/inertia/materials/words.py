@@ -63,38 +63,6 @@ _COATS = {
 _THICK = {
     "rubber", "gummi", "pvc", "plastic", "kunststoff", "silicone", "silikon", "pu", "polyurethane", "foam",
 }  # fmt: skip
-_WITH = {
-    "plated", "coated", "plating", "coating", "finish", "finished", "beschichtet", "beschichtung",
-    "überzogen", "revêtu", "recubierto", "rivestito", "dipped", "sprayed",
-}  # fmt: skip
-# These name themselves what lies on the part.
-_COVERS = {
-    "galvanized", "galvanised", "galvanizing", "electroplated", "zincked", "painted", "verzinkt",
-    "feuerverzinkt", "verzinkter", "verzinktes", "vernickelt", "verchromt", "brüniert", "lackiert",
-    "eloxiert", "anodized", "anodised", "anodizing", "anodize", "chromated", "phosphated", "blued",
-    "blackened", "passivated", "pulverbeschichtet", "pulverlackiert", "zingué", "galvanisé", "anodisé",
-    "peint", "galvanizado", "anodizado", "pintado", "zincato", "anodizzato", "verniciato", "enameled",
-    "enamelled", "lacquered", "varnished",
-}  # fmt: skip
-# What lies on parts and is no material of the table, or is another one by itself.
-_COATS = {
-    "powder", "chrome", "chromium", "epoxy", "paint", "enamel", "lacquer", "oxide", "pvd", "dlc", "e",
-    "ptfe", "teflon", "hard", "black", "white", "zinc", "nickel", "nitride", "conversion", "chromate",
-    "phosphate", "cadmium", "clear", "wax", "oil",
-}  # fmt: skip
-# These lie so thick on a part that they count.
-_THICK = {
-    "rubber",
-    "gummi",
-    "pvc",
-    "plastic",
-    "kunststoff",
-    "silicone",
-    "silikon",
-    "pu",
-    "polyurethane",
-    "foam",
-}
 _WITH = {"with", "in", "by", "mit", "avec", "con"}
 _FINISHES = (("black", "oxide"), ("oxide", "finish"), ("hot", "dip"), ("hot", "dipped"))
 

@@ -65,7 +65,7 @@ def read_live(document: Any, options: ReadOptions, report: Report) -> Assembly:
     """The geometry of an open document as it stands in this session, saved or not.
 
     ``report`` is called for every product and every face; what it raises (CancelledError) ends the reading.
-    Raises DocumentError, as the reader of files does.
+    Raises DocumentError, as the reader of files does, and InputError for too many or too deeply nested parts.
     """
     source = document.FileName or document.Label
     report("reading", 0, 0)

@@ -159,14 +159,15 @@ def _body(box: Any, tmp_path: Path) -> Any:
 
 
 def test_a_lone_body_is_a_part(body: Any, tmp_path: Path, read_in: Any, codes_of: Any) -> None:
-    """A part file without any container: one instance, at its placement, named after the document."""
+    """A part file without any container: one instance, and its path is the part's name."""
     path = body(Doc("bracket"), Placement=at(5)).save(tmp_path / "bracket.FCStd")
     assembly = read_in(path)
     (part,) = assembly.prototypes.values()
     assert part.volume_m3 == pytest.approx(6e-6)
     assert part.step_material is None
     assert codes_of(part) == []
-    assert len(assembly.instances) == 1
+    assert [instance.path for instance in assembly.instances] == [("Box",)]
+    assert (assembly.name, part.name) == ("Box", "Box")
 
 
 def test_the_default_material_is_no_material(body: Any, tmp_path: Path, read_in: Any, codes_of: Any) -> None:

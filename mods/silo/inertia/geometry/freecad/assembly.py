@@ -22,16 +22,15 @@ def assembled(
     walk: Walk, top: str, source: str, options: ReadOptions, measure: Measure, report: Report
 ) -> Assembly:
     """The assembly that the walk found below the product ``top``. InputError where it does not end."""
-    unfolded = unfold(walk.nodes, [Child("", top)], options.max_instances)
+    name = walk.nodes[top].name
+    unfolded = unfold(walk.nodes, [Child(name, top)], options.max_instances)
     keys = unfolded.placed
     found = measure(
         [walk.leaves[key] for key in keys], lambda number, total: report("measuring", number, total)
     )
     prototypes = {key: _prototype(walk, key, one) for key, one in zip(keys, found, strict=True)}
     problems = [GeometryProblem(code, message) for code, listed in walk.notes.items() for message in listed]
-    return checks.assembled(
-        unfolded, prototypes, problems, name=walk.nodes[top].name, source=source, unit="mm"
-    )
+    return checks.assembled(unfolded, prototypes, problems, name=name, source=source, unit="mm")
 
 
 def one_by_one(measure: Callable[[Leaf], Measured]) -> Measure:
