@@ -218,6 +218,8 @@ def test_a_bom_that_comes_late_does_not_undo_that_of_a_newer_file(api: Api) -> N
         return {"file": "Top.FCStd", "sha256": checksum, "revision": revision}
 
     api.merge(number, {bolt: 2}, document=document(2, b"two"))
+    shouted = {**document(2, b"two"), "sha256": document(2, b"two")["sha256"].upper()}
+    api.merge(number, {bolt: 2}, document=shouted)
     late = {
         "entries": [{"child_part_number": nut, "quantity": 9}],
         "document": document(1, b"one"),
@@ -239,10 +241,11 @@ def test_the_bom_of_an_older_file_is_known_by_its_content(api: Api) -> None:
         return {"file": "Top.FCStd", "sha256": hashlib.sha256(content).hexdigest()}
 
     api.merge(number, {bolt: 2}, document=document(b"two"))
-    for dry_run in (True, False):
+    older = document(b"one")
+    for dry_run, sha256 in ((True, older["sha256"]), (False, older["sha256"].upper())):
         stale = {
             "entries": [{"child_part_number": nut, "quantity": 9}],
-            "document": document(b"one"),
+            "document": {**older, "sha256": sha256},
             "dry_run": dry_run,
         }
         error = api.bad(409, "POST", f"/api/items/{number}/bom/merge", stale)

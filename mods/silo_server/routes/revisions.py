@@ -139,7 +139,7 @@ async def upload_file(call: Editor, part_number: str) -> Response:
         origin = Origin(
             _base_revision(form.get("base_revision")), _path(form.get("path")), _links(form.get("links"))
         )
-        key, text, digest = _idempotency_key(call.request), str(comment or ""), (sha256 or "").lower()
+        key, text, digest = _idempotency_key(call.request), str(comment or ""), sha256 or ""
 
         def answer(item: Item, revision: Revision) -> Response:
             return json_answer(revision_to_wire(item.part_number, revision, links=True), 201)

@@ -102,9 +102,11 @@ def is_short_text(value: Any, longest: int) -> TypeGuard[str]:
 
 
 def sha256_or_none(name: str, value: Any) -> str | None:
-    """A SHA-256 in hex, or None; RejectedError, naming the field, for anything else."""
-    if value is None or (isinstance(value, str) and re.fullmatch("[0-9A-Fa-f]{64}", value)):
-        return value
+    """A SHA-256 in small hex digits, or None; RejectedError, naming the field, for anything else."""
+    if value is None:
+        return None
+    if isinstance(value, str) and re.fullmatch("[0-9A-Fa-f]{64}", value):
+        return value.lower()
     raise RejectedError(f"{name}: wanted 64 hexadecimal digits")
 
 
