@@ -422,19 +422,21 @@ def test_a_lost_answer_is_found_behind_a_colleagues_commit(vault: Vault) -> None
     assert vault.told[-1].revision == 2
 
 
-@pytest.mark.parametrize("colleague", [False, True])
-def test_a_bom_does_not_go_without_its_file(vault: Vault, *, colleague: bool) -> None:
-    """The server was restored between the two. Its number may be free, or a colleague's by now."""
+@pytest.mark.parametrize("since", ["nothing", "a change of properties", "a colleague's file"])
+def test_a_bom_does_not_go_without_its_file(vault: Vault, since: str) -> None:
+    """The server was restored between the two. Its number may be free, or another revision's by now."""
     sent(vault, b"one")
     entry = mine(vault, b"longer", b"one")
     once(vault, "merge_bom", refuse)
     vault.send()
     restored(vault, 1)
-    if colleague:
+    if since == "a change of properties":
+        vault.silo.update_item(vault.number, properties={"mass_kg": 2})
+    elif since == "a colleague's file":
         theirs(vault, b"less", 1)
     vault.outbox.retry(entry.id)
     vault.send()
-    if colleague:
+    if since == "a colleague's file":
         entry = held(vault)
         assert (entry.file_left, entry.bom_left, entry.newer["revision_number"]) == (True, True, 2)
         assert (vault.files(), vault.lines()) == ([b"one", b"less"], {})

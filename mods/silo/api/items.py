@@ -134,7 +134,7 @@ class ItemCalls(FileCalls):
         def batch(some: Sequence[str]) -> dict[str, Item]:
             asked = UuidsBody(uuids=list(some))
             reply = self._ask(f"{len(some)} items", "items", "by-uuid", body=asked, cancelled=cancelled)
-            if reply.data() is None:
+            if reply.is_null(*LISTS):
                 # Go's empty list, or no answer. Read as "not registered" it would have all registered again.
                 raise RejectedError(f"{len(some)} items: the answer is null")
             known = {_written(item.id): item for item in reply.models(Item, *LISTS)}

@@ -112,12 +112,16 @@ class Reply:
         with translated(self.where):
             return kind.model_validate(data)
 
+    def is_null(self, *keys: str) -> bool:
+        """True where null stands for the list, by itself or under one of ``keys``."""
+        return _under(self.data(), keys) is None
+
     def models(self, kind: type[Model], *keys: str) -> list[Model]:
         """The answer as a list of models: a bare list, or an object that holds it under one of ``keys``."""
-        data = self.data()
-        # Go writes null for an empty list.
-        found = [] if data is None else data if isinstance(data, list) else _under(data, keys)
+        found = _under(self.data(), keys)
         if found is None:
+            found = []  # Go's empty list
+        if not isinstance(found, list):
             raise ServerFaultError(
                 f"{self.where.asked} answered no list where one was wanted ({', '.join(keys)})"
             )
@@ -250,13 +254,8 @@ def _router_speaks(said: Complaint) -> bool:
     return named or (not said.code and said.text in _ROUTER_SAYS)
 
 
-def _under(data: Any, keys: Sequence[str]) -> list[Any] | None:
-    if not isinstance(data, dict):
-        return None
-    for key in keys:
-        if key in data:
-            return data[key] if isinstance(data[key], list) else ([] if data[key] is None else None)
-    return None
+def _under(data: Any, keys: Sequence[str]) -> Any:
+    return next((data[key] for key in keys if key in data), data) if isinstance(data, dict) else data
 
 
 def _titled(reply: Reply) -> str:

@@ -118,11 +118,13 @@ REPACKED = (".kc",)
 
 def is_there(revisions: Iterable[Revision], file_name: str, sha256: str, number: int | None) -> bool:
     """True where a file that became revision ``number`` is among these. The checksum decides where it is that
-    of the file as it was sent."""
+    of the file as it was sent; a revision without a file decides nothing."""
     by_number = Path(file_name).suffix.lower() in REPACKED
+    known = list(revisions)
+    files = [r for r in known if has_file(r)] or known  # some servers say nothing of files
     return any(
         checksum_of(r) == sha256 or (r.revision_number == number and (by_number or not checksum_of(r)))
-        for r in revisions
+        for r in files
     )
 
 
