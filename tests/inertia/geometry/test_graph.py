@@ -161,6 +161,18 @@ def test_wanted_entities_are_taken_apart() -> None:
     assert 4 not in found.keywords
 
 
+@pytest.mark.parametrize("comment", ["/* #8=PRODUCT('c') */", "/* it's */", "/*/* '*/"])
+def test_comments_hold_no_entities_and_strings_hold_no_comments(comment: str) -> None:
+    """Also where the last mark of a comment in the file stands in a string."""
+    names = ["a /* b */", "#9=PRODUCT(", "x*/", "/*"]
+    rows = [f"#{number}=PRODUCT('{name}');\n" for number, name in enumerate(names, start=1)]
+    found = scan((rows[0] + comment + "".join(rows[1:])).encode(), WANTED)
+    assert {number: found.arguments(number) for number in (1, 2, 3, 4)} == {
+        number: (name,) for number, name in enumerate(names, start=1)
+    }
+    assert 8 not in found.keywords
+
+
 @given(st.binary(max_size=300))
 def test_no_text_whatever_raises(noise: bytes) -> None:
     """Hostile text gives nothing, no exception."""

@@ -45,7 +45,7 @@ _ENTITY = re.compile(rb"#(\d+)\s*=\s*([A-Z_0-9]*)\s*\(")
 _COMPLEX = re.compile(rb"UNIT|REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION")
 _BODY = re.compile(rb"(?:[^';]+|'[^']*')*")
 _REFERENCE = re.compile(rb"'(?:[^']|'')*'|#(\d+)")
-_COMMENT = re.compile(rb"'[^']*'|/\*.*?(?:\*/|\Z)", re.DOTALL)
+_COMMENT = re.compile(rb"'[^']*(?:'|\Z)|/\*.*?\*/", re.DOTALL)
 _TOKEN = re.compile(
     rb"\s*(?:(?P<string>'(?:[^']|'')*')|#(?P<ref>\d+)|(?P<enum>\.[A-Za-z0-9_]+\.)"
     rb"|(?P<number>[+-]?\d+\.?\d*(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z_!][A-Za-z0-9_]*)"
@@ -113,8 +113,9 @@ def scan(data: Buffer, wanted: frozenset[str]) -> Part21:
 
     Of complex entities: units, and relationships that place a part.
     """
-    if data.find(b"/*") >= 0:  # a comment may hold what looks like an entity
-        data = _COMMENT.sub(lambda found: found[0] if found[0][:1] == b"'" else b" " * len(found[0]), data[:])
+    if (end := data.rfind(b"*/") + 2) > 1:  # a comment may hold what looks like an entity
+        # Most have one in the header only: the rest is not looked through.
+        data = _COMMENT.sub(_blank, data[:end]) + data[end:]
     result = Part21(data)
     names: dict[bytes, str | None] = {}
     ordinal = 0
@@ -137,6 +138,11 @@ def scan(data: Buffer, wanted: frozenset[str]) -> Part21:
     result.count = ordinal
     result.complete = data.rfind(_END) > 0
     return result
+
+
+def _blank(found: re.Match[bytes]) -> bytes:
+    """Space in place of a comment; a string stays."""
+    return found[0] if found[0][:1] == b"'" else b" " * len(found[0])
 
 
 def refs(value: Value) -> tuple[int, ...]:
