@@ -26,22 +26,29 @@ _OUTPUT, _NO_PERSIST = 8, 32
 
 
 class SiloGroup:
-    """A selection observer. It keeps part number and state of each component: path → object → both."""
+    """A selection observer. It keeps part number and state of each component: document → its file, and
+    object → both. A click costs no look at the disk, which may be a slow network's."""
 
     def __init__(self) -> None:
-        self._known: dict[str, dict[str, tuple[str, str]]] = {}
+        self._known: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {}
         self._is_due = False
         host.add_selection_observer(self)
 
     def know(self, path: str, entries: Iterable[BomEntry]) -> None:
-        """Take over what Silo knows of the components of a document."""
+        """Take over what Silo knows of the components of a document, where it is open."""
+        doc = host.find_document(path)
+        if doc is None:
+            return
+        open_now = {one.Name for one in host.documents()}
+        self._known = {name: known for name, known in self._known.items() if name in open_now}
         in_silo = translate("Silo", "in Silo")
         left_out = translate("Silo", "not registered: left out of the BOM")
-        self._known[path] = {
+        components = {
             name: (entry.part_number or "", in_silo if entry.part_number else left_out)
             for entry in entries
             for name in entry.instances
         }
+        self._known[doc.Name] = str(doc.FileName), components
         self._soon()
 
     # FreeCAD calls these, once for each object; what is selected then is looked at once.
@@ -61,12 +68,12 @@ class SiloGroup:
 
     def _show(self) -> None:
         self._is_due = False
-        open_now = host.documents_by_path()
-        self._known = {path: known for path, known in self._known.items() if path in open_now}
-        known = {open_now[path].Name: found for path, found in self._known.items()}
-        selected = [pair for pair in host.selected() if pair[1] in known.get(pair[0].Name, ())]
-        wanted = [(doc.getObject(name), known[doc.Name][name]) for doc, name in selected[:MOST]]
-        left = [(obj, told) for obj, told in wanted if obj is not None and not _is_shown(obj, *told)]
+        wanted = []
+        for doc, name in host.selected():
+            file, components = self._known.get(doc.Name, ("", {}))
+            if name in components and doc.FileName == file:  # another document may have its name by now
+                wanted.append((doc.getObject(name), components[name]))
+        left = [(obj, told) for obj, told in wanted[:MOST] if obj is not None and not _is_shown(obj, *told)]
         if left:
             with saving.others_unmarked():
                 for obj, (number, state) in left:
