@@ -86,6 +86,7 @@ def test_what_waits_is_found_and_decided_for_many(api: Api, visit: Visit, script
     page.get_by_label("Reason").fill("spare parts")
     page.get_by_role("button", name="Keep as intentional").click()
     expect(page.locator(".notice")).to_contain_text("4 lines in 2 BOMs kept as intentional")
+    page.wait_for_load_state()  # the script that filters runs after the notice is there
     page.get_by_label("What waits").select_option("anything")
     expect(page).not_to_have_url(re.compile("kind=conflicts"))
     assert sum(line["reason"] == "spare parts" for line in api.lines(first).values()) == 2
