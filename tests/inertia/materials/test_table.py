@@ -497,3 +497,16 @@ def test_a_users_table_may_say_how_much_a_density_varies(tmp_path: Path) -> None
     (tmp_path / "m.csv").write_text("name,density,spread\nx,500 kg/m3,much\ny,500 kg/m3,120\n")
     with pytest.raises(ConfigError, match=r"“x”.*“much”.*“y”.*“120”"):
         user_rows(tmp_path / "m.csv")
+
+
+def test_columns_beside_the_wanted_ones_are_none_of_them(tmp_path: Path) -> None:
+    """Where a table has more than we ask for, "name" is the name, and "density" the density."""
+    from silo.inertia.materials.files import user_rows
+
+    (tmp_path / "m.csv").write_text("name,name_de,density,density_source\nx,y,500 kg/m3,me\n")
+    assert [(row.name, row.density) for row in user_rows(tmp_path / "m.csv")] == [("x", 500)]
+    (tmp_path / "m.toml").write_text('[materials]\nx = { density = 500, name = "y" }\n')
+    assert [row.name for row in user_rows(tmp_path / "m.toml")] == ["x"]
+    (tmp_path / "m.toml").write_text("[materials]\nx = { density = 500, aliases = 5 }\n")
+    with pytest.raises(ConfigError, match=r"aliases of “x”.*“5”"):
+        user_rows(tmp_path / "m.toml")

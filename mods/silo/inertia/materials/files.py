@@ -57,9 +57,9 @@ _Record = tuple[str, Mapping[str, Any]]
 def _csv_rows(text: str, source: str) -> tuple[Material, ...]:
     first = text.partition("\n")[0]
     reader = csv.DictReader(io.StringIO(text), delimiter=";" if ";" in first and "," not in first else ",")
-    heads = {
-        re.sub(r"[\W_].*", "", head.strip()).casefold(): head for head in reader.fieldnames or () if head
-    }
+    heads: dict[str, str] = {}
+    for head in sorted(filter(None, reader.fieldnames or ()), key=len):  # "name" goes before "name_de"
+        heads.setdefault(re.sub(r"[\W_].*", "", head.strip()).casefold(), head)
     if not {"name", "density"} <= heads.keys():
         raise ConfigError(f"{source}: wanted columns “name” and “density”, got {reader.fieldnames}")
     # "density (g/cm3)", "Density [g/cm3]", "density_g/cm3": whatever stands behind the word is the unit.
@@ -83,7 +83,7 @@ def _toml_records(text: str, source: str) -> Iterator[_Record]:
         raise ConfigError(f"{source}: wanted a table [materials] with name = density")
     for name, value in table.items():
         given = value if isinstance(value, dict) else {"density": value}
-        yield f"materials.{name}", {"name": name, **given}
+        yield f"materials.{name}", {**given, "name": name}
 
 
 def _checked(records: Iterable[_Record], factor: float | None, source: str) -> tuple[Material, ...]:
@@ -124,6 +124,8 @@ def _material(cells: Mapping[str, Any], factor: float | None, source: str) -> Ma
     if percent is None or not 0 <= percent.value < 100:
         return f"the spread of “{name}”: wanted 0 to 100 percent, got “{spread}”"
     given = cells.get("aliases", "")
+    if not isinstance(given, str | list):
+        return f"the aliases of “{name}”: wanted a list of names, got “{given}”"
     aliases = given.split(";") if isinstance(given, str) else map(str, given)
     return Material(
         name,
