@@ -117,6 +117,23 @@ def test_a_merged_cell_gives_each_of_its_lines_the_text() -> None:
     assert numbers == "merged cells: “12” in lines 3 to 4; only the first of these lines has the number"
 
 
+def test_a_merged_cell_below_the_last_value() -> None:
+    """Lines that hold nothing but a formula without a value are as long as the others."""
+
+    def merge(sheet: Any) -> None:
+        sheet["A3"], sheet["A4"], sheet["C3"] = "=1", "=1", "PLA"
+        sheet.merge_cells("C3:C5")
+        sheet["B6"] = "=1"
+        sheet.merge_cells("D6:D7")
+
+    table = BOMParser().parse_bytes(edited(HEAD, ["a", 1, "steel", 1], change=merge))
+    assert [(row.name, row.material) for row in table.rows[:3]] == [
+        ("a", "steel"),
+        ("=1", "PLA"),
+        ("=1", "PLA"),
+    ]
+
+
 def test_hidden_lines_are_read_and_named_and_a_hidden_sheet_comes_last() -> None:
     """A filter hides what was ordered elsewhere; the robot has it all the same."""
 

@@ -79,6 +79,8 @@ def _put_in(rows: list[list[Any]], hidden: _Hidden) -> Iterator[str]:
         rows += [[] for _ in range(row + 1 - len(rows))]
         rows[row] += [""] * (column + 1 - len(rows[row]))
         rows[row][column] = text
+    width = max(map(len, rows), default=0)
+    rows[:] = [row + [""] * (width - len(row)) for row in rows]
     if hidden.formulas:
         words = "open and save the workbook in a program that calculates them"
         yield f"{counted(hidden.formulas, 'formula')} without a value; {words}"
