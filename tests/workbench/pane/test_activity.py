@@ -169,8 +169,7 @@ def asking(key: str, when: float, *files: str, document: str = "/v/Top.FCStd") -
 
 
 def buttons(activity: Activity, key: str) -> list[str]:
-    box = activity.get(key)
-    assert box is not None
+    (box,) = (one for one in activity.entries if one.key == key)
     return [action.text for line in box.lines for action in line.actions]
 
 

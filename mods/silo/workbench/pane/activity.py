@@ -230,21 +230,6 @@ class Activity:
         place = next((i for i, e in enumerate(rest) if e.when <= entry.when), len(rest))
         return replace(self, entries=(*rest[:place], entry, *rest[place:])[:MOST_ENTRIES])
 
-    def extend(self, entries: Iterable[Entry]) -> Activity:
-        """With several more."""
-        state = self
-        for entry in entries:
-            state = state.add(entry)
-        return state
-
     def answered(self, is_answered: Callable[[Action], bool]) -> Activity:
         """Without the buttons of questions that have their answer (:meth:`Entry.without_questions`)."""
         return replace(self, entries=tuple(e.without_questions(is_answered) for e in self.entries))
-
-    def remove(self, key: str) -> Activity:
-        """Without the entry of this key."""
-        return replace(self, entries=tuple(e for e in self.entries if e.key != key))
-
-    def get(self, key: str) -> Entry | None:
-        """The entry of this key."""
-        return next((e for e in self.entries if e.key == key), None)
