@@ -134,3 +134,10 @@ def test_a_file_that_was_sent_is_still_there(
     """A server that was restored from a backup may have lost it. It was revision 2 with the SHA-256 "aa"."""
     known = [Revision(revision_number=number, file_name=file_name, file_checksum=checksum)]
     assert is_there(known, file_name, "aa", 2) is there
+
+
+def test_a_server_that_says_nothing_of_files_is_believed_by_the_number() -> None:
+    """Else each retry of a BOM would make a revision. Where it names files, one without a file is no file."""
+    bare = Revision(revision_number=2)
+    assert is_there([bare], "Top.FCStd", "aa", 2)
+    assert not is_there([Revision(revision_number=1, file_name="Top.FCStd"), bare], "Top.FCStd", "aa", 2)
