@@ -123,6 +123,7 @@ class Api:
         error = answer.json()
         assert isinstance(error["error"], str), error
         assert isinstance(error["message"], str), error
+        assert "Value error" not in str(error)  # pydantic's words, which say nothing to people
         return error
 
     def item(self, part_number: str | None = None, **values: Any) -> str:
