@@ -115,7 +115,7 @@ def _look_inside(data: bytes, source: str) -> dict[str, _Hidden]:
         for name in archive.namelist():
             _check_extent(archive.read(name), f"{source}: {name}")
         for name, path in _sheet_files(archive):
-            found[name] = _hidden(_xml(archive, path))
+            found[name] = _hidden(_read(archive, path))
     except (zipfile.BadZipFile, zlib.error, OSError, EOFError, RuntimeError, LookupError, SyntaxError):
         pass  # the reader says what is wrong with it
     return found
@@ -135,11 +135,15 @@ def _sheet_files(archive: zipfile.ZipFile) -> Iterator[tuple[str, str]]:
 
 
 def _xml(archive: zipfile.ZipFile, path: str) -> ElementTree.Element:
-    """ParseError (a SyntaxError) for a DOCTYPE too: no workbook has one, and entities are a way to attack."""
+    return ElementTree.fromstring(_read(archive, path))  # noqa: S314 - see _read
+
+
+def _read(archive: zipfile.ZipFile, path: str) -> bytes:
+    """ParseError (a SyntaxError) for a DOCTYPE: no workbook has one, and without it there are no entities."""
     data = archive.read(path)
     if b"<!DOCTYPE" in data:
         raise ElementTree.ParseError("has a DOCTYPE")
-    return ElementTree.fromstring(data)  # noqa: S314 - without a DOCTYPE there are no entities
+    return data
 
 
 def _check_extent(xml: bytes, what: str) -> None:
@@ -157,20 +161,26 @@ def _column(letters: str) -> int:
     return reduce(lambda number, letter: number * 26 + ord(letter) - 64, letters.upper(), 0)
 
 
-def _hidden(sheet: ElementTree.Element) -> _Hidden:
+def _hidden(sheet: bytes) -> _Hidden:
     found = _Hidden()
-    for row in sheet.findall("{*}sheetData/{*}row"):
+    for _, row in ElementTree.iterparse(io.BytesIO(sheet)):  # noqa: S314 - see _read
+        if not row.tag.endswith("row"):
+            continue
+        space = row.tag.removesuffix("row")  # ten times as quick as {*} for each cell
         if row.get("hidden") in ("1", "true") and (number := row.get("r", "")).isdecimal():
             found.rows.append(int(number) - 1)
-        for cell in row.findall("{*}c"):
+        for cell in row.iterfind(f"{space}c"):
+            formula, is_error = cell.find(f"{space}f"), cell.get("t") == "e"
+            if formula is None and not is_error:
+                continue
             place = re.fullmatch("([A-Za-z]{1,3})([1-9][0-9]{0,6})", cell.get("r", ""))
             if place is None:
                 continue
-            here = int(place[2]) - 1, _column(place[1]) - 1
-            formula, value = cell.find("{*}f"), cell.findtext("{*}v")
-            if cell.get("t") == "e":
+            here, value = (int(place[2]) - 1, _column(place[1]) - 1), cell.findtext(f"{space}v")
+            if is_error:
                 found.cells[here] = value or "#ERROR"
             elif formula is not None and not value and cell.get("t") != "str":
                 found.cells[here] = f"={formula.text or '…'}"
                 found.formulas += 1
+        row.clear()
     return found
