@@ -13,7 +13,7 @@ from silo.workbench import dependencies
 from silo.workbench.commands import INSTALL, Command
 from silo.workbench.freecad import host
 from silo.workbench.gui import widgets
-from silo.workbench.gui.qt import QtWidgets, Relay
+from silo.workbench.gui.qt import QtCore, QtWidgets, Relay
 from silo.workbench.words import translate, visible
 
 # The one window; FreeCAD holds no reference to it.
@@ -67,6 +67,8 @@ class InstallWindow(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         self._relay = Relay()
         title = translate("Silo", "Install what Silo needs")
         layout = widgets.lay_out(self, "SiloInstall", title, 460, 120)
+        # The work may end after the window is closed; then it comes back and says how that went.
+        self.setAttribute(QtCore.Qt.WidgetAttribute.WA_DeleteOnClose, False)
         text = translate(
             "Silo", "Silo needs these Python packages: {names}.\nThey are installed in {folder}."
         )
@@ -97,6 +99,7 @@ class InstallWindow(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
 
     def _ended(self, text: str, *, done: bool) -> None:
         self.bar.hide()
+        self.show()
         if done:
             told = translate("Silo", "The packages are in {folder}. Start FreeCAD again to use Silo.")
             self.text.setText(told.replace("{folder}", text))
