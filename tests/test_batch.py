@@ -19,7 +19,9 @@ from markdown_it import MarkdownIt
 from silo.batch import Options, TopResult, stopped_by, sync_top
 from silo.batch_report import JUnit, Markdown, Summary, cell
 from silo.bom.errors import AuthError, DocumentError, InputError, NotFoundError, SiloError
-from silo.bom.model import BomEntry, Extraction
+from silo.bom.merge import MergePlan
+from silo.bom.model import BomChange, BomDiff, BomEntry, Extraction, QuantityChange
+from silo.bom.report import diff_rows
 from silo.bom_sync import Outcome, Resolved, Status
 from silo.fcstd import Library
 from silo.files import documents_in
@@ -272,3 +274,39 @@ def test_the_counts_of_a_ci_report_are_those_of_its_cases(files: list[list[Statu
     assert suite is not None
     told = [int(suite.get(name, "")) for name in ("tests", "failures", "errors")]
     assert told == [len(suite.findall(f".//{name}")) for name in ("testcase", "failure", "error")]
+
+
+@pytest.mark.parametrize("status", [Status.MERGED, Status.BLOCKED])
+def test_a_report_has_what_changed_and_not_what_people_own(status: Status) -> None:
+    """A comparison has both, a line in doubt once. Nothing changed in a BOM that was not sent."""
+    diff = BomDiff(
+        added=(BomChange("P-ADDED", 1.0),),
+        removed=(BomChange("P-REMOVED", 2.0),),
+        quantity_changed=(QuantityChange("P-CHANGED", 3.0, None),),
+        unchanged=(BomChange("P-SAME", 4.0),),
+        manual=(BomChange("P-MANUAL", 5.0), BomChange("P-DOUBT", 6.0)),
+        conflicts=(QuantityChange("P-DOUBT", 7.0, 6.0),),
+        kept=(BomChange("P-KEPT", None),),
+    )
+    assert list(diff_rows(diff)) == [
+        ("added", "P-ADDED", "1"),
+        ("quantity_changed", "P-CHANGED", "? → 3"),
+        ("conflicts", "P-DOUBT", "CAD 7, Silo 6"),
+        ("removed", "P-REMOVED", "2"),
+        ("kept", "P-KEPT", "?"),
+        ("manual", "P-MANUAL", "5"),
+    ]
+    one = Resolved(BomEntry("top.FCStd", object_name="Top"), (), (), ())
+    result = TopResult("top.FCStd", outcomes=(Outcome(status, one, MergePlan(diff)),))
+    written = Markdown().one(result, 0)
+    rows = [row.strip("| ").split(" | ") for row in written.splitlines() if "P-" in row]
+    assert [(row[0], row[-1]) for row in rows] == (
+        []
+        if status is Status.BLOCKED
+        else [
+            ("added", "1"),
+            ("quantity", "? → 3"),
+            ("a person decides", "CAD 7, Silo 6"),
+            ("not in the assembly", "2"),
+        ]
+    )
