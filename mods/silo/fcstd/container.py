@@ -337,6 +337,7 @@ class Inflater:
         self._rest = engine.unconsumed_tail
         if engine.eof:
             self.finished = True
+            self._engine = None  # its buffers outweigh most files, and texts stay in memory by the thousand
         elif not data and not self._rest:
             raise self._error("is damaged (it ends too early)")
         return data
