@@ -120,6 +120,15 @@ def test_one_number_with_two_masses_is_skipped(assemble: Fixture, compute: Fixtu
     assert "2 different shapes or masses have the part number P" in plan.skipped[0].reason
 
 
+@pytest.mark.parametrize("row", ["b,", "b,steel,9000", ""])
+def test_one_number_with_a_mass_in_doubt_is_skipped(assemble: Fixture, compute: Fixture, row: str) -> None:
+    """The vouched mass of one shape is no answer for the other one."""
+    a, b = box("a", 0.1, 0.1, 0.1, part_number="P"), box("b", 0.1, 0.1, 0.2, part_number="P")
+    plan = plan_push(compute(assemble(("l/a", a), ("l/b", b)), f"Name,Material,Mass\na,steel,\n{row}\n"))
+    assert plan.items == ()
+    assert "'b' has the part number P as well" in " ".join(one.reason for one in plan.skipped)
+
+
 def test_the_whole_assembly_only_without_gaps(assemble: Fixture, compute: Fixture, report: Any) -> None:
     """A total with a hole in it is no mass of the assembly."""
     assert [s.name for s in plan_push(report, top="A01-0001").skipped][-1] == "asm"

@@ -96,6 +96,7 @@ def plan_push(
     known = part_numbers or {}
     by_number: dict[str, list[PartResult]] = defaultdict(list)
     found: list[PushItem | Skipped] = []
+    unsure: dict[str, str] = {}
     gaps = 0
     for _, part in report.parts():
         gap = _gap(part)
@@ -103,13 +104,18 @@ def plan_push(
         numbers = [part.part_number] if part.part_number else [known[k] for k in part.products if k in known]
         if gap is not None or not numbers:
             found.append(Skipped(part.name, gap or "it has no part number"))
+            if part.source is not Source.SUB_ASSEMBLY_MASS:
+                unsure |= dict.fromkeys(numbers, part.name)
             continue
         for part_number in dict.fromkeys(numbers):
             by_number[part_number].append(part)
     for part_number, parts in by_number.items():
         values = [_properties(part) for part in parts]
         different = sum(one not in values[:index] for index, one in enumerate(values))
-        if different > 1:
+        if part_number in unsure:
+            reason = f"{unsure[part_number]!r} has the part number {part_number} as well, and no sure mass"
+            found.append(Skipped(parts[0].name, reason))
+        elif different > 1:
             reason = f"{different} different shapes or masses have the part number {part_number}"
             found.append(Skipped(parts[0].name, reason))
         else:
