@@ -65,7 +65,7 @@ def drawing(one: Any) -> None:
     for number in range(2000):
         entry = Entry(f"e{number}", f"New item: M01-{number:04}", time.time())
         one.relay.post(lambda entry=entry: one.session.add(entry))
-    spin(lambda: one.session.shown.activity.get("e1999") is not None)
+    spin(lambda: any(entry.key == "e1999" for entry in one.session.shown.activity.entries))
     end = time.perf_counter() + 0.5
     spin(lambda: time.perf_counter() > end)
     pulse.stop()
