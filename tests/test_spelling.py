@@ -26,17 +26,14 @@ from silo.spelling import Spelling
 NFD = unicodedata.normalize("NFD", "Büchse")
 
 
-@pytest.fixture
-def disk(tmp_path: Path) -> Iterator[Path]:
+@pytest.fixture(params=[(), ("each-spelling",)], ids=["one-number", "each-spelling"])
+def disk(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Path]:
     """A folder on a disk that finds a name in any case and normal form: the machine's own, or a mount."""
-    names = ("Büchse", NFD.upper())
-    (tmp_path / names[0]).touch()
-    native = (tmp_path / names[1]).exists()
-    (tmp_path / names[0]).unlink()
-    if native:
+    (tmp_path / "ask-Ü").touch()
+    if not request.param and (tmp_path / unicodedata.normalize("NFD", "ASK-ü")).exists():
         yield Path(os.path.realpath(tmp_path))
         return
-    with other_disk(tmp_path) as mounted:
+    with other_disk(tmp_path, *request.param) as mounted:
         yield mounted
 
 
@@ -70,8 +67,9 @@ def test_every_normal_form_of_a_name_is_one_path(disk: Path) -> None:
 class OtherNumbers(Spelling):
     """A disk that numbers files in its listings otherwise, as some network disks do."""
 
-    def _listing(self, folder: str) -> dict[int, list[str]]:
-        return {-number: names for number, names in super()._listing(folder).items()}
+    def _listing(self, folder: str) -> dict[str, list[tuple[str, int]]]:
+        listed = super()._listing(folder)
+        return {key: [(name, -number) for name, number in names] for key, names in listed.items()}
 
 
 def test_a_listing_with_other_numbers_has_the_names(disk: Path) -> None:
@@ -81,6 +79,20 @@ def test_a_listing_with_other_numbers_has_the_names(disk: Path) -> None:
     (wanted.parent / "Bolt.FCStd").write_text("y")
     assert OtherNumbers().real(str(disk / NFD.upper() / f"{NFD}.FCStd")) == str(wanted)
     assert OtherNumbers().real(str(disk / "büchse" / "BOLT.fcstd")) == str(wanted.with_name("Bolt.FCStd"))
+
+
+def test_a_name_that_another_file_had_a_moment_ago(disk: Path) -> None:
+    """A disk may still answer for the file that was deleted under another spelling."""
+    for _ in range(5):
+        (disk / "Büchse").touch()
+        assert (disk / NFD.upper()).exists()
+        (disk / "Büchse").unlink()
+        wanted = disk / "Büchse" / "Bolt.FCStd"
+        wanted.parent.mkdir()
+        wanted.touch()
+        assert real(disk / NFD.upper() / "BOLT.fcstd") == str(wanted)
+        wanted.unlink()
+        wanted.parent.rmdir()
 
 
 def test_a_path_that_is_not_there_is_spelt_as_far_as_it_goes(disk: Path) -> None:

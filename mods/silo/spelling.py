@@ -31,7 +31,7 @@ class Spelling:
         self._folders: dict[str, tuple[str, str]] = {}
         self._canonical: dict[str, str] = {}
         self._exact: set[str] = set()  # folders that find a name in its own spelling only
-        self._listings: dict[str, dict[int, list[str]]] = {}
+        self._listings: dict[str, dict[str, list[tuple[str, int]]]] = {}
 
     def real(self, path: str) -> str:
         """``os.path.realpath`` with each name as its folder lists it; also for paths that are not there."""
@@ -88,25 +88,27 @@ class Spelling:
         spellings = {name.swapcase(), *(unicodedata.normalize(form, name) for form in ("NFC", "NFD"))} - {
             name
         }
-        if not any(_is(os.path.join(folder, other), status) for other in spellings):
+        # Not compared by number: some network disks number each spelling of a file otherwise, or its entry in
+        # a listing, and a disk may still answer with the number of a file that was deleted a moment ago.
+        if not any(os.path.lexists(os.path.join(folder, other)) for other in spellings):
             if name.isascii() and spellings:
                 self._exact.add(folder)
             return name
-        listing = self._listing(folder)
-        # Some network disks number a file in a listing otherwise than by itself.
-        names = listing.get(status.st_ino) or [one for names in listing.values() for one in names]
-        if name in names:  # a hard link may have several names
+        listed = self._listing(folder).get(folded(name), [])
+        if not listed or any(other == name for other, _ in listed):  # both may be files of their own
             return name
-        return next((other for other in names if folded(other) == folded(name)), name)
+        # Windows distinguishes normal forms, so several may be there: the number decides where it can.
+        return next((other for other, number in listed if number == status.st_ino), listed[0][0])
 
-    def _listing(self, folder: str) -> dict[int, list[str]]:
+    def _listing(self, folder: str) -> dict[str, list[tuple[str, int]]]:
+        """Names and inode numbers of a folder's entries, by :func:`folded` name."""
         known = self._listings.get(folder)
         if known is None:
             known = self._listings[folder] = {}
             try:
                 with os.scandir(folder) as found:
                     for _, item in zip(range(_LISTED_AT_MOST), found, strict=False):
-                        known.setdefault(item.inode(), []).append(item.name)
+                        known.setdefault(folded(item.name), []).append((item.name, item.inode()))
             except OSError:
                 pass  # a folder that cannot be listed shows nothing; names stay as they were given
         return known
@@ -120,10 +122,3 @@ def one_path(path: str) -> str:
 def folded(name: str) -> str:
     """Equal for names that differ in case or normal form only."""
     return unicodedata.normalize("NFC", unicodedata.normalize("NFD", name).casefold())
-
-
-def _is(path: str, status: os.stat_result) -> bool:
-    try:
-        return os.path.samestat(os.lstat(path), status)
-    except (OSError, ValueError):
-        return False

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from other_disk import other_disk
 
 from silo.api.revisions import standing
 from silo.api.wire import Revision
@@ -77,6 +78,18 @@ def test_a_held_file_keeps_its_content_when_freecad_saves_again(store: Store, do
     assert (store.copies / entry.copy).read_bytes() == b"first"
     # One copy, and no second name any more.
     assert [p for p in store.path.parent.rglob("*.FCStd") if p != document] == [store.copies / entry.copy]
+
+
+def test_a_disk_where_each_name_of_a_file_is_another_file(tmp_path: Path) -> None:
+    """A second name that looks like another file would be refused as written since: the file is copied."""
+    with other_disk(tmp_path, "each-spelling") as disk:
+        document = disk / "Top.FCStd"
+        document.write_bytes(b"first")
+        store, key = Store(disk / "data" / "outbox.sqlite3"), new_key()
+        stamp = stamp_of(document)
+        held = store.hold(str(document), key)
+        entry = store.add(replace(commit(document, key, held), stamp=stamp))
+        assert (store.copies / entry.copy).read_bytes() == b"first"
 
 
 def test_what_cannot_be_held_is_copied(store: Store, tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 
 A small FUSE file system over a real folder, run as a process of its own:
 
-    python tests/support/other_disk.py FOLDER MOUNT_POINT
+    python tests/support/other_disk.py FOLDER MOUNT_POINT [each-spelling]
 
 It stays in the foreground until it is unmounted. Needs ``mfusepy``, libfuse and the right to mount.
 """
@@ -38,8 +38,11 @@ def _cannot(reason: str) -> NoReturn:
 
 
 @contextmanager
-def other_disk(folder: Path) -> Iterator[Path]:
-    """Such a disk, mounted below ``folder``. Skips the test where none can be mounted."""
+def other_disk(folder: Path, *options: str) -> Iterator[Path]:
+    """Such a disk, mounted below ``folder``. Skips the test where none can be mounted.
+
+    With ``each-spelling`` each spelling of a name has an inode number of its own, as some network disks do.
+    """
     if fuse is None:
         _cannot(f"needs FUSE: {_WHY}")
     umount = shutil.which("fusermount3") or shutil.which("fusermount")
@@ -48,7 +51,7 @@ def other_disk(folder: Path) -> Iterator[Path]:
     root, mount = folder / "disk", folder / "mounted"
     root.mkdir()
     mount.mkdir()
-    command = [sys.executable, __file__, str(root), str(mount)]
+    command = [sys.executable, __file__, str(root), str(mount), *options]
     path = os.pathsep.join(filter(None, sys.path))
     # Its complaints go to a file: nobody reads a pipe, and a full one would stop it.
     with (
@@ -195,7 +198,8 @@ class OtherDisk(fuse.Operations if fuse else object):  # type: ignore[misc]
 
 if __name__ == "__main__":
     # nothreads: one request at a time, as the look-up and what follows it belong together.
-    # use_ino: an inode is the file's own, whatever it is called.
+    # use_ino: an inode is the file's own, whatever it is called; else each spelling has one.
+    own = "each-spelling" not in sys.argv[3:]
     fuse.FUSE(
-        OtherDisk(sys.argv[1]), sys.argv[2], foreground=True, nothreads=True, use_ino=True, fsname="other"
+        OtherDisk(sys.argv[1]), sys.argv[2], foreground=True, nothreads=True, use_ino=own, fsname="other"
     )

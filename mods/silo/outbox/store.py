@@ -83,6 +83,12 @@ class Store(Origins):
             os.link(path, held)
         except OSError:
             return None
+        if stamp_of(held) != stamp_of(path):
+            # Some network disks give each name of a file a number of its own: a later look at the second name
+            # would take it for another file.
+            with suppress(OSError):
+                remove_patiently(held)
+            return None
         return held
 
     def stage(self, commit: Commit, server: str = "") -> None:

@@ -25,6 +25,7 @@ from silo.fcstd import Library
 from silo.fcstd.linked import identity_in
 from silo.fcstd.locate import refusal
 from silo.files import content_hash
+from silo.spelling import one_path
 from silo.vault.fetch import Fetched, Lost, Tree
 
 
@@ -142,10 +143,10 @@ def place(tree: Tree, into: Path | str, rules: Rules = Rules()) -> Pulled:
     placed: list[Placed] = []
     lost = list(tree.lost)
     # The disk says which names are one file: by their case, their Unicode form, or a link.
-    taken: dict[tuple[int, int], Placed] = {}
+    taken: dict[str, Placed] = {}
     for one, where in zip(tree.files, places, strict=True):
         target = anchor.joinpath(*where.split("/"))
-        if (before := taken.get(_on_disk(target))) is not None:
+        if (before := taken.get(one_path(str(target)))) is not None:
             if (before.part_number, before.revision) != (one.part_number, one.revision.revision_number):
                 why = f"{before.part_number}, revision {before.revision}, has the same place on this disk"
                 lost.append(Lost(one.position, where, why))
@@ -156,16 +157,8 @@ def place(tree: Tree, into: Path | str, rules: Rules = Rules()) -> Pulled:
             lost.append(Lost(one.position, where, why))
             continue
         placed.append(_place(one, target, rules))
-        taken[_on_disk(target)] = placed[-1]
+        taken[one_path(str(target))] = placed[-1]
     return Pulled(placed[0].path, tuple(placed), tuple(lost))
-
-
-def _on_disk(path: Path) -> tuple[int, int]:
-    try:
-        status = path.stat()
-    except OSError:
-        return (0, 0)
-    return (status.st_dev, status.st_ino)
 
 
 def _in_the_way(target: Path, base: Path) -> str:
