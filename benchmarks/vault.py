@@ -71,7 +71,8 @@ from silo.files import documents_in
 from silo.vault.index import Index
 from silo.vault.plan import make_plan
 from silo.vault.pool import pool_of
-from silo.vault.reading import Question, Reading
+from silo.vault.reading import Reading
+from silo.vault.session import Question
 
 def main():
     folder, index, jobs, dask = sys.argv[1], sys.argv[2], int(sys.argv[3]), sys.argv[4] or None
@@ -107,7 +108,7 @@ from silo.fcstd.facts import facts_of
 from silo.fcstd.library import Library
 from silo.files import documents_in
 from silo.vault.index import Index
-from silo.vault.reading import Question, Session
+from silo.vault.session import Question, Session
 
 def read(session, question):
     library = Library(contents=session.contents, locator=session.locator)

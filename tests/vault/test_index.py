@@ -20,7 +20,7 @@ from tempfile import mkdtemp
 from typing import Any
 
 import pytest
-from fcstd_writer import Doc, XLink, locals_, part
+from fcstd_writer import Doc, Local, XLink, locals_, part
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
@@ -29,7 +29,8 @@ from silo.bom.errors import InputError
 from silo.fcstd.library import Contents
 from silo.vault.answers import Known, Seen
 from silo.vault.index import Index
-from silo.vault.reading import Question, Reading, Session
+from silo.vault.reading import Reading
+from silo.vault.session import Question, Session
 
 HOUR_NS = 3600 * 10**9
 NAMES = tuple(f"{folder}{name}.FCStd" for folder in ("", "sub/") for name in ("a", "b", "c", "d"))
@@ -269,6 +270,7 @@ def odd_target() -> Doc:
     doc.add("Part::Box", "Hidden", SiloBomExclude=True).add("Part::Feature", "Ähn<lich", Label='a "b" & c')
     doc.add("App::Part", "Inner", Group=locals_("Out", "Body")).link("Array", "", "Body", ElementCount=3)
     doc.add("Future::Links", "Later", LinkedObject=XLink("a.FCStd", "Box"), ElementCount=2)
+    doc.add("Part::Box", "Types", Label=7, SiloItemId={"SiloUUID": "x"}, Meta="text", SiloUUID=Local("Pad"))
     for number in range(30):
         doc.add("Part::Box", f"More{number}", SiloItemId=f"more {number}")
     return doc
@@ -305,7 +307,7 @@ def test_facts_in_place_of_a_file_change_nothing(vault: Path, tmp_path: Path) ->
     odd_target().save(vault / "odd.FCStd")
     named = [
         *("Pad", "Body", "Screw", "Sheet", "Chain", "Out", "Hidden", "Ähn<lich", "Inner", "Array"),
-        "Later",
+        *("Later", "Types"),
     ]
     links = [XLink("odd.FCStd", name) for name in (*named, "Gone", "More1", "More29")]
     links += [

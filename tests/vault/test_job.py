@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
@@ -27,7 +29,8 @@ from silo.vault.index import Index
 from silo.vault.job import Job
 from silo.vault.plan import make_plan
 from silo.vault.pool import Pool, pool_of
-from silo.vault.reading import Question, Reading, work
+from silo.vault.reading import Reading
+from silo.vault.session import Question, work
 
 
 def write(folder: Path, silo: FakeSilo | None, assemblies: dict[int, dict[int, int]], parts: int = 4) -> None:
@@ -301,3 +304,11 @@ def test_parts_in_the_file_of_an_assembly_are_its_bom_where_it_is_registered(
     with Index(None) as memory:
         plan = make_plan(documents_in([str(tmp_path)]), Reading(memory))
     assert (len(plan.nodes), plan.parts) == ((1, 0) if uuid else (0, 1))
+
+
+def test_a_worker_starts_without_the_network() -> None:
+    """Each worker imports what it needs anew; HTTP and TLS would be a tenth of it."""
+    code = (
+        "import sys, silo.vault.session as _; print([n for n in ('http.client', 'ssl') if n in sys.modules])"
+    )
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout == b"[]\n"

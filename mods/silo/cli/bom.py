@@ -161,7 +161,7 @@ def _add_where_used(commands: Commands) -> None:
 
 def run_where_used(args: argparse.Namespace) -> int:
     """Print the files; those of an unchanged vault are known from the index."""
-    from silo.vault.reading import Question
+    from silo.vault.session import Question
 
     if not os.path.isdir(args.vault):
         raise InputError(f"{args.vault} is no folder. Name the folder of the vault.")

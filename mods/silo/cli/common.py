@@ -210,7 +210,7 @@ def read_assembly(top: str, assembly: str | None = None, *, hardware: bool = Tru
 def read_top(args: argparse.Namespace) -> Extraction:
     """The BOM of the file that the options name, from the index where it is known. Raises SiloError."""
     from silo.fcstd.suggest import with_suggestions
-    from silo.vault.reading import Question
+    from silo.vault.session import Question
 
     with reading_of(args) as reading:
         found = reading.ask(Question(args.top, args.assembly, not args.no_hardware, below=True)).found

@@ -36,6 +36,7 @@ from silo.platform import copy_rights, patiently, swap
 _HAS_DESCRIPTOR = 0x8
 _DEFLATED = 8
 _LARGEST = 0xFFFFFFFF
+_REFERENCES = {'"': "&quot;", "'": "&apos;", "\n": "&#10;", "\r": "&#13;", "\t": "&#9;"}
 
 
 class Span(NamedTuple):
@@ -46,6 +47,13 @@ class Span(NamedTuple):
 
 
 Piece = bytes | Span
+
+
+def in_attribute(text: str) -> str:
+    """A text as the value of an XML attribute, to stand between quotes."""
+    from xml.sax.saxutils import escape  # late, as it imports HTTP and TLS
+
+    return escape(text, _REFERENCES)
 
 
 def replaced_entry(container: ContainerFile, entry: Entry, content: bytes) -> tuple[Piece, ...]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from silo.bom.walk.kinds import Kind
 from silo.fcstd.container import Directory, FileState
 from silo.fcstd.limits import FcstdError
-from silo.fcstd.properties import CANONICAL, Properties, table_of
+from silo.fcstd.properties import Properties, Text, table_of
 from silo.fcstd.values import ABSENT
 from silo.fcstd.xmltext import XmlText
 
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 # Which objects of a file its facts describe: what may be a component, but no features of a body.
 _TARGETS = frozenset(Kind) - {Kind.NOTHING, Kind.FOLDER, Kind.LINK, Kind.ASSEMBLY_LINK, Kind.ELEMENT}
 _TARGETS_AT_MOST = 24
+# What is mostly text. The values are kept, as they are asked for by each assembly that uses the file.
+_TEXTS = frozenset({"Label", "Meta", "SiloItemId", "SiloUUID"})
 # What lies in a target is asked for only where a link names an object inside it.
 _NOT_OF_TARGETS = frozenset({"ElementList", "Group"})
 _ENCODER = json.JSONEncoder(separators=(",", ":"))
@@ -34,17 +36,17 @@ class Facts(NamedTuple):
     """The facts of a file. Goes through JSON.
 
     document
-        names and kept pieces of the document's own properties.
+        of the document's own properties: all names, what is text, and the kept pieces of others.
     objects
-        name → (type, names, kept pieces), of those that links most likely mean.
+        name → (type, and the same three), of those that links most likely mean.
     """
 
     digest: str
     state: FileState
     changed_ns: int
     read_ns: int
-    document: tuple[Sequence[str], Mapping[str, str]]
-    objects: Mapping[str, tuple[str, Sequence[str], Mapping[str, str]]]
+    document: tuple[Sequence[str], Mapping[str, Text], Mapping[str, str]]
+    objects: Mapping[str, tuple[str, Sequence[str], Mapping[str, Text], Mapping[str, str]]]
 
 
 def facts_of(document: FcstdDocument) -> str:
@@ -63,9 +65,17 @@ def facts_of(document: FcstdDocument) -> str:
     return _ENCODER.encode(facts)
 
 
-def _to_keep(table: Properties) -> tuple[tuple[str, ...], dict[str, str]]:
-    pieces = {name: piece.decode() for name, piece in table.kept.items() if name not in _NOT_OF_TARGETS}
-    return table.names, pieces
+def _to_keep(table: Properties) -> tuple[tuple[str, ...], dict[str, Text], dict[str, str]]:
+    texts, pieces = dict[str, Text](), dict[str, str]()
+    for name, piece in table.kept.items():
+        if name in _NOT_OF_TARGETS:
+            continue
+        value = table.quick_value(piece) if name in _TEXTS else None
+        if isinstance(value, (str, dict)):
+            texts[name] = value
+        else:
+            pieces[name] = piece.decode()
+    return table.names, texts, pieces
 
 
 class Remembered:
@@ -129,18 +139,25 @@ class Remembered:
 
 
 class _Kept(Properties):
-    """The table of an object, "" for the document itself; ``pieces`` of what a walker asks of a target."""
+    """The table of an object, "" for the document itself: what a walker asks of a target."""
 
-    __slots__ = ("_file", "_name", "_values", "kind")
+    __slots__ = ("_file", "_name", "_texts", "_values", "kind")
 
     def __init__(
-        self, file: Remembered, name: str, kind: str, names: Sequence[str], pieces: Mapping[str, str]
+        self,
+        file: Remembered,
+        name: str,
+        kind: str,
+        names: Sequence[str],
+        texts: Mapping[str, Text],
+        pieces: Mapping[str, str],
     ) -> None:
         self._file, self._name, self.kind = file, name, kind
         self._careful, self._decode = False, _utf8
         self._begin = self._end = 0
         self._values: dict[str, Any] | None = None
         self.names, self.numbers = _shared(tuple(names))
+        self._texts = texts
         self.kept = {name: piece.encode() for name, piece in pieces.items()}
 
     def _whole(self) -> Properties:
@@ -156,13 +173,20 @@ class _Kept(Properties):
     def value(self, name: str) -> Any:
         if name not in self.numbers:
             return ABSENT
+        if name in self._texts:
+            return self._texts[name]
         if self._values is None:
             self._values = {}
         if name not in self._values:
-            if not CANONICAL.match(self.kept.get(name, b"")):
+            value = self.quick_value(self.kept.get(name, b""))
+            if value is None:
                 return self._whole().value(name)
-            self._values[name] = super().value(name)
+            self._values[name] = value
         return self._values[name]
+
+    @property
+    def texts(self) -> Mapping[str, Text]:
+        return self._texts
 
 
 @lru_cache(maxsize=4096)

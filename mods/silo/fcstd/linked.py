@@ -16,13 +16,19 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import NamedTuple
-from xml.sax.saxutils import quoteattr
 
 from silo.bom.errors import DocumentError, InputError
 from silo.bom.identity import document_identity, own_identity
 from silo.fcstd.careful import Malformed, as_utf8, start_tags
 from silo.fcstd.container import ContainerFile
-from silo.fcstd.edit import check_writable, document_xml, edited_xml, replace_file, replaced_entry
+from silo.fcstd.edit import (
+    check_writable,
+    document_xml,
+    edited_xml,
+    in_attribute,
+    replace_file,
+    replaced_entry,
+)
 from silo.fcstd.library import Library
 from silo.fcstd.limits import Limits
 from silo.fcstd.locate import Found, Locator
@@ -215,7 +221,7 @@ def _mend(one: Relinked, old: str, target: str, limits: Limits) -> None:
             attribute = _FILE.search(text, record.at)
             if attribute is None:
                 raise Malformed("has a link that cannot be edited")
-            parts += [text[begin : attribute.end(1)], quoteattr(recorded).encode()]
+            parts += [text[begin : attribute.end(1)], b'"%b"' % in_attribute(recorded).encode()]
             begin = attribute.end()
         return b"".join((*parts, text[begin:]))
 

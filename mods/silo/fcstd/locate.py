@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -85,6 +85,11 @@ class Locator:
             if isinstance(found, Found):
                 self._files[recorded, folders] = found
         return found
+
+    def learn(self, folders: tuple[str, ...], found: Mapping[str, Found]) -> None:
+        """Remember where the paths of a document's links lead, as another session found it just now."""
+        for recorded, one in found.items():
+            self._files.setdefault((recorded, folders), one)
 
     def _find(self, recorded: str, folders: tuple[str, ...]) -> Found | NotFound:
         if "://" in recorded and _URL.match(recorded):

@@ -159,6 +159,7 @@ class FcstdObject:
         mine = self.__dict__
         properties = mine["properties"] = self.Document.properties_of(self)
         mine["PropertiesList"] = properties.names
+        mine.update(properties.texts)
         known = self.Document.values
         for name, piece in properties.kept.items():
             if piece in known:

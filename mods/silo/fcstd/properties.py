@@ -9,7 +9,8 @@ first.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from silo.fcstd import careful
@@ -25,18 +26,22 @@ _PROPERTIES = b'<Properties Count="'
 # that a BOM asks for. Nothing that expat would read in another way: no references, no white space to
 # normalise.
 _ATTRIBUTES = rb'((?: [\w:.-]+="[^"<&\r\n\t]*")*)'
-CANONICAL = re.compile(
+_AFTER = rb"\s*</Property>\s*(?:</Properties>\s*(?:</Object>)?)?\Z"
+_CANONICAL = re.compile(
     rb'([^"&]+)" type="([^"&]+)"[^<]*<(\w+)' + _ATTRIBUTES + rb"(?:/>|>\s*"
-    rb'((?:<\w+(?: [\w:.-]+="[^"<&\r\n\t]*")*/>\s*)*)</\3>)'
-    rb"\s*</Property>\s*(?:</Properties>\s*(?:</Object>)?)?\Z"
+    rb'((?:<\w+(?: [\w:.-]+="[^"<&\r\n\t]*")*/>\s*)*)</\3>)' + _AFTER
 )
 # The same for a list of links, which may be long.
 _MEMBERS = re.compile(
     rb'[^"&]+" type="App::PropertyLinkList"[^<]*<LinkList count="\d+">'
-    rb'((?:\s*<Link value="[^"<&\r\n\t]*"/>)*)\s*</LinkList>'
-    rb"\s*</Property>\s*(?:</Properties>\s*(?:</Object>)?)?\Z"
+    rb'((?:\s*<Link value="[^"<&\r\n\t]*"/>)*)\s*</LinkList>' + _AFTER
 )
 _MEMBER = re.compile(r'"([^"]*)"')
+# And what a BOM asks of nearly every object: a text, and a map with nothing in it.
+_PLAIN = re.compile(
+    rb'[^"&]+" type="App::Property(?:String"[^<]*<String value="([^"<&\r\n\t]*)"/>'
+    rb'|Map"[^<]*<Map count="0">\s*</Map>)' + _AFTER
+)
 _CHILD = re.compile(r"<(\w+)([^<]*)/>")
 _ATTRIBUTE = re.compile(r' ([\w:.-]+)="([^"]*)"')
 
@@ -70,6 +75,10 @@ class Shape(NamedTuple):
 
 
 _NOTHING = Shape.of((), b"")
+
+
+Text = str | dict[str, str]
+_NO_TEXTS: Mapping[str, Text] = MappingProxyType({})
 
 
 class Properties:
@@ -116,9 +125,26 @@ class Properties:
         if name not in self.numbers:
             return ABSENT
         piece = self.piece(name)
+        value = self.quick_value(piece)
+        return value_of(self._careful_node(piece)) if value is None else value
+
+    def quick_value(self, piece: bytes) -> Any:
+        """The same of a piece in FreeCAD's own form; None where it has another one."""
+        if (plain := _PLAIN.match(piece)) is not None:
+            return {} if plain[1] is None else self._decode(plain[1])
         if (members := _MEMBERS.match(piece)) is not None:
             return LocalList(tuple(_MEMBER.findall(self._decode(members[1]))))
-        return value_of(self._node(piece))
+        if (found := _CANONICAL.match(piece)) is None:
+            return None
+        name, kind, tag, attributes, inner = (self._decode(part or b"") for part in found.groups())
+        children = [Node(child, dict(_ATTRIBUTE.findall(own))) for child, own in _CHILD.findall(inner)]
+        value = Node(tag, dict(_ATTRIBUTE.findall(attributes)), children)
+        return value_of(Node("Property", {"name": name, "type": kind}, [value]))
+
+    @property
+    def texts(self) -> Mapping[str, Text]:
+        """Values that are known without reading a piece."""
+        return _NO_TEXTS
 
     def _cut(self) -> list[bytes]:
         begin, end = self._begin, self._end
@@ -147,12 +173,7 @@ class Properties:
             raise self._xml.malformed(error) from error
         return Shape.of(spans, b""), [b"", *(element[first:last] for first, last in spans.values())]
 
-    def _node(self, piece: bytes) -> Node:
-        if (found := CANONICAL.match(piece)) is not None:
-            name, kind, tag, attributes, inner = (self._decode(part or b"") for part in found.groups())
-            children = [Node(child, dict(_ATTRIBUTE.findall(own))) for child, own in _CHILD.findall(inner)]
-            value = Node(tag, dict(_ATTRIBUTE.findall(attributes)), children)
-            return Node("Property", {"name": name, "type": kind}, [value])
+    def _careful_node(self, piece: bytes) -> Node:
         if not self._careful:
             end = piece.find(_CLOSING)
             piece = _CUT + (piece[: end + len(_CLOSING)] if end >= 0 else piece)

@@ -16,14 +16,13 @@ import re
 import unicodedata
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from xml.sax.saxutils import escape
 
 from silo.bom.errors import DocumentError
 from silo.bom.identity import META_KEY, meta_key, own_identity
 from silo.fcstd import careful
 from silo.fcstd.careful import Malformed, Node, Span
 from silo.fcstd.container import ContainerFile, Entry, FileState
-from silo.fcstd.edit import changed, check_writable, edited_xml, replace_file, replaced_entry
+from silo.fcstd.edit import changed, check_writable, edited_xml, in_attribute, replace_file, replaced_entry
 from silo.fcstd.library import Library
 from silo.fcstd.limits import Limits
 
@@ -172,7 +171,7 @@ def _stamped_xml(
     """The entry Document.xml, and its content as it is to become."""
 
     def edit(text: bytes) -> bytes:
-        own = {"SiloItemId": _ITEM_ID % escape(identity, _MORE).encode()}
+        own = {"SiloItemId": _ITEM_ID % in_attribute(identity).encode()}
         return _edited(text, {key: identity}, item_object, own, limits.depth)
 
     return edited_xml(container, edit, limits)
@@ -189,7 +188,6 @@ def _read_back(path: str, temporary: str, key: str, identity: str) -> None:
         raise DocumentError(path, "the stamped copy does not hold the identity; the file is unchanged")
 
 
-_MORE = {'"': "&quot;", "'": "&apos;", "\n": "&#10;", "\r": "&#13;", "\t": "&#9;"}
 # As FreeCAD writes what the add-on adds: asks for no recompute (8), and cannot be edited by accident.
 _ITEM_ID = (
     b'<Property name="SiloItemId" type="App::PropertyString" group="Silo" doc="Identity of the item in Silo"'
@@ -290,6 +288,6 @@ def _map(items: dict[str, str]) -> bytes:
     lines = [f'\n            <Map count="{len(items)}">']
     for key in sorted(items, key=str.encode):
         lines.append(
-            f'\n                <Item key="{escape(key, _MORE)}" value="{escape(items[key], _MORE)}"/>'
+            f'\n                <Item key="{in_attribute(key)}" value="{in_attribute(items[key])}"/>'
         )
     return "".join((*lines, "\n            </Map>")).encode()

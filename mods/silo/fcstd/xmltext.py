@@ -18,7 +18,6 @@ from hashlib import sha256
 from itertools import accumulate, compress, count, islice, repeat
 from operator import lshift, not_, or_
 from typing import TYPE_CHECKING, Any
-from xml.sax.saxutils import unescape
 
 from silo.fcstd import careful
 from silo.fcstd.careful import Head, Malformed, Span
@@ -344,7 +343,12 @@ class XmlText:
 
     def linked(self) -> set[str]:
         """The recorded paths of linked files, about; of a text that was read to its end."""
-        return {unescape(self.decode(path)) for path in _LINKED.findall(self.text)}
+        found = {self.decode(path) for path in _LINKED.findall(self.text)}
+        if any("&" in path for path in found):
+            from xml.sax.saxutils import unescape  # it imports HTTP and TLS
+
+            found = {unescape(path) for path in found}
+        return found
 
     def _read_carefully(self) -> None:
         text = self.text + self._inflater.rest()

@@ -48,7 +48,7 @@ def whole_folder(
     plan: Plan, reading: Reading, base: str, *, hardware: bool = True
 ) -> tuple[Extraction, frozenset[str]]:
     """All components of a folder's assemblies, and the files that no assembly uses."""
-    from silo.vault.reading import Question
+    from silo.vault.session import Question
 
     entries: dict[tuple[str, str], BomEntry] = {}
     findings: list[Finding] = []

@@ -21,7 +21,8 @@ from silo.bom.report import whole_row
 from silo.bom.walk.rings import Rings
 from silo.bom.walk.standard import standard_uuid
 from silo.fcstd.suggest import with_suggestions
-from silo.vault.reading import Answer, Question, Reading, collecting_seldom
+from silo.vault.reading import Answer, Reading
+from silo.vault.session import Question, collecting_seldom
 
 Key = tuple[str, str]
 

@@ -14,7 +14,7 @@ from typing import Any
 from uuid import uuid4
 
 from silo.bom.errors import InputError
-from silo.vault.reading import CHUNK, Done, Question, Supplies, collect_seldom, work
+from silo.vault.session import CHUNK, Done, Question, Supplies, collect_seldom, work
 
 # A worker process costs some 0.3 s to start; reading a file some milliseconds.
 _WORTH_A_POOL = 128
@@ -53,9 +53,10 @@ class Pool:
         return self._executor.submit(work, questions, supplies, self._run)
 
     def renew(self) -> None:
-        """Give up an executor that lost its workers."""
+        """Give up an executor that lost its workers, or that is no longer needed."""
         if self._executor is not None:
-            self._executor.shutdown(wait=False, cancel_futures=True)
+            # Python would wait for it at the end anyway, and at times trips over it then.
+            self._executor.shutdown(wait=True, cancel_futures=True)
             self._executor = None
 
 

@@ -1,9 +1,6 @@
 # SPDX-License-Identifier: LGPL-2.1-or-later
 """Reading many files: each question about a file once, from the index or by any executor.
 
-A question has a file and a kind: the whole BOM below its assembly, or that one assembly alone. It is answered
-in a session of its own, so that the answer's trail is exactly what the session has read.
-
 Many questions are answered in two steps, each spread over the executor. First every file is read, once: that
 gives its facts, and the answer where it links to no other. Then the assemblies are walked, with the facts of
 what they link to in place of the files. Answers come back in the order of the questions, whoever found them.
@@ -11,79 +8,34 @@ what they link to in place of the files. Answers come back in the order of the q
 
 from __future__ import annotations
 
-import gc
 import json
-import os
-import threading
-import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError, Future
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from dataclasses import dataclass
 from itertools import islice
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 from uuid import uuid4
 
 from silo.bom.errors import DocumentError, InputError, SiloError
-from silo.bom.findings import respelt_findings
-from silo.bom.links import extract
 from silo.bom.model import Extraction
-from silo.bom.report import from_plain, to_plain
-from silo.bom.roots import choose_assembly
-from silo.fcstd.facts import facts_of
-from silo.fcstd.library import Content, Contents, Library
-from silo.fcstd.locate import Found, Locator
-from silo.vault.answers import Known, engine
+from silo.bom.report import from_plain
+from silo.fcstd.library import Content
+from silo.vault.answers import Known
 from silo.vault.index import Index
+from silo.vault.session import CHUNK, Done, First, Question, Session, Supplies, work, work_in
 
 if TYPE_CHECKING:
     from silo.vault.pool import Pool
 
 T = TypeVar("T")
-CHUNK = 64
 _RECALLED = 256  # answers that are held on the way from the index
 # Bytes of assemblies' files that are kept from the first step to the second.
 _HELD = 48 << 20
 _TRIES = 3
+_LEAST = 8  # questions that travel together, also at the end
 _WORKER_LOST = (BrokenProcessPool, CancelledError)
-
-
-@dataclass(frozen=True, slots=True)
-class Question:
-    """What is asked of a file.
-
-    assembly
-        name or label of the one meant, where the file holds several; None for the likeliest.
-    name_only
-        ``assembly`` is the internal name of any object that may hold components.
-    below
-        the whole tree, or the one assembly alone (:func:`silo.bom.links.extract`).
-    """
-
-    path: str
-    assembly: str | None = None
-    hardware: bool = True
-    below: bool = False
-    name_only: bool = False
-
-    def __post_init__(self) -> None:
-        # Another process, and another day, have other current folders.
-        object.__setattr__(self, "path", os.path.abspath(self.path))
-
-    @property
-    def name(self) -> str:
-        """For the index."""
-        return _name(self.assembly, self.hardware, self.below, self.name_only)
-
-
-@lru_cache(maxsize=256)
-def _name(assembly: str | None, hardware: bool, below: bool, name_only: bool) -> str:
-    words = ("bom" if below else "level") + ("" if hardware else " without hardware")
-    mark = "#" if name_only else "="
-    return f"{engine()} {words} {'' if assembly is None else mark + assembly}"
 
 
 class Answer:
@@ -110,144 +62,6 @@ class Answer:
         if "input" in self.plain:
             return InputError(self.plain["input"])
         return from_plain(self.plain)
-
-
-def collect_seldom() -> None:
-    """Let Python search for rings of objects seldom.
-
-    A session takes its own rings apart. Each search goes through all that is remembered of a vault, so that
-    a document of a large vault would cost more than one of a small vault.
-    """
-    gc.set_threshold(100_000, *gc.get_threshold()[1:])
-
-
-@contextmanager
-def collecting_seldom() -> Iterator[None]:
-    """:func:`collect_seldom`, for a while."""
-    before = gc.get_threshold()
-    collect_seldom()
-    try:
-        yield
-    finally:
-        gc.set_threshold(*before)
-
-
-# --- in the worker --------------------------------------------------------------------------------------
-
-
-class First(NamedTuple):
-    """What reading one file gave.
-
-    known
-        the answer; None where that needs other files.
-    path, facts
-        the file without symlinks, and its facts, "" where there are none.
-    content, linked
-        where there is no answer yet: the file itself, and the files that it links to.
-    """
-
-    known: Known | None
-    path: str = ""
-    facts: str = ""
-    content: Content | None = None
-    linked: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Supplies:
-    """What is known already of the files that some questions need: contents, and facts."""
-
-    contents: Mapping[str, Content] = field(default_factory=dict)
-    facts: Mapping[str, str] = field(default_factory=dict)
-
-
-class Session:
-    """What a worker keeps between questions."""
-
-    def __init__(self, contents: Contents | None = None) -> None:
-        self.contents = contents or Contents()
-        self.locator = Locator(remembers_files=True)
-
-    def ask(self, question: Question, facts: Callable[[str], str] = lambda _path: "") -> Known:
-        """The answer with its trail."""
-        library = Library(contents=self.contents, locator=self.locator, facts=facts)
-        try:
-            return Known.found_in(library, self._answer(library, question))
-        finally:
-            library.dissolve()
-
-    def read(self, question: Question) -> First:
-        """The file of a question, and the answer where no other file is needed for it."""
-        library = Library(contents=self.contents, locator=self.locator)
-        try:
-            return self._read(library, question)
-        finally:
-            library.dissolve()
-
-    def _read(self, library: Library, question: Question) -> First:
-        path, facts, linked = "", "", set[str]()
-        try:
-            document = library.open(question.path)
-            path, facts = document.FileName, facts_of(document)
-            for recorded in document.linked():
-                if isinstance(found := self.locator.find(recorded, document.folders), Found):
-                    linked.add(found.real)
-        except DocumentError:
-            pass  # which is the answer
-        else:
-            if linked - {path} and isinstance(document.content, Content):
-                return First(None, path, facts, document.content, tuple(linked))
-        return First(Known.found_in(library, self._answer(library, question)), path, facts)
-
-    def _answer(self, library: Library, question: Question) -> dict[str, Any]:
-        try:
-            document = library.open(question.path)
-            top = document.getObject(question.assembly or "") if question.name_only else None
-            top = choose_assembly(document, question.assembly) if top is None else top
-            found = extract(top, hardware=question.hardware, below=question.below)
-            told = respelt_findings(library.notes, document.FileName)
-            return to_plain(replace(found, findings=(*found.findings, *told)))
-        except DocumentError as error:
-            return {"document": [error.path, error.reason]}
-        except InputError as error:
-            return {"input": str(error)}
-
-
-class Done(NamedTuple):
-    """Some questions worked on: what they gave in order, how many files were read, seconds of processor."""
-
-    found: list[First]
-    reads: int
-    seconds: float
-
-
-_mine = threading.local()
-
-
-def work(questions: Sequence[Question], supplies: Supplies | None, run: str) -> Done:
-    """Read the files of questions, or with supplies answer them; this is what travels to workers.
-
-    run
-        names the run: what a worker of a cluster keeps from another one may be old.
-    """
-    if getattr(_mine, "run", None) != run:
-        _mine.run, _mine.session = run, Session()
-    return _work(_mine.session, questions, supplies)
-
-
-def _work(session: Session, questions: Sequence[Question], supplies: Supplies | None) -> Done:
-    reads, begin = session.contents.reads, time.thread_time()
-    if supplies is None:
-        found = [session.read(question) for question in questions]
-    else:
-        for path, content in supplies.contents.items():
-            session.contents.add(path, content)
-        facts = supplies.facts
-        found = [First(session.ask(question, lambda path: facts.get(path, ""))) for question in questions]
-    return Done(found, session.contents.reads - reads, time.thread_time() - begin)
-
-
-# --- the job --------------------------------------------------------------------------------------------
 
 
 @dataclass
@@ -305,9 +119,9 @@ class Reading:
                 waiting[number] = found
         self.asked += len(left)
         pool = self._pool if self._pool is not None and len(left) >= self._pool.worth else None
-        size = CHUNK if pool is None else pool.chunk
+        jobs, size = (1, CHUNK) if pool is None else (pool.jobs, pool.chunk)
         contents, linked, held = dict[str, Content](), dict[int, First](), 0
-        chunks = (_Chunk([asked[number] for number in group], None) for group in grouped(left, size))
+        chunks = (_Chunk([asked[number] for number in group], None) for group in tapered(left, size, jobs))
         for number, first in zip(left, self._worked_on(chunks, pool), strict=True):
             if first.facts:
                 self.index.remember_facts(first.path, first.facts)
@@ -316,11 +130,11 @@ class Reading:
                 if len(waiting) < self._waiting or not first.known.lasting:
                     waiting[number] = first.known
             else:
-                linked[number] = First(None, first.path, linked=first.linked)
+                linked[number] = first._replace(facts="", content=None)
                 if first.content is not None and held < _HELD:  # else it is read again
                     contents[first.path] = first.content
                     held += first.content.size
-        walks = (self._walk(asked, group, linked, contents) for group in grouped(linked, size))
+        walks = (self._walk(asked, group, linked, contents) for group in tapered([*linked], size, jobs))
         walked = self._worked_on(walks, pool)
         rest = [number for number in range(len(asked)) if number not in linked and number not in waiting]
         again = self._recalled(asked, rest)
@@ -355,8 +169,9 @@ class Reading:
     ) -> _Chunk:
         own = dict.fromkeys(linked[number].path for number in group)
         given = {path: contents.pop(path) for path in own if path in contents}
-        paths = {path: None for number in group for path in linked[number].linked}
-        return _Chunk([asked[number] for number in group], Supplies(given, self.index.facts([*own, *paths])))
+        files = dict.fromkeys(file for number in group for file in linked[number].files)
+        found = [(linked[number].folders, linked[number].linked) for number in group]
+        return _Chunk([asked[number] for number in group], Supplies(given, self.index.facts([*files]), found))
 
     def _remember(self, question: Question, known: Known) -> None:
         self.index.remember(question.path, question.name, known)
@@ -366,7 +181,7 @@ class Reading:
         waiting: deque[_Chunk] = deque()
         for chunk in chunks:
             if pool is None:
-                yield from _work(self._session, chunk.questions, chunk.supplies).found
+                yield from work_in(self._session, chunk.questions, chunk.supplies).found
                 continue
             chunk.asked = pool.submit(chunk.questions, chunk.supplies)
             waiting.append(chunk)
@@ -423,3 +238,12 @@ def grouped(several: Iterable[T], size: int) -> Iterator[list[T]]:
     left = iter(several)
     while group := list(islice(left, size)):
         yield group
+
+
+def tapered(several: Sequence[T], size: int, jobs: int) -> Iterator[Sequence[T]]:
+    """Lists of ``size``, and smaller ones towards the end, so that no worker is left with much to do."""
+    at = 0
+    while at < len(several):
+        some = min(size, max(_LEAST, (len(several) - at) // (3 * jobs)))
+        yield several[at : at + some]
+        at += some
