@@ -85,19 +85,50 @@ def test_a_sync_does_not_undo_a_colleagues_newer_file(
         assert "alice has committed revision 2 since" in office.sent[-1].entry.remark
 
 
+def test_bom_and_file_of_a_sync_are_of_one_state(office: Office, flow: PreviewFlow, top: Document) -> None:
+    """A document that was edited since the comparison is shown as it is, and synced at the second press."""
+    number = "M01-0001"
+    Path(top.FileName).write_bytes(b"three plates")
+    office.silo.upload_file(number, top.FileName, "mine")
+    top.changed = False
+    flow.start(top)
+    office.settle()
+    (window,) = office.desk.previews
+    sub = office.document("Sub")
+    for edit in (lambda: top.parts.update(dict.fromkeys(top.parts, 5)), lambda: top.parts.update({sub: 1})):
+        edit()
+        top.content = b"as edited: %d" % len(top.parts)
+        office.desk.documents.save(top)
+        before = office.silo.get_bom(number)
+        window.flow.sync(window.filled[-1], False, False)
+        office.settle()
+        assert (office.silo.get_bom(number), office.sent) == (before, [])
+        assert "was edited since the comparison" in window.filled[-1].note
+        assert "was edited since the comparison" not in window.filled[0].note
+    office.silo.upload_file(number, top.FileName, "mine")
+    window.flow.sync(window.filled[-1], False, False)
+    office.settle()
+    assert [line.quantity for line in office.silo.get_bom(number)] == [5, 1]
+    assert len(office.sent) == 1
+
+
 def test_a_closed_document_is_reported_in_its_window(
     office: Office, flow: PreviewFlow, top: Document
 ) -> None:
-    """Comparing again, with Silo and with the 3D view, needs it; a sync of what is shown does not."""
+    """Comparing again, with Silo and with the 3D view, needs it, and so does a sync: its file may be another
+    one by now."""
     flow.start(top)
     office.settle()
     (window,) = office.desk.previews
     office.desk.open.remove(top)
     window.flow.again(window.path)
     window.flow.verify(window.filled[0])
+    window.flow.sync(window.filled[0], False, False)
+    office.settle()
     assert [str(error) for error in window.failed] == [
         "Top.FCStd is not open any more. Open it, then compare again."
-    ] * 2
+    ] * 3
+    assert office.sent == []
 
 
 def test_one_window_per_document(office: Office, flow: PreviewFlow, top: Document) -> None:

@@ -16,6 +16,7 @@ from silo.bom.errors import InputError
 from silo.bom.identity import META_KEY, identity_of
 from silo.bom.links import extract
 from silo.bom.model import Extraction
+from silo.bom.report import to_plain
 from silo.bom.roots import NAME_ONE, choose_assembly
 from silo.spelling import one_path
 from silo.workbench.words import plain, translate
@@ -45,6 +46,11 @@ class Snapshot:
     def is_assembly(self) -> bool:
         """True where there is a BOM to sync."""
         return self.extraction is not None
+
+    def is_as(self, other: Snapshot) -> bool:
+        """True where both are of one state: the same item, and the same BOM with all below it."""
+        mine, its = (one.extraction and to_plain(one.extraction) for one in (self, other))
+        return (self.path, self.identity, mine) == (other.path, other.identity, its)
 
 
 Walk = Callable[[Any], Extraction]

@@ -165,7 +165,7 @@ class PreviewDialog(QtWidgets.QDialog):  # type: ignore[misc]  # PySide has no t
         self._enable()
 
     def _problems(self, preview: Preview) -> str:
-        told = []
+        told = [preview.note] if preview.note else []
         if not preview.number:
             told.append(
                 translate("Silo", "This assembly has no Silo part number yet. Register it to sync its BOM.")

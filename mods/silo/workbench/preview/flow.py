@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from typing import Any, Protocol
 
 from silo.bom.errors import SiloError
@@ -101,12 +102,12 @@ class PreviewFlow:
         """The window of this document is gone."""
         self._open.pop(path, None)
 
-    def _ask(self, taken: Snapshot) -> None:
+    def _ask(self, taken: Snapshot, note: str = "") -> None:
         self._open[taken.path].busy()
 
         self._session.ask(
             translate("Silo", "Comparing with Silo"),
-            lambda client, control: ask(taken, client, control),
+            lambda client, control: replace(ask(taken, client, control), note=note),
             done=self._answered,
             failed=lambda error: self._with_dialog(taken.path, lambda dialog: dialog.fail(error)),
         )
@@ -151,10 +152,23 @@ class PreviewFlow:
             self.again(preview.snapshot.path)
 
     def sync(self, preview: Preview, below: bool, allow_missing: bool) -> None:
-        """Sync what is shown; ``below``: its sub-assemblies first; ``allow_missing``: with broken links."""
+        """Sync what is shown; ``below``: its sub-assemblies first; ``allow_missing``: with broken links.
+
+        A document that was edited since is compared again instead: its BOM and its file must be of one state.
+        """
+        path = preview.snapshot.path
+        now = self._taken_again(path)
+        if now is None:
+            return
+        if not now.is_as(preview.snapshot):
+            text = translate(
+                "Silo", "Nothing was synced: {name} was edited since the comparison. This is it now."
+            )
+            self._ask(now, text.replace("{name}", plain(now.label, 80)))
+            return
 
         def failed(error: SiloError) -> None:
-            self._with_dialog(preview.snapshot.path, lambda dialog: dialog.fail(error))
+            self._with_dialog(path, lambda dialog: dialog.fail(error))
 
         for taken in to_sync(preview, below=below):
             commit = commit_of(taken, key=new_key(), allow_missing=allow_missing)

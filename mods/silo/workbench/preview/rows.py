@@ -94,6 +94,8 @@ class Preview:
         what keeps the assembly from being synced.
     page
         address of the assembly's BOM on the server.
+    note
+        why it was made, where nobody asked for it.
     """
 
     snapshot: Snapshot
@@ -101,6 +103,7 @@ class Preview:
     names: Mapping[str, str] = field(default_factory=dict)
     broken: tuple[Finding, ...] = ()
     page: str = ""
+    note: str = ""
 
     @property
     def top(self) -> Compared:
