@@ -122,7 +122,8 @@ class Store(Origins):
         """Make the copy of a staged commit's file, from its second name rather than from ``source``.
 
         Where the disk does not take it, a commit with a second name stays and is tried again later. One
-        without is forgotten, and DocumentError says so. A file that was written since the commit is not sent.
+        without is forgotten, and DocumentError says so. With an OutboxError the commit stays. A file that
+        was written since the commit is not sent.
 
         ``origin`` replaces that of the commit: the commit before it may have been copied only now. Returns
         the file's SHA-256, "" where there is no copy of it.
@@ -142,7 +143,7 @@ class Store(Origins):
         # A copy that has its name is whole: only its row was not written any more.
         content = copy if copy.exists() else held or source
         if content is None:
-            text = "FreeCAD ended before its file was copied; commit it again, then discard this"
+            text = "its file was not copied in time; commit it again, then discard this"
             self.update(entry.id, state=State.HELD, reason=text)
             return
         try:

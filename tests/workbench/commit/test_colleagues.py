@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
 from hashlib import sha256
 from pathlib import Path
@@ -28,6 +29,7 @@ from silo.workbench.commit.plan import Plan, plan
 from silo.workbench.commit.theirs import Choice, Theirs, line_words
 from silo.workbench.pane.activity import Action, Do, Entry, Line, Tone
 from silo.workbench.pane.waiting import rows
+from silo.workbench.session.colleagues import Newer
 
 
 @pytest.fixture(name="flow")
@@ -129,6 +131,22 @@ def test_a_colleagues_commit_is_a_question_and_nothing_goes_without_a_choice(
     assert theirs.headline == "alice committed revision 2; yours was made from revision 1"
     assert office.files("Plate") == [b"one", b"one less"]
     assert Path(doc.FileName).read_bytes() == b"one"
+
+
+def test_a_notice_goes_once_the_server_has_nothing_newer(office: Office, flow: CommitFlow) -> None:
+    """An announced commit that a restore took away, also where FreeCAD never heard of the restore."""
+    doc = committed(office, flow, "Plate", b"one")
+    office.session._heard(doc.identity, Newer("M01-0001", 2, "alice", time.monotonic()))
+    edit(doc, b"two")
+    person = Person(office)
+    office.preferences.set("AskComment", False)
+    flow.start(doc)
+    assert (len(office.desk.asked), person.seen, office.session.shown.newer) == (1, {}, {})
+    office.settle()
+    edit(doc, b"three")
+    flow.start(doc)
+    office.settle()
+    assert (len(office.desk.asked), office.files("Plate")) == (1, [b"one", b"two", b"three"])
 
 
 def test_on_top_at_a_persons_word(office: Office, flow: CommitFlow) -> None:

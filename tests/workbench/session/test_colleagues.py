@@ -48,6 +48,18 @@ def test_a_restored_server_gives_our_number_to_a_colleague() -> None:
     assert known.newer == {ITEM: newer(4)}
 
 
+def test_what_is_announced_after_the_server_was_asked_stays() -> None:
+    """Its answer says nothing of that."""
+    known = Colleagues()
+    known.heard(ITEM, newer(4))
+    seen = known.newer
+    known.heard(ITEM, newer(2))
+    known.gone(seen, [ITEM])
+    assert known.newer == {ITEM: newer(2)}
+    known.gone(known.newer, [ITEM.upper(), "another"])
+    assert known.newer == {}
+
+
 STEPS = st.lists(st.sampled_from(["mine", "theirs", "run ends"]), max_size=12)
 
 

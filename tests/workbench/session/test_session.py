@@ -16,7 +16,8 @@ from server_testing import wait_until
 from silo.api.sse import RESET, ServerEvent
 from silo.bom.errors import SiloError, UnreachableError
 from silo.durable import stamp_of
-from silo.outbox.entry import UNKNOWN, Commit, State
+from silo.outbox.database import OutboxError
+from silo.outbox.entry import UNKNOWN, Commit, Entry, State
 from silo.outbox.send import send_all
 from silo.outbox.store import Store
 from silo.workbench.commit.opened import Base
@@ -56,6 +57,26 @@ def test_a_restored_server_that_counts_anew_gives_our_number_to_a_colleague(offi
             online._heard(event, online.address)
         office.gui.run_all()
         assert [one.who for one in office.session.shown.newer.values()] == names
+
+
+@pytest.mark.parametrize("kept", [0, 1, 2])
+def test_after_a_restore_a_colleagues_commit_that_is_gone_is_no_news(office: Office, kept: int) -> None:
+    """``kept``: so many of the two announced revisions are in the backup; 0: not even the item is."""
+    made = commit(office, "Bolt")
+    office.session.begin(live=False)
+    office.settle()
+    online = office.session._need_online()
+    for _ in range(kept):
+        office.silo.upload_file("M01-0001", made.path, "theirs")
+    if not kept:
+        office.silo.items.clear()
+    data = {"id": made.identity, "part_number": "M01-0001", "revision_number": 2, "user": "alice"}
+    online._heard(ServerEvent("9", "revision.created", data), online.address)
+    online._heard(ServerEvent(None, RESET, {}), online.address)
+    office.gui.run_all()
+    assert [one.revision for one in office.session.shown.newer.values()] == [2]
+    office.settle()
+    assert [one.revision for one in office.session.shown.newer.values()] == ([2] if kept == 2 else [])
 
 
 class SlowStore(Store):
@@ -98,6 +119,40 @@ def test_closing_waits_for_the_disk(office: Office, slow: SlowStore) -> None:
         (f"P{number}", State.WAITING) for number in range(12)
     ]
     assert slow.copies_made == 12
+
+
+class FullDisk(Store):
+    """A disk that takes the row of a commit, and then nothing more until there is room."""
+
+    room = False
+
+    def update(self, entry_id: int, **values: Any) -> None:
+        self._need_room()
+        super().update(entry_id, **values)
+
+    def entries(self) -> tuple[Entry, ...]:
+        self._need_room()
+        return super().entries()
+
+    def _need_room(self) -> None:
+        if not self.room:
+            raise OutboxError("the outbox cannot be used now (database or disk is full)")
+
+
+@pytest.mark.parametrize("hold", [True, False])
+def test_a_commit_that_a_full_disk_kept_is_not_reported_as_lost(office: Office, *, hold: bool) -> None:
+    """It is reported as kept, and goes by itself as soon as there is room."""
+    office.session.outbox = disk = FullDisk(office.session.outbox.path)
+    made = commit(office, "Bolt", hold=hold)
+    base = Base(made.path, stamp_of(made.path), UNKNOWN)
+    office.session.keep(made, failing, base)
+    office.settle()
+    assert base.origin == hashlib.sha256(b"content").hexdigest()  # the next commit is made from this one
+    assert any("Bolt: It is kept, and sent once the disk" in line for line in office.console)
+    disk.room = True
+    office.session.tick()
+    office.settle()
+    assert (office.files("Bolt"), office.session.shown.waiting) == ([b"content"], ())
 
 
 @pytest.mark.parametrize("hold", [True, False])

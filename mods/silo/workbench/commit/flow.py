@@ -146,6 +146,7 @@ class CommitFlow:
         if local:
             back(local)
         asked, documents = self._asked(planned), {row.path: row.document for row in planned.rows}
+        announced = self._session.shown.newer
 
         def question(client: Any, control: Any) -> dict[str, Theirs]:
             from silo.vault.revisions import top_of
@@ -156,10 +157,14 @@ class CommitFlow:
 
             return look(client, self._session.outbox, asked, mine, control.cancelled)
 
+        def done(found: dict[str, Theirs]) -> None:
+            self._session.no_news(announced, (one.identity for one in asked if one.path not in found))
+            back({**local, **found})
+
         self._session.ask(
             translate("Silo", "Looking for colleagues' commits"),
             question,
-            done=lambda found: back({**local, **found}),
+            done=done,
             failed=lambda _error: back(local),
         )
 

@@ -14,7 +14,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 from silo.bom.changes import Assembly, ThreeLines
-from silo.bom.errors import SiloError
+from silo.bom.errors import NotFoundError, RouteMissingError, SiloError
 from silo.bom.naming import display_name
 from silo.workbench.commit.opened import Base
 from silo.workbench.words import counted, plain, quantity, translate
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from silo.api.transport import Cancel
     from silo.outbox.entry import Entry
     from silo.outbox.store import Store
+    from silo.workbench.session.colleagues import Newer
 
 
 class Choice(StrEnum):
@@ -157,6 +158,23 @@ def look(
             with suppress(SiloError):  # the question stands without its details
                 lines = file.lines(client, stands, mine(one.path), cancelled)
             found[one.path] = file.theirs(stands, lines)
+    return found
+
+
+def gone(client: SiloClient, announced: Mapping[str, Newer]) -> list[str]:
+    """The items of which the server no longer has the announced commit. For a worker."""
+    from silo.api.revisions import newest_number
+
+    found = []
+    for identity, newer in announced.items():
+        try:
+            known = client.revisions(newer.part_number, newest=1)
+        except RouteMissingError:
+            continue
+        except NotFoundError:
+            known = []
+        if newest_number(known) < newer.revision:
+            found.append(identity)
     return found
 
 

@@ -39,6 +39,11 @@ class Colleagues:
         """The server counts anew, after a restore: by what we know of its numbers, nothing is ours."""
         self._mine.clear()
 
+    def gone(self, seen: Mapping[str, Newer], identities: Iterable[str]) -> None:
+        """The server has nothing newer of these items; what was announced after ``seen`` stays."""
+        stale = {one for one in map(str.lower, identities) if self.newer.get(one) is seen.get(one)}
+        self.newer = {key: one for key, one in self.newer.items() if key not in stale}
+
     def heard(self, identity: str, newer: Newer) -> None:
         """The server announced a commit."""
         if newer.revision <= self._mine.get(identity, 0):

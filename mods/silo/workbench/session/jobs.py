@@ -168,3 +168,28 @@ class Worker:
     def _tell(self, job: Job, detail: str, fraction: float | None) -> None:
         busy = Busy(job.title, detail, fraction, len(self._waiting))
         self._deliver(lambda: self._on_busy(busy))
+
+
+def in_gui(deliver: Deliver, call: Callable[[], Any], control: Control) -> Any:
+    """For a job: run ``call`` in the GUI thread and wait for what it gives or raises."""
+    finished = threading.Event()
+    result: list[Any] = []
+    problem: list[BaseException] = []
+
+    def run() -> None:
+        try:
+            result.append(call())
+        except BaseException as error:
+            problem.append(error)
+            if not isinstance(error, SiloError):
+                raise
+        finally:
+            finished.set()
+
+    deliver(run)
+    while not finished.wait(0.2):
+        # Whoever closes FreeCAD, or presses Stop, must not wait for the GUI thread to have time.
+        control.check()
+    if problem:
+        raise problem[0]
+    return result[0]

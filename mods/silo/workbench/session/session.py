@@ -8,19 +8,20 @@ come back through ``deliver``. No widgets here, and no FreeCAD, so that all of i
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from silo.bom.errors import ConfigError, SiloError
+from silo.outbox.database import OutboxError
 from silo.outbox.entry import Commit, State
 from silo.outbox.entry import Entry as Waiting
 from silo.outbox.store import Store
 from silo.workbench.pane.activity import Action, Entry
 from silo.workbench.session.colleagues import Colleagues, Newer
-from silo.workbench.session.jobs import Busy, Control, Deliver, Job, Worker
+from silo.workbench.session.jobs import Busy, Control, Deliver, Job, Worker, in_gui
 from silo.workbench.session.shown import Listener, Shown
 from silo.workbench.settings.server import Known, Server, TokenStore
 from silo.workbench.words import translate
@@ -73,6 +74,8 @@ class Session:
         self._live = False
         self._colleagues = Colleagues()
         self._comparing = False
+        # Something was kept since the outbox was last read; on a full disk it cannot be read.
+        self._owed = False
 
     # -- the server -------------------------------------------------------------------------------------
 
@@ -136,22 +139,22 @@ class Session:
         title = translate("Silo", "Keeping the commit")
         self._colleagues.sending(commit.identity)
 
+        self._owed = True
+
         def finish(_control: Control) -> None:
-            made_from = base.origin if base is not None and commit.origin else ""
-            content = self.outbox.finish(commit.key, commit.file, made_from)
+            made_from, content = base.origin if base is not None and commit.origin else "", ""
+            try:
+                content = self.outbox.finish(commit.key, commit.file, made_from)
+            except (OutboxError, OSError) as error:
+                text = translate("Silo", "It is kept, and sent once the disk takes a copy of its file.")
+                told = SiloError(f"{commit.label or commit.path}: {text} {error}")  # its row is on disk
+                self._deliver(lambda: self.problem(told))
             if base is not None:
                 base.committed(content)
 
         def stage(_control: Control) -> None:
             self.outbox.stage(commit, self._online.address if self._online is not None else "")
-            self._disk.submit(
-                Job(
-                    title,
-                    finish,
-                    done=lambda _kept: self.send(force=True),
-                    failed=failed,
-                )
-            )
+            self._disk.submit(Job(title, finish, done=lambda _kept: self.send(force=True), failed=failed))
 
         self._rows.submit(Job(title, stage, failed=failed))
 
@@ -195,8 +198,23 @@ class Session:
     def _heard(self, identity: str, newer: Newer | None) -> None:
         if newer is None:
             self._colleagues.anew()
+            self._look_again()
             return
         self._colleagues.heard(identity, newer)
+        self._show(newer=self._colleagues.newer)
+
+    def _look_again(self) -> None:
+        """After a restore of the server, a colleague's commit that was announced may be gone."""
+        if seen := self.shown.newer:
+            from silo.workbench.commit.theirs import gone  # late, as all that a start does not need
+
+            title = translate("Silo", "Looking for colleagues' commits")
+            done = partial(self.no_news, seen)
+            self.ask(title, lambda client, _control: gone(client, seen), done, lambda _error: None)
+
+    def no_news(self, seen: Mapping[str, Newer], identities: Iterable[str]) -> None:
+        """The server has nothing newer of these items; ``seen``: what was shown when it was asked."""
+        self._colleagues.gone(seen, identities)
         self._show(newer=self._colleagues.newer)
 
     def _arrived(self, sent: Sent, lines: tuple[str, ...]) -> None:
@@ -209,7 +227,7 @@ class Session:
 
     def tick(self) -> None:
         """Called now and then: what waits is tried again when its time has come."""
-        if self.shown.waiting and self._net.idle:
+        if (self.shown.waiting or self._owed) and self._net.idle:
             self.send(force=False)
 
     def retry(self, entry_id: int) -> None:
@@ -257,6 +275,7 @@ class Session:
         """Show what waits; a worker finds out what the colleagues changed for whom commits are held."""
         asked = {entry.id: entry for entry in waiting if entry.newer and entry.path}
         known = {number: found for number, found in self.shown.theirs.items() if number in asked}
+        self._owed = False
         self._show(waiting=waiting, theirs=known, **more)
         left = [entry for number, entry in asked.items() if number not in known]
         if not left or self._comparing:
@@ -319,27 +338,7 @@ class Session:
 
     def in_gui(self, call: Callable[[], Any], control: Control) -> Any:
         """For a job: run ``call`` in the GUI thread and wait for what it gives or raises."""
-        finished = threading.Event()
-        result: list[Any] = []
-        problem: list[BaseException] = []
-
-        def run() -> None:
-            try:
-                result.append(call())
-            except BaseException as error:
-                problem.append(error)
-                if not isinstance(error, SiloError):
-                    raise
-            finally:
-                finished.set()
-
-        self._deliver(run)
-        while not finished.wait(0.2):
-            # Whoever closes FreeCAD, or presses Stop, must not wait for the GUI thread to have time.
-            control.check()
-        if problem:
-            raise problem[0]
-        return result[0]
+        return in_gui(self._deliver, call, control)
 
     def cancel(self) -> None:
         """Stop what the network worker is doing."""
@@ -384,11 +383,10 @@ class Session:
 
     def problem(self, error: SiloError) -> None:
         """Show a problem that belongs to nothing else that is shown."""
-        if error.code == "bad_config":
+        if error.code != "cancelled":
             self._show(reason=str(error))
-        elif error.code != "cancelled":
-            self._show(reason=str(error))
-            self._listener.console(f"[Silo] {error}")
+            if error.code != "bad_config":
+                self._listener.console(f"[Silo] {error}")
 
     def _show(self, **changes: Any) -> None:
         shown = replace(self.shown, **changes)
