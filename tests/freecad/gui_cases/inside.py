@@ -124,7 +124,20 @@ def addon() -> Any:
 
 
 def settled() -> bool:
-    """Nothing is under way any more."""
+    """Nothing is under way any more, and what the workers have handed over is done and shown.
+
+    What they handed over may begin the next step, as the copy of a commit is followed by its sending; so one
+    look at workers without work is not enough.
+    """
+    for _ in range(3):
+        if not at_rest():
+            return False
+        QtWidgets.QApplication.processEvents()
+    return at_rest()
+
+
+def at_rest() -> bool:
+    """No worker has anything to do at this moment."""
     one = addon()
     return bool(one.session.idle and not one.commits.running and one.session.shown.busy is None)
 

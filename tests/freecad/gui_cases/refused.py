@@ -42,6 +42,11 @@ def held(one: Any) -> bool:
     return any(w.state.value == "held" for w in one.session.shown.waiting)
 
 
+def attempts(one: Any) -> int:
+    """How often the commits that wait were tried: a refusal may be back before anybody saw one on its way."""
+    return sum(w.attempts for w in one.session.shown.waiting)
+
+
 def refused(one: Any, gearbox: Any, other: Any) -> None:
     """The server knows the top below the gearbox, so the gearbox in the top would be a ring."""
     commit(gearbox.Document)
@@ -56,9 +61,9 @@ def refused(one: Any, gearbox: Any, other: Any) -> None:
     tell(still=waiting(one))
 
     # Tried again too early: it stays. Mended on the server: it goes.
+    tried = attempts(one)
     press_soon(one.dock, "Retry")
-    wait(lambda: not held(one))
-    wait(lambda: settled() and held(one))
+    wait(lambda: attempts(one) > tried and held(one) and settled())
     ask("mend")
     press_soon(one.dock, "Retry")
     wait(lambda: settled() and not waiting(one))

@@ -138,6 +138,25 @@ def test_an_equal_job_that_waits_already_is_not_queued_twice(worker: Worker, gui
     assert worker.idle
 
 
+@pytest.mark.parametrize("refused", [False, True])
+def test_a_worker_is_idle_once_the_end_of_its_job_was_handed_over(refused: bool) -> None:
+    """Not before: who waits for it to be idle, and for an empty queue of calls, would miss that end."""
+    idle: list[bool] = []
+    worker = Worker("test", lambda call: call())
+
+    def run(_control: Control) -> None:
+        if refused:
+            raise InputError("no")
+
+    def end(_what: object) -> None:
+        idle.append(worker.idle)
+
+    worker.submit(Job("one", run, done=end, failed=end))
+    assert worker.left(WAIT_S) == 0
+    assert idle == [False]
+    assert worker.close(WAIT_S)
+
+
 def test_after_close_nothing_is_taken(worker: Worker) -> None:
     """And closing twice, or before the first job, is harmless."""
     assert worker.close()

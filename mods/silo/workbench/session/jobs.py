@@ -130,7 +130,7 @@ class Worker:
 
     @property
     def idle(self) -> bool:
-        """True where nothing runs and nothing waits."""
+        """True where nothing runs and nothing waits, and the end of each job was handed to ``deliver``."""
         return not self.left()
 
     def _next(self) -> tuple[Job, Control] | None:
@@ -143,17 +143,16 @@ class Worker:
         while (queued := self._next()) is not None:
             self._tell(queued[0], "", None)
             with collection_off():
-                end = self._finish(*queued)
+                # Handed over before the worker counts as idle: whoever waits for that must not miss it.
+                self._deliver(self._finish(*queued))
             with self._change:
                 self._current = None
                 left = len(self._waiting)
                 self._change.notify_all()
-            if end is not None:
-                self._deliver(end)
             if not left:
                 self._deliver(lambda: self._on_busy(None))
 
-    def _finish(self, job: Job, control: Control) -> Callable[[], None] | None:
+    def _finish(self, job: Job, control: Control) -> Callable[[], None]:
         try:
             result = job.run(control)
         except SiloError as error:
