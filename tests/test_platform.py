@@ -16,7 +16,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from silo.bom.paths import relative
+from silo.bom.document import relative
 from silo.platform import (
     child_options,
     copy_rights,

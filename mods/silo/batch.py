@@ -16,10 +16,10 @@ from typing import Any
 
 from silo.api.wire import SourceDocument
 from silo.bom.diff import diff_findings
+from silo.bom.document import relative
 from silo.bom.errors import SiloError
 from silo.bom.findings import Finding
 from silo.bom.model import BomEntry, Extraction
-from silo.bom.paths import relative
 from silo.bom.report import base_of, diff_json, entry_json, finding_json, project_folder
 from silo.bom_sync import (
     Outcome,

@@ -31,6 +31,7 @@ from silo.api.wire import (
     SourceDocument,
 )
 from silo.bom.diff import diff_bom
+from silo.bom.document import relative
 from silo.bom.errors import SiloError
 from silo.bom.findings import Finding, FindingCode, Severity
 from silo.bom.identity import walk_entries
@@ -38,7 +39,6 @@ from silo.bom.left_out import LeftOut, components_of, left_out_of
 from silo.bom.links import extract, extract_bom_links
 from silo.bom.merge import MergePlan, plan_merge
 from silo.bom.model import BomDiff, BomEntry, Extraction
-from silo.bom.paths import relative
 from silo.bom.resolve import (
     ItemLookup,
     Known,

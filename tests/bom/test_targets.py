@@ -9,9 +9,8 @@ import pytest
 from fakes import Doc, edit
 
 from silo.bom import FindingCode, Severity, extract
-from silo.bom.document import LinkProblem
+from silo.bom.document import LinkProblem, located, split_sub_name
 from silo.bom.findings import Finding
-from silo.bom.paths import located, split_sub_name
 from silo.bom.walk.targets import resolve_target
 
 

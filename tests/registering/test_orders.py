@@ -8,12 +8,12 @@ from pathlib import Path
 from fcstd_writer import part
 
 from silo.api.wire import Item
-from silo.bom.declare import Modelled
 from silo.bom.errors import RejectedError
 from silo.bom.model import BomEntry
 from silo.bom.naming import propose
 from silo.registering.items import Registration
 from silo.registering.journal import Journal
+from silo.registering.modelled import Modelled
 from silo.registering.offer import Candidate, State
 from silo.registering.orders import Order, carry_out
 from silo.testing import FakeSilo

@@ -16,10 +16,10 @@ from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
 
+from silo.bom.document import relative
 from silo.bom.findings import Finding
 from silo.bom.model import BomEntry
 from silo.bom.naming import display_name
-from silo.bom.paths import relative
 from silo.bom.report import shorten
 from silo.bom.walk.standard import STANDARD_PARTS
 

@@ -15,12 +15,12 @@ from dataclasses import MISSING, fields
 from types import ModuleType
 from typing import Any
 
+from silo.bom.document import relative
 from silo.bom.errors import InputError
 from silo.bom.findings import Finding, FindingCode, Place, Severity
 from silo.bom.identity import walk_entries
 from silo.bom.model import BomDiff, BomEntry, Extraction, rows_as_dicts
 from silo.bom.naming import display_name
-from silo.bom.paths import relative
 
 # A CAD model counts pieces.
 PIECES = "pcs"

@@ -9,10 +9,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from silo.batch import ask_for_moved
+from silo.bom.document import relative
 from silo.bom.errors import DocumentError, Exit, InputError, SiloError, did_you_mean
 from silo.bom.identity import walk_entries
 from silo.bom.model import BomEntry, Extraction
-from silo.bom.paths import relative
 from silo.bom.report import base_of, bom_json, flat_json
 from silo.bom.resolve import consolidation_findings
 from silo.bom_sync import resolve

@@ -12,10 +12,10 @@ from typing import Any, Literal
 from silo.batch import suggest_by_identity
 from silo.bom.changes import AssemblyChange, LineChange, changes_json, compare_assemblies
 from silo.bom.diff import diff_findings
+from silo.bom.document import relative
 from silo.bom.errors import Exit, InputError
 from silo.bom.model import BomDiff, BomEntry
 from silo.bom.naming import display_name
-from silo.bom.paths import relative
 from silo.bom.report import base_of, diff_json, finding_json, shorten
 from silo.bom_sync import Resolved, assemblies, blocking, names_of, resolve, server_lines
 from silo.cli import common

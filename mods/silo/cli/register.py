@@ -16,11 +16,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from silo.bom.document import relative
 from silo.bom.errors import ConflictError, DocumentError, Exit, InputError
 from silo.bom.identity import walk_entries
 from silo.bom.model import Extraction
 from silo.bom.naming import Proposal, propose
-from silo.bom.paths import relative
 from silo.bom.report import base_of
 from silo.cli import common
 from silo.cli.common import Commands

@@ -12,8 +12,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
+from silo.bom.document import relative
 from silo.bom.errors import InputError, SiloError
-from silo.bom.paths import relative
 from silo.cli.show import plain
 from silo.registering.offer import ITEM_TYPES, Candidate, Offer, State
 from silo.registering.orders import Order

@@ -17,15 +17,15 @@ from rich.tree import Tree
 from silo.activity import ActivityText
 from silo.api.merging import unusual
 from silo.batch_report import STATUS_WORDS
-from silo.bom.declare import Modelled
+from silo.bom.document import relative
 from silo.bom.findings import Finding, Severity
 from silo.bom.model import BomDiff, BomEntry, Extraction
 from silo.bom.naming import Proposal, display_name
-from silo.bom.paths import relative
 from silo.bom.report import base_of, diff_rows, shorten
 from silo.bom_sync import Outcome, Status
 from silo.cli import common
 from silo.registering.items import Registration
+from silo.registering.modelled import Modelled
 
 _MARK = {
     Severity.ERROR: ("✗", "bold red"),

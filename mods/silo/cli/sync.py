@@ -268,7 +268,7 @@ def _show_summary(summary: Summary) -> None:
 
 def moved(before: dict[str, set[str]], now: set[tuple[str, str]], base: str) -> list[tuple[str, str, str]]:
     """Files that carry on the identity of one that is gone or another item's by now: (name, before, now)."""
-    from silo.bom.paths import relative
+    from silo.bom.document import relative
 
     here: dict[str, set[str]] = {}
     for uuid, path in now:

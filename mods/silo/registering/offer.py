@@ -16,7 +16,6 @@ from enum import StrEnum
 from typing import Any, Protocol
 
 from silo.api.revisions import other_name
-from silo.bom.declare import Modelled
 from silo.bom.errors import CancelledError, NotFoundError, ServerFaultError, SiloError
 from silo.bom.findings import FindingCode
 from silo.bom.identity import meta_key, walk_entries
@@ -24,7 +23,7 @@ from silo.bom.model import BomEntry, Extraction
 from silo.bom.naming import Proposal, propose, propose_all
 from silo.files import content_hash
 from silo.registering.items import component_key
-from silo.registering.modelled import modelled
+from silo.registering.modelled import Modelled, modelled
 
 ITEM_TYPES = ("part", "assembly", "consumable", "tool")
 # Servers without a request for many are asked for each; beyond this many nobody reads them in a dialog.

@@ -11,13 +11,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from silo.bom.declare import Modelled
 from silo.bom.errors import SiloError
 from silo.bom.model import BomEntry
 from silo.bom.naming import Proposal, proposed_category
 from silo.registering.items import Registration, RegistrationApi, register, register_standard, unclear
 from silo.registering.journal import Journal
-from silo.registering.modelled import source_identity
+from silo.registering.modelled import Modelled, source_identity
 from silo.registering.offer import Candidate, Control, Similar
 
 

@@ -15,9 +15,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from silo.bom.document import relative
 from silo.bom.errors import InputError, NotFoundError
 from silo.bom.headers import plain_cell, safe_cell
-from silo.bom.paths import relative
 from silo.registering.offer import ITEM_TYPES, Candidate, Offer, Similar, State, fingerprint
 from silo.registering.orders import Order
 

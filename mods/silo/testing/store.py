@@ -24,7 +24,7 @@ from silo.api.wire import (
 )
 from silo.bom.errors import CycleError, NewerRevisionError, NotFoundError, ReadOnlyError, RejectedError
 from silo.bom.left_out import Reason, remembered
-from silo.bom.undoing import base_of, would_undo
+from silo.bom.merge import base_of, would_undo
 
 CATEGORIES = {
     "A01": "Mechanical assembly",

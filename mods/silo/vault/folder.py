@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from silo.bom.changes import Assembly
+from silo.bom.document import relative
 from silo.bom.errors import InputError, SiloError
 from silo.bom.findings import Finding, Severity
 from silo.bom.links import extract
 from silo.bom.model import BomEntry, Extraction
-from silo.bom.paths import relative
 from silo.bom.roots import choose_assembly, find_assemblies
 from silo.fcstd import Library
 from silo.files import documents_in

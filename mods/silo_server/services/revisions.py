@@ -11,7 +11,7 @@ from typing import Any
 from sqlalchemy import Row, func, insert, select, update
 
 from silo.bom.errors import ConflictError, NewerRevisionError, NotFoundError
-from silo.bom.undoing import base_of, would_undo
+from silo.bom.merge import base_of, would_undo
 from silo_server.db.engine import Tx
 from silo_server.db.tables import items, revisions
 from silo_server.json_values import check_json, dumps
@@ -114,7 +114,7 @@ def _check_base(tx: Tx, item: Item, base: int | None, checksum: str | None) -> N
 
 def check_document(tx: Tx, item: Item, base: int | None, checksum: str | None) -> None:
     """Raise :class:`NewerRevisionError` where a BOM is that of an older file and would undo the newest one's,
-    :class:`MissingRevisionError` where its file is not here (:func:`silo.bom.undoing.base_of`)."""
+    :class:`MissingRevisionError` where its file is not here (:func:`silo.bom.merge.base_of`)."""
     same = select(func.max(revisions.c.revision_number)).where(
         revisions.c.item_id == item.id, revisions.c.file_checksum == checksum
     )

@@ -11,9 +11,17 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from silo.bom.document import LinkProblem, derived, object_name, own, same_document
+from silo.bom.document import (
+    LinkProblem,
+    derived,
+    is_element_name,
+    located,
+    object_name,
+    own,
+    same_document,
+    split_sub_name,
+)
 from silo.bom.findings import FindingCode
-from silo.bom.paths import is_element_name, located, split_sub_name
 from silo.bom.walk.arrays import array_count, elements
 
 Inspect = Callable[[Any], "LinkProblem | None"]

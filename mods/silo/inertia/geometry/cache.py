@@ -20,8 +20,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from silo.bom.document import relative
 from silo.bom.errors import InputError
-from silo.bom.paths import relative
 from silo.durable import remove_patiently, replacing
 from silo.files import content_hash
 from silo.folders import cache_folder

@@ -5,10 +5,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from silo.bom.document import LinkProblem
+from silo.bom.document import LinkProblem, located
 from silo.bom.errors import DocumentError
 from silo.bom.findings import Finding
-from silo.bom.paths import located
 from silo.workbench.freecad import host, live, saving
 
 

@@ -12,10 +12,10 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
+from silo.bom.document import relative
 from silo.bom.findings import Finding, FindingCode, Severity
 from silo.bom.model import BomDiff, BomEntry, Extraction
 from silo.bom.naming import display_name
-from silo.bom.paths import relative
 from silo.bom.report import shorten
 from silo.workbench.commit.snapshot import Snapshot
 from silo.workbench.session.jobs import Control

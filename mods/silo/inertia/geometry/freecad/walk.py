@@ -21,10 +21,9 @@ from typing import Any
 
 import numpy as np
 
-from silo.bom.document import derived, label_of, object_name, own, same_document
+from silo.bom.document import derived, label_of, object_name, own, relative, same_document
 from silo.bom.model import BomEntry
 from silo.bom.naming import display_name
-from silo.bom.paths import relative
 from silo.bom.roots import loose_hardware, silent_reader
 from silo.bom.walk.contents import Reader
 from silo.bom.walk.kinds import REPEATERS, Kind, is_container, is_named_assembly, kind_of, sources
