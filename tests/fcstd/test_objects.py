@@ -15,7 +15,7 @@ from fcstd_writer import Doc, Raw, Vector, XLink, container, locals_, part
 from silo.bom.document import DocumentLike, ObjectLike, document_property, own
 from silo.bom.errors import DocumentError
 from silo.fcstd import FcstdObject, Library, open_document
-from silo.fcstd.typetree import PARENTS, ancestors
+from silo.fcstd.objects import PARENTS, ancestors
 
 
 def read(folder: Path, **values: Any) -> FcstdObject:

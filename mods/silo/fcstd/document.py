@@ -18,9 +18,8 @@ from silo.bom.walk.kinds import Kind, Survey, kind_by_type, kind_of
 from silo.fcstd.container import ContainerFile, Entry, Inflater
 from silo.fcstd.limits import FcstdError
 from silo.fcstd.locate import Found
-from silo.fcstd.objects import FcstdObject
+from silo.fcstd.objects import FcstdObject, ancestors, is_listed
 from silo.fcstd.properties import Properties, table_of
-from silo.fcstd.typetree import ancestors, is_listed
 from silo.fcstd.values import ABSENT, LocalList, Ref, Vector
 from silo.fcstd.xmltext import XmlText
 
