@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from silo.durable import private_file, private_folder, replacing
+from silo.durable import private_file, private_folder, read_memory, replacing, write_memory
 
 
 @pytest.mark.parametrize("before", [None, b"old"])
@@ -78,3 +78,23 @@ def test_what_is_private_is_closed_also_where_it_was_open(tmp_path: Path) -> Non
             private_file(file)
             assert (folder.stat().st_mode & 0o777, file.stat().st_mode & 0o777) == (0o700, 0o600)
     assert (tmp_path / "old" / "old.db").read_text() == "kept"
+
+
+@pytest.mark.parametrize("content", [b"", b"{", b"\xff\xfe", b"[1]", b'"text"', b"[" * 100_000])
+def test_a_damaged_memory_is_empty(tmp_path: Path, content: bytes) -> None:
+    """Losing it costs a question, so it never keeps anybody from work; the next one is whole again."""
+    path = tmp_path / "not there yet" / "memory.json"
+    assert read_memory(path) == {}
+    write_memory(path, {"a": 1})
+    assert read_memory(path) == {"a": 1}
+    path.write_bytes(content)
+    assert read_memory(path) == {}
+    write_memory(path, {"a": 2})
+    assert read_memory(path) == {"a": 2}
+
+
+def test_a_memory_that_cannot_be_written_keeps_what_it_was(tmp_path: Path) -> None:
+    """The reason is given back, for those who report it."""
+    (tmp_path / "a file").write_text("kept")
+    assert isinstance(write_memory(tmp_path / "a file" / "memory.json", {}), OSError)
+    assert (tmp_path / "a file").read_text() == "kept"

@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
+import json
 import os
 import stat
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from silo.platform import patiently, sync_folder
 
@@ -17,11 +18,13 @@ __all__ = [
     "Stamp",
     "private_file",
     "private_folder",
+    "read_memory",
     "remove_patiently",
     "replace_patiently",
     "replacing",
     "stamp_of",
     "sync_folder",
+    "write_memory",
 ]
 
 Stamp = tuple[int, int, int]
@@ -51,6 +54,29 @@ def replacing(path: Path | str, *, mode: int | None = None) -> Iterator[BinaryIO
             remove_patiently(temporary)
         raise
     sync_folder(target.parent)
+
+
+def read_memory(path: Path) -> dict[str, Any]:
+    """What a small JSON file remembers; {} where it is not there, damaged, or no JSON object.
+
+    For files whose loss costs a repeated question and never an answer.
+    """
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return data if isinstance(data, dict) else {}
+
+
+def write_memory(path: Path, content: Mapping[str, Any]) -> OSError | None:
+    """Write what :func:`read_memory` reads, for its owner only. The error where that is not possible."""
+    try:
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        with replacing(path) as file:
+            file.write(json.dumps(content, indent=1, sort_keys=True).encode())
+    except OSError as error:
+        return error
+    return None
 
 
 def replace_patiently(source: Path | str, target: Path | str) -> None:

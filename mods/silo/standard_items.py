@@ -8,7 +8,6 @@ an item whose description is exactly the designation; which one it is, is rememb
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ from typing import Any
 from silo.bom.errors import SiloError
 from silo.bom.identity import walk_entries
 from silo.bom.model import BomEntry
-from silo.durable import private_folder, replacing
+from silo.durable import read_memory, write_memory
 from silo.folders import data_folder
 
 # Each costs a request, and only while nobody has registered the part.
@@ -34,24 +33,15 @@ class Memory:
         return self._read().get(server, {})
 
     def remember(self, server: str, found: Mapping[str, str]) -> None:
-        """Keep what was found or made."""
+        """Keep what was found or made; what cannot be written costs a search."""
         servers = self._read()
         before = servers.get(server, {})
         if found.items() <= before.items():
             return
-        servers[server] = {**before, **found}
-        private_folder(self.path.parent)
-        with replacing(self.path) as file:
-            file.write(json.dumps(servers, indent=1, sort_keys=True).encode())
+        write_memory(self.path, {**servers, server: {**before, **found}})
 
     def _read(self) -> dict[str, dict[str, str]]:
-        try:
-            data = json.loads(self.path.read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            return {}
-        if not isinstance(data, dict):
-            return {}
-        return {str(server): dict(known) for server, known in data.items() if isinstance(known, dict)}
+        return {server: known for server, known in read_memory(self.path).items() if isinstance(known, dict)}
 
 
 def find_items(

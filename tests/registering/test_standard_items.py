@@ -132,3 +132,15 @@ def test_a_memory_that_cannot_be_read_costs_a_search_only(memory: Memory) -> Non
     silo.create_item("", "", SCREW)
     assert find_items([screw()], {}, silo, memory)
     assert memory.known(silo.base_url) == {standard_uuid(SCREW): "own-1"}
+
+
+@pytest.mark.parametrize("place", ["a file/memory.json", "a folder"])
+def test_a_memory_that_cannot_be_written_costs_a_search_only(tmp_path: Path, place: str) -> None:
+    """A full disk, or a home that nobody may write: the item is made, and its run does not fail."""
+    (tmp_path / "a file").touch()
+    (tmp_path / "a folder").mkdir()
+    silo, memory = Stubborn(), Memory(tmp_path / place)
+    made = register_standard(proposal(), silo, schema="kindred-rd", memory=memory)
+    assert (made.error, made.part_number) == (None, "F01-0001")
+    assert find_items([screw()], {}, silo, memory)
+    assert silo.searches == 2

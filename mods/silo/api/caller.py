@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import re
 import time
@@ -18,7 +17,7 @@ from silo.api.address import ServerAddress
 from silo.api.replies import Reply
 from silo.api.transport import Call, Cancel, Transport, as_json, stop_if
 from silo.bom.errors import BusyError, ForbiddenError, InputError, NotFoundError, ReadOnlyError, RejectedError
-from silo.durable import replacing
+from silo.durable import read_memory, write_memory
 from silo.folders import cache_folder
 
 log = logging.getLogger("silo.api")
@@ -65,7 +64,7 @@ def abilities_path() -> Path:
 def load_abilities(path: Path, server: str, *, clock: Callable[[], float] = time.time) -> Abilities:
     """What is known of a server; nothing where that is older than a day."""
     try:
-        known = _Kept.model_validate(_read_memory(path).get(server), strict=True)
+        known = _Kept.model_validate(read_memory(path).get(server), strict=True)
     except ValidationError:
         return Abilities()
     fresh = 0 <= clock() - known.learned_at < KEPT_S
@@ -79,21 +78,9 @@ def save_abilities(
 
     It is only a memory: a file that is lost, old or damaged costs some requests, never an answer.
     """
-    content = {**_read_memory(path), server: {**known.model_dump(), "learned_at": clock()}}
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with replacing(path) as file:
-            file.write(json.dumps(content, indent=1).encode())
-    except OSError as error:
+    content = {**read_memory(path), server: {**known.model_dump(), "learned_at": clock()}}
+    if (error := write_memory(path, content)) is not None:
         log.info("%s: what was learned about %s is not kept (%s)", path, server, error)
-
-
-def _read_memory(path: Path) -> dict[str, Any]:
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return data if isinstance(data, dict) else {}
 
 
 T = TypeVar("T")

@@ -59,6 +59,14 @@ class FileState(NamedTuple):
         """From ``os.stat`` or ``os.fstat``."""
         return cls(status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)
 
+    @classmethod
+    def now(cls, path: str) -> FileState | None:
+        """That of a file as it is now; None where it cannot be looked at."""
+        try:
+            return cls.of(os.stat(path))
+        except OSError:
+            return None
+
 
 class Entry(NamedTuple):
     """One file in the container, as the central directory has it. ``offset`` counts from the file's begin."""

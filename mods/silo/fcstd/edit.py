@@ -188,7 +188,7 @@ def _write(path: str, state: FileState, content: Iterable[Piece], check: Callabl
             copy_rights(path, temporary)
             os.fsync(file.fileno())
         check(temporary)
-        if _state(path) != state:
+        if FileState.now(path) != state:
             raise changed(path)
         patiently(lambda: swap(temporary, path))
     except BaseException:
@@ -212,10 +212,3 @@ def _put(path: str, content: Iterable[Piece], file: BinaryIO) -> None:
                     raise changed(path)
                 file.write(block)
                 left -= len(block)
-
-
-def _state(path: str) -> FileState | None:
-    try:
-        return FileState.of(os.stat(path))
-    except OSError:
-        return None

@@ -242,7 +242,7 @@ class Library:
                 return FcstdDocument(self, found, self._contents.read(found.real))
             except FcstdError as error:
                 # FreeCAD may just be writing it; if nobody is, a second look is the same as the first.
-                if error.state is None or error.state == _state(found.real):
+                if error.state is None or error.state == FileState.now(found.real):
                     raise
                 return FcstdDocument(self, found, self._contents.read(found.real))
         except FcstdError as error:
@@ -254,13 +254,6 @@ class Library:
         note = f"{owner.FileName} records {ref.file}; taken was {name}, {differs}"
         if note not in self.notes:
             self.notes.append(note)
-
-
-def _state(path: str) -> FileState | None:
-    try:
-        return FileState.of(os.stat(path))
-    except OSError:
-        return None
 
 
 def open_document(

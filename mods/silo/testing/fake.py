@@ -9,8 +9,7 @@ method's name around each change: raise there what the network or a crash would 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from datetime import datetime
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 from uuid import UUID, uuid4
@@ -59,11 +58,6 @@ from silo.testing.store import (
 
 class FakeSilo(FakeStore):
     """A Silo in memory. ``items`` and ``log`` may be looked at; :meth:`set_mode` makes it read-only."""
-
-    def __init__(
-        self, base_url: str = "http://silo.invalid", *, clock: Callable[[], datetime] | None = None
-    ) -> None:
-        super().__init__(base_url, clock)
 
     def __enter__(self) -> Self:
         return self

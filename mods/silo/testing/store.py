@@ -82,7 +82,9 @@ class FakeStore:
 
     user = "designer"
 
-    def __init__(self, base_url: str, clock: Callable[[], datetime] | None) -> None:
+    def __init__(
+        self, base_url: str = "http://silo.invalid", *, clock: Callable[[], datetime] | None = None
+    ) -> None:
         self.base_url = base_url
         self.mode = "normal"
         self.before: Callable[[str], None] = _nothing

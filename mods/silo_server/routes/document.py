@@ -128,7 +128,7 @@ _MERGE: dict[str, dict[str, Schema]] = {
         "child_part_number": {
             "type": "string",
             "maxLength": 200,
-            "pattern": "^[^\\u0000]*[^\\s\\u0000][^\\u0000]*$",
+            "pattern": _NOT_BLANK,
         },
         "quantity": {"type": "number", "exclusiveMinimum": 0, "maximum": LARGEST_QUANTITY},
         "source": {"description": "not read: the entries are an assembly's"},

@@ -6,7 +6,6 @@ One small JSON file in the user's data folder. Losing it costs a repeated questi
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +13,7 @@ from pathlib import Path
 from silo.bom.findings import Finding, FindingCode
 from silo.bom.identity import walk_entries
 from silo.bom.model import Extraction
-from silo.durable import replacing
+from silo.durable import read_memory, write_memory
 from silo.folders import data_folder
 
 
@@ -28,7 +27,7 @@ class Decisions:
         """These files are the same part, says a person."""
         known = self._read()
         known[identity.lower()] = sorted({*known.get(identity.lower(), ()), *files})
-        self._write(known)
+        write_memory(self._path, known)
 
     def without_accepted(self, extraction: Extraction) -> Extraction:
         """The extraction without the copied-identity findings that a person has accepted."""
@@ -51,18 +50,5 @@ class Decisions:
         return replace(extraction, findings=kept)
 
     def _read(self) -> dict[str, list[str]]:
-        try:
-            data = json.loads(self._path.read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            return {}
-        if not isinstance(data, dict):
-            return {}
-        return {str(k): [str(f) for f in v] for k, v in data.items() if isinstance(v, list)}
-
-    def _write(self, known: dict[str, list[str]]) -> None:
-        try:
-            self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            with replacing(self._path) as file:
-                file.write(json.dumps(known, indent=1).encode())
-        except OSError:
-            return
+        known = read_memory(self._path)
+        return {key: [str(file) for file in files] for key, files in known.items() if isinstance(files, list)}

@@ -14,6 +14,7 @@ from silo.api.config import resolve_server
 from silo.api.events import ConnectionState, EventListener
 from silo.api.sse import RESET, ServerEvent
 from silo.bom.errors import ConfigError
+from silo.durable import read_memory
 from silo.outbox.entry import Entry as Waiting
 from silo.outbox.report import Report, Sent
 from silo.outbox.send import send_all
@@ -193,8 +194,4 @@ class LastIds:
             return
 
     def _read(self) -> dict[str, str]:
-        try:
-            data = json.loads(self._path.read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            return {}
-        return {str(k): str(v) for k, v in data.items()} if isinstance(data, dict) else {}
+        return {url: str(event_id) for url, event_id in read_memory(self._path).items()}
