@@ -107,6 +107,7 @@ def test_which_options_exclude_another() -> None:
         *(("sync", "--via", option) for option in reading),
         *(("register", "--undeclare", option) for option in ("--declare", "--category")),
         ("register", "--apply", "--category"),
+        *(("mass", "--via", option) for option in ("--mesh-unit", "--jobs", "--no-siblings", "--no-cache")),
         *(("restore", "--verify", option) for option in ("--replace", "--database", "--files")),
     }
 
@@ -130,6 +131,8 @@ def test_which_options_need_another() -> None:
             for command in weighing
             for option in ("--dry-run", "--item", "--server", "--token")
         ),
+        ("mass", "--push", "--index"),
+        ("mass", "--push", "--no-index"),
         ("bom", "--resolve", "--server"),
         ("bom", "--resolve", "--token"),
         *(

@@ -63,7 +63,7 @@ def refuse_idle_options(parser: argparse.ArgumentParser, args: argparse.Namespac
     """Raise InputError for an option that would do nothing (:func:`only_with`, :func:`not_with`)."""
 
     def given(option: str) -> bool:
-        name = option.strip("-").replace("-", "_")
+        name = next(action.dest for action in parser._actions if option in action.option_strings)
         return bool(getattr(args, name) != parser.get_default(name))
 
     for option, needed in getattr(args, "needs", ()):

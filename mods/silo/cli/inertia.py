@@ -284,6 +284,9 @@ def _add_mass(commands: Commands) -> None:
     shared.add_geometry_options(parser)
     shared.add_result_options(parser)
     shared.add_push_options(parser)
+    # FreeCAD reads its own documents, in one process, afresh. The index is asked only for part numbers.
+    common.not_with(parser, "--via", "--mesh-unit", "--jobs", "--no-siblings", "--no-cache")
+    common.only_with(parser, "--push", "--index", "--no-index")
     parser.set_defaults(run=run_mass)
 
 

@@ -93,7 +93,8 @@ def add_result_options(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="OUT",
-        help="write a report: .json, .csv, or .md with a picture beside it, by suffix; may be repeated",
+        help="write a report by suffix: .json, .csv, or .md with a picture beside it (OUT.md.png); "
+        "may be repeated",
     )
     group.add_argument(
         "--preview",
@@ -182,9 +183,14 @@ def check_options(args: argparse.Namespace, *, asks_server: bool) -> None:
 
 def check_outputs(args: argparse.Namespace) -> None:
     """InputError for files that cannot be written, or that must not: what is read, and one file twice."""
+    from silo.inertia.geometry.detect import is_model_name
+
     report: list[str] = getattr(args, "report", [])
-    single = (getattr(args, name, None) for name in ("urdf_out", "html", "out"))
-    written = [*report, *args.preview, *filter(None, single)]
+    single = [getattr(args, name) for name in ("urdf_out", "html", "out") if getattr(args, name, None)]
+    written = [*report, *map(str, _pictures(args)), *single]
+    for name in single:
+        if is_model_name(Path(name)) and os.path.lexists(name):
+            raise InputError(f"{name} is there already and is named like a model; write to another file")
     if bad := [name for name in report if Path(name).suffix.lower() not in REPORTS]:
         raise InputError(f"--report writes {', '.join(REPORTS)}; got {', '.join(bad)}")
     if bad := [name for name in args.preview if Path(name).suffix.lower() not in (".glb", ".png")]:
@@ -286,13 +292,7 @@ def console(stream: TextIO | None = None) -> Any:
 def _write_files(args: argparse.Namespace, report: InertiaReport, assembly: Assembly) -> None:
     from silo.inertia.output.files import write_whole
 
-    pictures = [Path(name) for name in args.preview]
-    drawn = next((path for path in pictures if path.suffix.lower() == ".png"), None)
-    pages = [Path(name) for name in args.report if name.lower().endswith(".md")]
-    if pages and drawn is None:
-        # People look rather than read: a report to read has its picture beside it.
-        drawn = pages[0].with_suffix(".png")
-        pictures.append(drawn)
+    pictures = _pictures(args)
     for path in pictures:
         from silo.inertia.preview.picture import write_preview
 
@@ -301,8 +301,18 @@ def _write_files(args: argparse.Namespace, report: InertiaReport, assembly: Asse
         from silo.inertia.preview.page import report_html
 
         write_whole(args.html, report_html(report, assembly).encode("utf-8"))
+    drawn = next((path for path in pictures if path.suffix.lower() == ".png"), None)
     for name in args.report:
         write_whole(name, _report_text(Path(name), report, drawn).encode("utf-8"))
+
+
+def _pictures(args: argparse.Namespace) -> list[Path]:
+    """What is drawn. A report to read has a picture beside it, with a name that is the report's own."""
+    pictures = [Path(name) for name in args.preview]
+    page = next((name for name in getattr(args, "report", ()) if name.lower().endswith(".md")), None)
+    if page and not any(path.suffix.lower() == ".png" for path in pictures):
+        pictures.append(Path(f"{page}.png"))
+    return pictures
 
 
 def _report_text(path: Path, report: InertiaReport, picture: Path | None) -> str:

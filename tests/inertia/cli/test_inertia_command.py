@@ -187,8 +187,8 @@ def test_reports_of_every_kind(run: Run, arm: Path) -> None:
     assert len(list(csv.reader(files[1].read_text("utf-8").splitlines()))) == 20
     text = files[2].read_text("utf-8")
     assert "## Warnings" in text
-    assert "(report.png)" in text
-    assert (arm / "report.png").read_bytes().startswith(b"\x89PNG")
+    assert "(report.md.png)" in text
+    assert (arm / "report.md.png").read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize(
@@ -207,8 +207,15 @@ def test_the_picture_of_a_report_is_found_whatever_it_is_called(run: Run, arm: P
     """Spaces and brackets in a file's name do not break the link in the Markdown."""
     run("inertia", arm / "arm.step", "--report", arm / "my (first) report.md")
     text = (arm / "my (first) report.md").read_text("utf-8")
-    assert "(my%20%28first%29%20report.png)" in text
-    assert (arm / "my (first) report.png").exists()
+    assert "(my%20%28first%29%20report.md.png)" in text
+    assert (arm / "my (first) report.md.png").exists()
+
+
+def test_the_picture_of_a_report_replaces_no_other_picture(run: Run, arm: Path) -> None:
+    """A photo of the arm lay beside the report, and was gone."""
+    (arm / "arm.png").write_bytes(b"a photo")
+    assert run("inertia", arm / "arm.step", "--report", arm / "arm.md").code == 0
+    assert (arm / "arm.png").read_bytes() == b"a photo"
 
 
 def test_strict_and_allow(run: Run, arm: Path) -> None:
@@ -280,6 +287,9 @@ def test_mistakes_are_one_plain_sentence(
         "inertia arm.step --urdf arm.urdf --urdf-out arm.urdf",
         "inertia arm.step --html new.md --report new.md",
         "mass arm.step --html arm.step",
+        "mass arm.step --html part.FCStd",
+        "links arm.step --out part.stl",
+        "inertia arm.step --bom arm.md.png --report arm.md",
     ],
 )
 def test_what_is_read_is_never_overwritten(
@@ -288,6 +298,8 @@ def test_what_is_read_is_never_overwritten(
     """The map of links was written over the CAD file; a report over the BOM that it was made from."""
     monkeypatch.chdir(arm)
     os.symlink("bom.csv", "linked.csv")
+    for other in ("part.FCStd", "part.stl", "arm.md.png"):
+        (arm / other).write_bytes(b"of a person")
     before = {path.name: path.read_bytes() for path in arm.iterdir()}
     ran = run(*words.split())
     assert (ran.code, ran.out) == (2, "")

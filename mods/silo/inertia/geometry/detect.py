@@ -42,6 +42,12 @@ _SUFFIXES = {
     ".3mf": Kind.THREEMF,
 }
 
+
+def is_model_name(path: Path) -> bool:
+    """True where a file of this name is taken for geometry, whatever it holds."""
+    return path.suffix.lower() in _SUFFIXES
+
+
 _OTHERS = {
     b"<?xml": "is XML. STEP AP242 XML (.stpx) holds no geometry; export the assembly as STEP text (.step)",
     b"\x1f\x8b": "is compressed (gzip); unpack it first",

@@ -205,13 +205,38 @@ def test_damaged_meshes_are_errors(suffix: str, tmp_path: Path, read_in: Any) ->
         read_in(path)
 
 
-def test_coordinates_that_are_no_numbers_are_refused(tmp_path: Path, read_in: Any) -> None:
-    """NaN would run through every sum."""
-    path = tmp_path / "nan.stl"
+@pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf, 3e38])
+@pytest.mark.parametrize("suffix", ["stl", "ply", "glb"])
+def test_coordinates_that_cannot_be_meant_are_refused(
+    suffix: str, number: float, tmp_path: Path, read_in: Any
+) -> None:
+    """NaN would run through every sum, and a huge number through every product."""
+    path = tmp_path / f"bad.{suffix}"
     body = brick()
-    body.vertices[0] = np.nan
-    path.write_bytes(trimesh.exchange.stl.export_stl(body))
-    with pytest.raises(DocumentError, match="no numbers"):
+    body.vertices[0] = number
+    with np.errstate(all="ignore"):
+        body.export(path)
+    with pytest.raises(DocumentError, match="not finite, or larger than 1e\\+12; repair the file"):
+        read_in(path)
+
+
+@pytest.mark.parametrize("scale", ["1e200", "NaN", "-Infinity"])
+def test_placements_that_cannot_be_meant_are_refused(scale: str, tmp_path: Path, read_in: Any) -> None:
+    """A NaN in the scene of a GLB file put the part into the origin."""
+    path = tmp_path / "part.glb"
+    scene = trimesh.Scene()
+    scene.add_geometry(brick(), transform=np.diag([7.0, 7.0, 7.0, 1.0]))
+    scene.export(path)
+    data = path.read_bytes()
+    new = data.replace(b"7.0,", f"{scale},".encode(), 1)
+    assert new != data
+    size = len(new) - len(data)
+    length = int.from_bytes(data[12:16], "little")
+    text = new[20 : 20 + length + size]
+    text += b" " * (-len(text) % 4)
+    head = data[:8] + (len(data) - length + len(text)).to_bytes(4, "little") + len(text).to_bytes(4, "little")
+    path.write_bytes(head + b"JSON" + text + data[20 + length :])
+    with pytest.raises(DocumentError, match=r"placement of .* not finite"):
         read_in(path)
 
 

@@ -122,6 +122,8 @@ BAD = {
         "vertices that it does not hold",
     ),
     "number": (model(box(1, (1, 1, 1)).replace('x="1.0"', 'x="one"'), ITEM), "damaged"),
+    "nan": (model(box(1, (1, 1, 1)).replace('x="1.0"', 'x="nan"'), ITEM), "not finite"),
+    "huge": (model(box(1, (1, 1, 1)).replace('x="1.0"', 'x="1e300"'), ITEM), "larger than 1e"),
     "transform": (model(box(1, (1, 1, 1)), '<item objectid="1" transform="1 2 3"/>'), "12 numbers"),
     "xml": ("<model><resources>", "damaged"),
 }  # fmt: skip

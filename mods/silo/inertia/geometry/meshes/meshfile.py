@@ -13,16 +13,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from silo.bom.errors import ConfigError, DocumentError
 from silo.inertia.geometry.checks import assembled, implausible_size
 from silo.inertia.geometry.detect import Kind
 from silo.inertia.geometry.graph import MAX_DEPTH, Child, Node, in_metres, unfold
 from silo.inertia.geometry.measured import Measured
-from silo.inertia.geometry.mesh import Mesh, welded
+from silo.inertia.geometry.mesh import Floats, Mesh, welded
 from silo.inertia.geometry.options import MESH_UNITS, Reading, ReadOptions, Report
 from silo.inertia.geometry.together import enclosed
 from silo.inertia.model import GeometryCode, GeometryProblem, Prototype
+
+MAX_COORDINATE = 1e12
+"""Of mesh files, in their own unit; nothing that is made is as large, and larger ones overflow an inertia."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +45,10 @@ def read_mesh(path: Path, kind: Kind, options: ReadOptions, report: Report) -> R
     report("reading", 0, 0)
     scene = _scene(path, kind)
     unit, unit_name, problems = _unit(scene, options)
-    unfolded = unfold(scene.nodes, scene.roots, options.max_instances)
+    with np.errstate(over="ignore", invalid="ignore"):  # what comes of it is checked
+        unfolded = unfold(scene.nodes, scene.roots, options.max_instances)
+    for instance in unfolded.instances:
+        _check(path, f"the placement of '{instance.name}'", instance.transform)
     unfolded.instances = [replace(i, transform=in_metres(i.transform, unit)) for i in unfolded.instances]
     unfolded.frames = {path: in_metres(frame, unit) for path, frame in unfolded.frames.items()}
     prototypes = {}
@@ -53,6 +60,19 @@ def read_mesh(path: Path, kind: Kind, options: ReadOptions, report: Report) -> R
     return Reading(
         assembled(unfolded, prototypes, problems, name=path.stem, source=str(path), unit=unit_name)
     )
+
+
+def checked_mesh(path: Path, what: str, vertices: ArrayLike, faces: ArrayLike) -> Mesh:
+    """Triangles of a file, welded. Raises DocumentError for coordinates that cannot be meant."""
+    points = np.asarray(vertices, dtype=np.float64)
+    _check(path, what, points)
+    return welded(points, np.asarray(faces, dtype=np.int64))
+
+
+def _check(path: Path, what: str, numbers: Floats) -> None:
+    if not (np.abs(numbers) <= MAX_COORDINATE).all():  # NaN is no more so than infinity
+        reason = f"{what} has numbers that are not finite, or larger than {MAX_COORDINATE:g}"
+        raise DocumentError(str(path), f"{reason}; repair the file or export it again")
 
 
 def _scene(path: Path, kind: Kind) -> MeshScene:
@@ -67,7 +87,8 @@ def _scene(path: Path, kind: Kind) -> MeshScene:
             'mesh files need trimesh, which is not installed: pip install "silo-mod[inertia]"'
         ) from error
     try:
-        with path.open("rb") as stream:
+        # Infinite coordinates are refused below, in words; numpy's own would be about trimesh.
+        with path.open("rb") as stream, np.errstate(all="ignore"):
             # Unprocessed: what trimesh would mend in silence is what we have to report.
             loaded = trimesh.load_scene(stream, file_type=kind.value, process=False)
     except MemoryError:
@@ -84,10 +105,7 @@ def _from_trimesh(path: Path, kind: Kind, loaded: Any) -> MeshScene:
         faces = getattr(geometry, "faces", None)
         if faces is None or not len(faces):
             continue
-        vertices = np.asarray(geometry.vertices, dtype=np.float64)
-        if not np.isfinite(vertices).all():
-            raise DocumentError(str(path), f"the mesh '{name}' has coordinates that are no numbers")
-        meshes[name] = welded(vertices, np.asarray(faces, dtype=np.int64))
+        meshes[name] = checked_mesh(path, f"the mesh '{name}'", geometry.vertices, faces)
         nodes[name] = Node(name, path.stem if len(loaded.geometry) == 1 else name, (), True)
     if not meshes:
         raise DocumentError(str(path), "holds no triangles")

@@ -18,8 +18,8 @@ import numpy as np
 
 from silo.bom.errors import DocumentError
 from silo.inertia.geometry.graph import Child, Floats, Node
-from silo.inertia.geometry.mesh import Mesh, welded
-from silo.inertia.geometry.meshes.meshfile import MeshScene
+from silo.inertia.geometry.mesh import Mesh
+from silo.inertia.geometry.meshes.meshfile import MeshScene, checked_mesh
 from silo.inertia.geometry.options import MESH_UNITS
 
 MAX_MODEL_BYTES = 2_000_000_000
@@ -120,7 +120,7 @@ class _Package:
         faces = np.array(found.faces, dtype=np.int64)
         if faces.min() < 0 or faces.max() >= len(found.vertices):
             self._fail(f"its object {number} has triangles of vertices that it does not hold")
-        return welded(np.array(found.vertices, dtype=np.float64), faces)
+        return checked_mesh(self._path, f"its object {number}", found.vertices, faces)
 
     def _parse(self, name: str, start: Callable[[str, dict[str, str]], None]) -> None:
         try:
