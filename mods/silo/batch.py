@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from silo.api.wire import SourceDocument
-from silo.bom.diff import diff_findings
 from silo.bom.document import relative
 from silo.bom.errors import SiloError
 from silo.bom.findings import Finding
@@ -76,7 +75,7 @@ class TopResult:
             found.update(dict.fromkeys(outcome.resolved.findings))
         for outcome in self.outcomes:
             if outcome.plan is not None:
-                found.update(dict.fromkeys(diff_findings(outcome.plan.diff, outcome.assembly)))
+                found.update(dict.fromkeys(outcome.plan.diff.findings_at(outcome.assembly)))
         return tuple(found)
 
     @property

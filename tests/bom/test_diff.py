@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from silo.bom import BomDiff, BomEntry, FindingCode, Severity, diff_bom
-from silo.bom.diff import as_number, diff_findings, same_quantity
+from silo.bom.diff import as_number, same_quantity
 
 
 def local(**quantities: Any) -> list[BomEntry]:
@@ -179,7 +179,7 @@ def test_what_a_person_has_to_decide_is_reported() -> None:
     """The spec's sentence for unreferenced lines, and each conflict with both quantities."""
     parent = BomEntry("/v/top.FCStd", object_name="Assembly")
     remote = [line("A", 1), line("B", 1), line("P", 6.5, "manual"), line("Q", None, "manual")]
-    unreferenced, conflict, unknown = diff_findings(diff_bom(local(P=4, Q=1), remote), parent)
+    unreferenced, conflict, unknown = diff_bom(local(P=4, Q=1), remote).findings_at(parent)
     assert (
         "2 items in the Silo BOM are not referenced by components in this assembly." in unreferenced.message
     )
@@ -193,13 +193,13 @@ def test_what_a_person_has_to_decide_is_reported() -> None:
 
 def test_one_unreferenced_item_is_one_item() -> None:
     """Grammar is a courtesy."""
-    (finding,) = diff_findings(diff_bom([], [line("A", 1)]))
+    (finding,) = diff_bom([], [line("A", 1)]).findings
     assert finding.message.startswith("1 item in the Silo BOM is not referenced")
 
 
 def test_nothing_to_decide_is_not_reported() -> None:
     """Additions and changes need nobody."""
-    assert diff_findings(diff_bom(local(P=4, Q=1), [line("P", 1), line("M", 1, "manual")])) == ()
+    assert diff_bom(local(P=4, Q=1), [line("P", 1), line("M", 1, "manual")]).findings == ()
 
 
 def test_while_a_component_is_missing_no_line_of_unknown_origin_reads_as_removed() -> None:

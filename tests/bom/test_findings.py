@@ -11,7 +11,6 @@ import pytest
 from fakes import Doc, edit
 
 from silo.bom import BomEntry, Finding, FindingCode, Severity, choose_assembly, diff_bom, extract
-from silo.bom.diff import diff_findings
 from silo.bom.document import LinkProblem
 from silo.bom.findings import respelt_findings
 from silo.bom.resolve import consolidation_findings, unregistered_findings
@@ -173,16 +172,13 @@ SCENES: dict[FindingCode, Callable[[], Iterable[Finding]]] = {
     FindingCode.SHARED_IDENTITY: lambda: one_identity(("/v/a.FCStd", "A"), ("/v/a.FCStd", "B")),
     FindingCode.CONSOLIDATION: lambda: consolidation_findings(extract(Scene().sub).entries),
     FindingCode.UNREGISTERED: lambda: unregistered_findings(extract(Scene().sub).entries),
-    FindingCode.UNREFERENCED: lambda: diff_findings(
-        diff_bom([], [{"child_part_number": "P", "quantity": 1}]), BomEntry("/v/top.FCStd", object_name="A")
+    FindingCode.UNREFERENCED: lambda: diff_bom([], [{"child_part_number": "P", "quantity": 1}]).findings_at(
+        BomEntry("/v/top.FCStd", object_name="A")
     ),
-    FindingCode.CONFLICT: lambda: diff_findings(
-        diff_bom(
-            [{"child_part_number": "P", "quantity": 2}],
-            [{"child_part_number": "P", "quantity": 1, "source": "manual"}],
-        ),
-        BomEntry("/v/top.FCStd", object_name="A"),
-    ),
+    FindingCode.CONFLICT: lambda: diff_bom(
+        [{"child_part_number": "P", "quantity": 2}],
+        [{"child_part_number": "P", "quantity": 1, "source": "manual"}],
+    ).findings_at(BomEntry("/v/top.FCStd", object_name="A")),
 }
 
 BLOCKING = {

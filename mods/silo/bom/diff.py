@@ -20,7 +20,6 @@ from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from silo.bom.findings import Finding, Place
 from silo.bom.model import BomChange, BomDiff, BomEntry, QuantityChange
 from silo.bom.numbers import exact_sum, plain
 
@@ -194,11 +193,3 @@ def _compare(
         manual=tuple(BomChange(n, q) for n, q in manual.items()),
         conflicts=tuple(conflicts),
     )
-
-
-def diff_findings(diff: BomDiff, parent: BomEntry | None = None) -> tuple[Finding, ...]:
-    """What a comparison leaves to a person: unreferenced lines in one finding, each conflict in one.
-
-    ``parent`` is the assembly that was compared.
-    """
-    return diff.findings_at((Place(parent.doc_path, parent.object_name),) if parent is not None else ())

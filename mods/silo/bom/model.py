@@ -211,11 +211,11 @@ class BomDiff:
     @property
     def findings(self) -> tuple[Finding, ...]:
         """What the comparison leaves to a person; :meth:`findings_at` adds the place."""
-        return self.findings_at(())
+        return self.findings_at()
 
-    def findings_at(self, where: Iterable[Place]) -> tuple[Finding, ...]:
-        """Unreferenced lines in one finding, each conflict in one. ``where``: the assembly compared."""
-        places = tuple(where)
+    def findings_at(self, parent: BomEntry | None = None) -> tuple[Finding, ...]:
+        """Unreferenced lines in one finding, each conflict in one. ``parent``: the assembly compared."""
+        places = (Place(parent.doc_path, parent.object_name),) if parent is not None else ()
         found = []
         if self.removed:
             count, numbers = len(self.removed), ", ".join(change.part_number for change in self.removed)

@@ -11,7 +11,6 @@ from typing import Any, Literal
 
 from silo.batch import suggest_by_identity
 from silo.bom.changes import AssemblyChange, LineChange, changes_json, compare_assemblies
-from silo.bom.diff import diff_findings
 from silo.bom.document import relative
 from silo.bom.errors import Exit, InputError
 from silo.bom.model import BomDiff, BomEntry
@@ -63,7 +62,7 @@ def run_diff(args: argparse.Namespace) -> int:
     )
     if args.json:
         data = [{**_head(one, base), "diff": diff_json(diff)} for one, diff in compared]
-        told = chain(whole.findings, *(diff_findings(diff, one.assembly) for one, diff in compared))
+        told = chain(whole.findings, *(diff.findings_at(one.assembly) for one, diff in compared))
         findings = [finding_json(finding, base) for finding in told]
         common.print_json({"drift": drifted, "assemblies": data, "findings": findings})
     else:
