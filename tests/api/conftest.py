@@ -168,7 +168,7 @@ def pauses() -> list[float]:
 def client(server: ScriptedServer, pauses: list[float]) -> Iterator[SiloClient]:
     """A client of the scripted server that does not really pause."""
     retries = Retries(first=0.5, chance=lambda: 0.0, sleep=pauses.append)
-    with SiloClient(server.url, "silo_secret", timeout=(5, 10), retries=retries) as made:
+    with SiloClient(server.url, "silo_secret", timeout=(60, 60), retries=retries) as made:
         yield made
 
 

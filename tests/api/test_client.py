@@ -54,7 +54,7 @@ def test_without_the_batch_a_bounded_pool_asks_and_remembers(
     server: Any, client: SiloClient, answer: Any
 ) -> None:
     """Never one after another, never all at once; the missing route is asked for once only."""
-    together, most, now = threading.Barrier(8, timeout=20), 0, 0
+    together, most, now = threading.Barrier(8, timeout=60), 0, 0
     lock = threading.Lock()
 
     def enter() -> None:

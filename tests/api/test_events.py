@@ -49,14 +49,14 @@ class Watch:
     def event(self) -> ServerEvent:
         """The next event."""
         while True:
-            said = self.said.get(timeout=20)
+            said = self.said.get(timeout=60)
             if isinstance(said, ServerEvent):
                 return said
 
     def state(self, kind: Connection) -> ConnectionState:
         """The next change to this state."""
         while True:
-            said = self.said.get(timeout=20)
+            said = self.said.get(timeout=60)
             if isinstance(said, ConnectionState) and said.kind is kind:
                 return said
 
@@ -174,7 +174,7 @@ def test_a_token_that_is_refused_is_not_tried_again(
     server.on(EVENTS, answer(status, {"error": "x"}), stream(frame(1), stay=True))
     with Watch(client) as watch:
         assert "token" in watch.state(Connection.REFUSED).message
-        watch.listener._thread.join(20)  # type: ignore[union-attr]
+        watch.listener._thread.join(60)  # type: ignore[union-attr]
         assert (watch.pauses, len(server.seen)) == ([], 1)
         watch.listener.start()
         assert watch.event().id == "1"
@@ -251,7 +251,7 @@ def test_stop_wakes_a_waiting_stream_and_nothing_comes_after_it(
     with Watch(client) as watch:
         watch.event()
         thread = watch.listener._thread
-        watch.listener.stop(timeout=20)
+        watch.listener.stop(timeout=60)
         assert thread is not None
         assert not thread.is_alive()
         assert watch.listener.state.kind is Connection.STOPPED
@@ -263,7 +263,7 @@ def test_stop_ends_a_pause(client: SiloClient, server: Any, answer: Any) -> None
     server.on(EVENTS, answer(502))
     with Watch(client, backoff=Backoff(first=600, longest=600), wait=threading.Event.wait) as watch:
         assert watch.state(Connection.OFFLINE).retry_in == 600
-        watch.listener.stop(timeout=20)
+        watch.listener.stop(timeout=60)
         assert not watch.listener._thread.is_alive()  # type: ignore[union-attr]
 
 
@@ -289,10 +289,10 @@ def test_stop_from_within_a_callback_does_not_lock_up() -> None:
     ready = threading.Event()
     listener = EventListener(silo, on_event, lambda s: ready.set() if s.kind is Connection.ONLINE else None)
     listener.start()
-    assert ready.wait(20)
+    assert ready.wait(60)
     silo.create_item("kindred-rd", "F01", "Bolt")
     silo.create_item("kindred-rd", "F01", "Nut")
-    assert done.wait(20)
+    assert done.wait(60)
 
 
 def test_an_error_in_a_callback_costs_only_that_call(caplog: pytest.LogCaptureFixture) -> None:
@@ -306,10 +306,10 @@ def test_an_error_in_a_callback_costs_only_that_call(caplog: pytest.LogCaptureFi
 
     listener = EventListener(silo, on_event, lambda s: ready.set() if s.kind is Connection.ONLINE else None)
     listener.start()
-    assert ready.wait(20)
+    assert ready.wait(60)
     for name in ("Bolt", "Nut"):
         silo.create_item("kindred-rd", "F01", name)
-    assert [seen.get(timeout=20).id, seen.get(timeout=20).id] == ["1", "2"]
+    assert [seen.get(timeout=60).id, seen.get(timeout=60).id] == ["1", "2"]
     listener.stop()
     assert "a mistake in a pane" in caplog.text
 

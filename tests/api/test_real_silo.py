@@ -61,7 +61,7 @@ class Desk:
         retries = Retries(tries=2, sleep=lambda _s: None)
         # Only a fault may make an answer late: on a busy machine others come late as well.
         patience = 0.25 if "slow" in self.silo.faults.values() else 60
-        return SiloClient(self.silo.url, TOKEN, timeout=(5, patience), retries=retries)
+        return SiloClient(self.silo.url, TOKEN, timeout=(60, patience), retries=retries)
 
     def register(self, ask: Any = None) -> list[SiloError]:
         extraction = read_assembly(str(self.top))
@@ -302,7 +302,7 @@ def test_the_live_connection_reads_both_dialects(tmp_path: Path) -> None:
                 listener.start()
                 try:
                     desk.sync()
-                    event = heard.get(timeout=20)
+                    event = heard.get(timeout=60)
                 finally:
                     listener.stop()
             assert (event.type, event.merge.item) == ("bom_merge", event.item)
@@ -355,7 +355,7 @@ def test_the_listener_keeps_the_pause_that_the_server_named(fault: str, seconds:
         )
         listener.start()
         try:
-            said = [states.get(timeout=20) for _ in range(4)]
+            said = [states.get(timeout=60) for _ in range(4)]
         finally:
             listener.stop()
         kinds = [Connection.CONNECTING, Connection.OFFLINE, Connection.CONNECTING, Connection.ONLINE]

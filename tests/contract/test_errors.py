@@ -108,7 +108,7 @@ def test_a_body_without_a_declared_length_is_counted(small: RunningServer) -> No
     from urllib.parse import urlsplit
 
     parts = urlsplit(small.base_url)
-    connection = http.client.HTTPConnection(parts.hostname or "", parts.port, timeout=20)
+    connection = http.client.HTTPConnection(parts.hostname or "", parts.port, timeout=60)
     headers = {"Authorization": "Bearer silo_small", "Content-Type": "application/json"}
     chunks = iter([b'{"name": "', b"x" * 1500, b"x" * 1500, b'"}'])
     connection.request("POST", "/api/items", body=chunks, headers=headers, encode_chunked=True)

@@ -17,7 +17,7 @@ def together(count: int, work: Any) -> list[Any]:
     gate, got = threading.Barrier(count), []
 
     def run(number: int) -> None:
-        gate.wait(30)
+        gate.wait(60)
         got.append(work(number))
 
     threads = [threading.Thread(target=run, args=(n,)) for n in range(count)]

@@ -140,7 +140,7 @@ def test_two_admins_who_demote_each_other_leave_one(kind: str, databases: Databa
             with db.write(SYSTEM) as tx:
                 # On PostgreSQL both are inside here at once; SQLite lets one in after the other.
                 if tx.postgres:
-                    gate.wait(30)
+                    gate.wait(60)
                 try:
                     accounts.change_user(tx, name, role=Role.VIEWER)
                 except ConflictError:

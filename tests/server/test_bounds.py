@@ -186,7 +186,7 @@ def test_guesses_that_come_at_once_are_all_counted(url: str, tmp_path: Path) -> 
 
         def guess(number: int) -> None:
             with Api(server.base_url) as api:
-                gate.wait(30)
+                gate.wait(60)
                 body = {"username": "ann", "password": f"wrong password {number}"}
                 statuses[api.call("POST", "/api/auth/login", body).status] += 1
 
@@ -211,11 +211,11 @@ def test_a_turnstile_lets_in_so_many_and_no_more() -> None:
         def wait() -> None:
             with patient.enter():
                 inside.set()
-                go.wait(30)
+                go.wait(60)
 
         first = threading.Thread(target=wait)
         first.start()
-        inside.wait(30)
+        inside.wait(60)
         second = threading.Thread(target=wait)
         second.start()
         while not patient.full:
@@ -223,8 +223,8 @@ def test_a_turnstile_lets_in_so_many_and_no_more() -> None:
         with pytest.raises(BusyError, match="too many tests"), patient.enter():
             pass
         go.set()
-        first.join(30)
-        second.join(30)
+        first.join(60)
+        second.join(60)
         with patient.enter():
             pass
     with turnstile.enter():

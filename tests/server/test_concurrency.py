@@ -84,7 +84,7 @@ def run_together(actions: list[Callable[[Api, int], None]], api: Api) -> None:
     def client(number: int) -> None:
         mine = api.as_(api.token)
         try:
-            gate.wait(30)
+            gate.wait(60)
             for n in range(len(actions)):
                 actions[(n + number) % len(actions)](mine, number)
         except Exception as error:  # noqa: BLE001  whatever it was, the test is to tell it

@@ -246,7 +246,7 @@ def form_body(parts: Mapping[str, str | tuple[str, bytes]]) -> tuple[bytes, dict
     return out, {"Content-Type": f"multipart/form-data; boundary={boundary}"}
 
 
-def wait_until(true: Callable[[], bool], what: str, seconds: float = 30.0) -> None:
+def wait_until(true: Callable[[], bool], what: str, seconds: float = 60.0) -> None:
     """Poll ``true()`` until it is; AssertionError after ``seconds``."""
     deadline = time.monotonic() + seconds
     while not true():

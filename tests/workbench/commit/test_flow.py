@@ -166,7 +166,7 @@ class OtherDisk(Store):
         return None
 
     def finish(self, *arguments: Any, **more: Any) -> str:
-        self.gate.wait(30)
+        self.gate.wait(60)
         return super().finish(*arguments, **more)
 
 
@@ -209,7 +209,7 @@ class SlowDisk(Store):
         self.gate = threading.Event()
 
     def finish(self, *arguments: Any, **more: Any) -> str:
-        self.gate.wait(30)
+        self.gate.wait(60)
         return super().finish(*arguments, **more)
 
 

@@ -88,7 +88,7 @@ class SlowStore(Store):
         self.copies_made = 0
 
     def _copied(self, source: Path, copy: Path, stamp: str) -> tuple[str, int]:
-        self.gate.wait(30)
+        self.gate.wait(60)
         self.copies_made += 1
         return super()._copied(source, copy, stamp)
 
@@ -210,7 +210,7 @@ def test_closing_does_not_wait_for_the_network(office: Office) -> None:
     def hang(name: str) -> None:
         if name == "upload_file":
             reached.set()
-            released.wait(30)
+            released.wait(60)
 
     office.silo.before = hang
     office.session.keep(commit(office, "Bolt"), failing)
