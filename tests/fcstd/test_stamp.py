@@ -450,3 +450,16 @@ def test_the_object_names_its_item_too(tmp_path: Path) -> None:
         stamp(path, "u-2", item_object="Box", replace=True)
     with pytest.raises(DocumentError, match="no object named"):
         check_stampable(tmp_path / "a.FCStd", item_object="Gone")
+
+
+@pytest.mark.parametrize("object_name", [None, "Box"])
+def test_an_object_that_lacks_the_identity_of_meta_gets_it(tmp_path: Path, object_name: str | None) -> None:
+    """The file was said to have it already, and Silo did not find the object."""
+    path = tmp_path / "a.FCStd"
+    Doc().add("Part::Box", "Box").save(path)
+    assert stamp(path, "u-1", object_name=object_name)
+    meta = open_document(path).Meta
+    assert stamp(path, "u-1", object_name=object_name, item_object="Box")
+    document = open_document(path)
+    assert (document.getObject("Box").SiloItemId, document.Meta) == ("u-1", meta)
+    assert stamp(path, "u-1", object_name=object_name, item_object="Box") is False

@@ -136,7 +136,7 @@ def _present(
     limits: Limits,
     item_object: str | None,
 ) -> bool:
-    """True where the file carries the identity already. Raises DocumentError where it carries another."""
+    """True where the identity is in each of its places. Raises DocumentError where another one is."""
     with Library(limits=limits) as library:
         document = library.open(path)
         if document.state != state:
@@ -152,12 +152,14 @@ def _present(
             own = _text_of(owner, name)
             if own and own.lower() != identity.lower():
                 raise DocumentError(path, f"its own property {name} is another identity already: {own}")
+        item = document.getObject(item_object) if item_object else None
+        named = item is None or bool(_text_of(item, "SiloItemId"))
         present = document.Meta.get(meta_key(object_name or ""), "").strip()
     same = present.lower() == identity.lower()
     if present and not same and not replace:
         what = META_KEY if object_name is None else f"{META_KEY} of {object_name}"
         raise DocumentError(path, f"it carries another identity already ({what}): {present}")
-    return same
+    return same and named
 
 
 def _text_of(owner: object, name: str) -> str:
