@@ -11,6 +11,7 @@ import ctypes
 import errno
 import importlib
 import os
+import re
 import signal
 import socket
 import stat
@@ -35,6 +36,17 @@ _CANNOT_MERGE = 1175  # ERROR_UNABLE_TO_REMOVE_REPLACED
 _COPYFILE_ACL, _COPYFILE_XATTR = 1, 4  # copyfile.h of macOS
 _LOCKED_BYTE = 1 << 30
 _WAITS_S = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6)
+
+
+# Windows opens a device under each of these names, in any folder and with any ending.
+_DEVICE = re.compile(
+    r"(?:CON|PRN|AUX|NUL|CLOCK\$|CONIN\$|CONOUT\$|(?:COM|LPT)[0-9¹²³])\s*(?:[.:].*)?\Z", re.I
+)
+
+
+def is_device_name(name: str) -> bool:
+    """True where Windows takes this name of a file for a device; asked on every platform, as files travel."""
+    return _DEVICE.match(name) is not None
 
 
 class Resources(Protocol):

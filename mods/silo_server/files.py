@@ -18,6 +18,7 @@ from typing import IO
 
 from silo.bom.errors import NotFoundError
 from silo.durable import remove_patiently, replace_patiently, sync_folder
+from silo.platform import is_device_name
 from silo_server.services.revisions import StoredFile
 
 CHUNK = 1024 * 1024
@@ -172,7 +173,8 @@ def clean_name(name: str) -> str:
     """The last part of a file name without control characters; what a download is called."""
     last = name.replace("\\", "/").rpartition("/")[2]
     cleaned = "".join(c for c in last if c.isprintable()).strip(" .")
-    return cleaned[:200] or "file"
+    # A person on Windows cannot save a download that is called CON.
+    return ("_" * is_device_name(cleaned) + cleaned)[:200] or "file"
 
 
 def read_thumbnail(path: Path) -> bytes | None:

@@ -75,6 +75,13 @@ def test_thumbnails_are_taken_with_care(tmp_path: Path) -> None:
         assert read_thumbnail(path) == expected
 
 
+@pytest.mark.parametrize("name", ["CON", "nul.FCStd", "vault\\com1.FCStd", "Aux .tar.gz", "\0LPT¹"])
+def test_a_name_is_no_device_of_windows(name: str) -> None:
+    """Nobody on Windows can save such a download; the rule is that of links and of pulled files."""
+    assert clean_name(name).startswith("_")
+    assert not clean_name("Console.FCStd").startswith("_")
+
+
 @given(st.text(max_size=300))
 def test_a_name_is_only_a_name(name: str) -> None:
     """Whatever a client sends: no path, no control characters, not empty, not endless."""

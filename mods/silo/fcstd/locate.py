@@ -17,13 +17,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from silo.bom.findings import FindingCode
+from silo.platform import is_device_name
 from silo.spelling import Spelling, Spelt, folded
 
 _URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+://")
-# Windows opens a device under each of these names, in any folder and with any ending.
-_DEVICE = re.compile(
-    r"(?:CON|PRN|AUX|NUL|CLOCK\$|CONIN\$|CONOUT\$|(?:COM|LPT)[0-9¹²³])\s*(?:[.:].*)?\Z", re.I
-)
 _STREAM = re.compile(r"\.fcstd:", re.I)
 _LONGEST, _DEEPEST = 4096, 128
 _FOLDER_AT_MOST = 50_000
@@ -166,7 +163,7 @@ def refusal(recorded: str) -> NotFound | None:
         # The mere look would send the user's credentials to that host; //./ and //?/ name devices.
         return NotFound(FindingCode.OUTSIDE_ROOT, "it is on the network or a device, by an absolute path")
     for name in path.split("/"):
-        if _DEVICE.match(name):
+        if is_device_name(name):
             return NotFound(FindingCode.MISSING_FILE, f"{name} is a device on Windows, not a file")
         if _STREAM.search(name):
             return NotFound(FindingCode.MISSING_FILE, f"{name} names a stream within a file")
