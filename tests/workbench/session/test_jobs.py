@@ -135,7 +135,7 @@ def test_an_equal_job_that_waits_already_is_not_queued_twice(worker: Worker, gui
     assert not worker.submit(job())
     go.set()
     gui.run_until(lambda: len(runs) == 2)
-    assert worker.idle
+    assert worker.left(WAIT_S) == 0
 
 
 @pytest.mark.parametrize("refused", [False, True])
