@@ -252,6 +252,8 @@ def test_a_decision_about_very_many_lines(visitors: dict[str, Visitor], api: Api
     page = visitors[EDITOR].get(f"/items/{parent}/bom").body.decode()
     boxes = re.findall(r'name="chosen" form="bulk" value="([^"]+)"', page)
     assert len(boxes) == 1000
+    # "name mark", as in /waiting: one script looks after the boxes of both pages.
+    assert {box.rpartition(" ")[0] for box in boxes} <= {line["id"] for line in api.lines(parent).values()}
     assert "the first 1000; the others follow" in page
     assert page.count("<form") < 10
     lines = [line["id"] for line in api.lines(parent).values() if line["unreferenced_since"]]
@@ -274,6 +276,7 @@ def test_a_conflict_that_came_meanwhile_is_not_decided(visitors: dict[str, Visit
         return unescape(re.findall(r'name="chosen" form="bulk" value="([^"]+)"', page)[0])
 
     seen = box()
+    assert seen.rpartition(" ")[0] == parent
     api.merge(parent, {child: 12})
     answer = visitor.post("/waiting/decide", chosen=seen, action="keep_silo", reason="the drawing says so")
     assert answer.status == 409

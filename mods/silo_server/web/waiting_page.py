@@ -62,7 +62,7 @@ def decide(call: Writer, form: Form) -> Response:
     lines = boms = 0
     problems: list[str] = []
     for value in dict.fromkeys(texts(form, "chosen")):
-        seen, _, part_number = value.partition(" ")
+        part_number, _, seen = value.rpartition(" ")
         if not part_number:
             problems.append(f"{isolate(value[:80])}: this is no BOM of the table; load the page again")
             continue

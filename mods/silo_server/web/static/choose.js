@@ -6,8 +6,8 @@ const told = document.getElementById("count");
 const form = document.getElementById("bulk");
 const boxes = () => [...document.querySelectorAll('input[type="checkbox"][name="chosen"][form="bulk"]')];
 const chosen = new Set();
-// A value is "mark number": what was seen, and of what.
-const number = (value) => value.slice(value.indexOf(" ") + 1);
+// A value is "name mark": the line or the part number, and what was seen of it.
+const named = (value) => value.slice(0, value.lastIndexOf(" "));
 
 function recount() {
   const found = boxes();
@@ -28,6 +28,7 @@ function recount() {
 }
 
 if (all) {
+  document.getElementById("scriptless")?.remove();
   all.closest("label").hidden = false;
   all.addEventListener("change", () => {
     for (const box of boxes()) box.checked = all.checked;
@@ -37,9 +38,9 @@ if (all) {
   document.addEventListener("change", (event) => event.target.name === "chosen" && recount());
   // Another view of the table has other boxes. What changed meanwhile has another mark, and has to be chosen anew.
   document.addEventListener("shown", () => {
-    const now = new Map(boxes().map((box) => [number(box.value), box]));
+    const now = new Map(boxes().map((box) => [named(box.value), box]));
     for (const value of [...chosen]) {
-      const box = now.get(number(value));
+      const box = now.get(named(value));
       if (box?.value === value) box.checked = true;
       else if (box) chosen.delete(value);
     }
