@@ -35,7 +35,7 @@ def test_search_as_you_type(api: Api, visit: Visit) -> None:
     page.wait_for_url("**/items?q=hex+screw")
     assert measured(page, "window.still")
     page.get_by_label("Search").fill("nothing like this")
-    expect(page.locator("#shown")).to_contain_text("Nothing fits")
+    expect(page.locator("#shown")).to_contain_text("No item matches")
 
 
 def test_a_late_answer_does_not_replace_a_newer_one(api: Api, visit: Visit) -> None:
@@ -85,7 +85,7 @@ def test_the_list_has_pages(api: Api, visit: Visit) -> None:
     expect(page.get_by_label("Search")).to_have_value("PAGE-")
     page.get_by_label("Type").select_option("tool")
     page.get_by_role("button", name="Search").click()
-    expect(page.locator("#shown")).to_contain_text("Nothing fits")
+    expect(page.locator("#shown")).to_contain_text("No item matches")
     assert "sort=-name" in page.url
 
 
