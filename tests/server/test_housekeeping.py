@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import os
 import threading
@@ -22,7 +23,7 @@ from silo_server.db.engine import Database
 from silo_server.db.tables import audit, bom_changes, bom_syncs, events, sessions
 from silo_server.files import FileStore
 from silo_server.operation.backup import back_up
-from silo_server.operation.housekeeping import last_run, tidy
+from silo_server.operation.housekeeping import keep_tidy, last_run, tidy
 from silo_server.run import running_server
 from silo_server.services.search import rebuild_index
 from silo_server.settings import Settings
@@ -49,6 +50,49 @@ def tidied(url: str, tmp_path: Path, days_later: float = 0, **values: Any) -> di
     db.close()
     assert run.problem is None
     return dict(run.removed)
+
+
+class Odd(FileStore):
+    """A store with an error that nobody thought of; the second run ends the loop."""
+
+    def __init__(self, root: Path, enough: Callable[[], object]) -> None:
+        super().__init__(root)
+        self.enough, self.runs = enough, 0
+
+    def older_than(self, before: float) -> list[Path]:
+        self.runs += 1
+        if self.runs == 2:
+            self.enough()
+        raise ValueError(f"odd {self.runs}")
+
+
+def test_an_error_is_logged_at_once_and_the_next_run_comes(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Not when the server stops, and not by ending the loop; the run that failed is shown as such."""
+    url = f"sqlite:///{tmp_path / 'silo.db'}"
+    now = datetime.now(UTC)
+
+    def clock() -> datetime:
+        nonlocal now
+        now += timedelta(days=2)  # each run is due, and looks at the files
+        return now
+
+    db = Database(Settings(database_url=url, files_dir=tmp_path / "files", housekeeping_seconds=0.01), clock)
+    prepare(db, TOKEN)
+
+    async def work() -> None:
+        ending, loop = asyncio.Event(), asyncio.get_running_loop()
+        store = Odd(tmp_path / "files", lambda: loop.call_soon_threadsafe(ending.set))
+        await asyncio.wait_for(keep_tidy(db, store, ending), 60)
+
+    asyncio.run(work())
+    assert [text in caplog.text for text in ("odd 1", "odd 2")] == [True, True]
+    with db.read() as tx:
+        run = last_run(tx)
+    db.close()
+    assert run is not None
+    assert run.problem == "files: odd 2"
 
 
 def test_a_busy_server_trims_its_log(url: str, tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from datetime import datetime, timedelta
+from functools import partial
 
 from sqlalchemy import ColumnElement, Table, delete, func, insert, select, update
 from sqlalchemy.exc import SQLAlchemyError
@@ -75,15 +76,15 @@ def tidy(db: Database, store: FileStore) -> Run:
     started, at = time.monotonic(), stamp(db.clock())
     removed: dict[str, int] = {}
     problems: list[str] = []
-    for name, step in _STEPS.items():
+    steps = {name: partial(_repeat, db, step) for name, step in _STEPS.items()}
+    for name, work in {**steps, "files": partial(_remove_orphans, db, store)}.items():
         try:
-            removed[name] = _repeat(db, step)
-        except (SQLAlchemyError, SiloError) as error:
+            removed[name] = work()
+        except (OSError, SQLAlchemyError, SiloError) as error:
             problems.append(f"{name}: {cause_of(error)}")
-    try:
-        removed["files"] = _remove_orphans(db, store)
-    except (OSError, SQLAlchemyError, SiloError) as error:
-        problems.append(f"files: {cause_of(error)}")
+        except Exception as error:
+            logger.exception("housekeeping of %s failed", name)
+            problems.append(f"{name}: {cause_of(error)}")
     run = Run(
         at=at,
         seconds=round(time.monotonic() - started, 3),
