@@ -133,6 +133,7 @@ def test_a_login_form_from_another_site_is_refused(api: Api) -> None:
     assert answer.status == 401
 
 
+@pytest.mark.usefixtures("visitors")
 def test_logging_out_ends_the_session(api: Api) -> None:
     """Afterwards the cookie is worth nothing."""
     visitor = enter(api, VIEWER)
