@@ -110,6 +110,11 @@ def test_bom_and_file_of_a_sync_are_of_one_state(office: Office, flow: PreviewFl
     office.settle()
     assert [line.quantity for line in office.silo.get_bom(number)] == [5, 1]
     assert len(office.sent) == 1
+    top.parts[sub] = 2
+    window.flow.closed(window.path)
+    window.flow.sync(window.filled[-1], False, False)
+    office.settle()
+    assert (len(office.sent), office.bugs) == (1, [])
 
 
 def test_a_closed_document_is_reported_in_its_window(

@@ -103,7 +103,7 @@ class PreviewFlow:
         self._open.pop(path, None)
 
     def _ask(self, taken: Snapshot, note: str = "") -> None:
-        self._open[taken.path].busy()
+        self._with_dialog(taken.path, lambda dialog: dialog.busy())
 
         self._session.ask(
             translate("Silo", "Comparing with Silo"),
