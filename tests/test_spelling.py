@@ -64,6 +64,17 @@ def test_every_normal_form_of_a_name_is_one_path(disk: Path) -> None:
     assert real(disk / NFD.upper() / f"{NFD}.FCStd") == str(wanted)
 
 
+def test_a_letter_without_a_counterpart_keeps_no_name_from_being_found(tmp_path: Path) -> None:
+    """Windows takes ß for no SS; one part was two components where a link wrote it in another case."""
+    with other_disk(tmp_path, "by-letter") as disk:
+        wanted = disk / "Straße" / "Büchse ß.FCStd"
+        wanted.parent.mkdir()
+        wanted.touch()
+        (disk / "STRASSE").mkdir()
+        assert real(disk / "straße" / "BÜCHSE ß.fcstd") == str(wanted)
+        assert real(disk / "strasse") == str(disk / "STRASSE")
+
+
 class OtherNumbers(Spelling):
     """A disk that numbers files in its listings otherwise, as some network disks do."""
 

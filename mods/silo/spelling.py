@@ -10,10 +10,13 @@ from __future__ import annotations
 
 import os
 import stat
+import string
 import unicodedata
 from typing import NamedTuple
 
 _LISTED_AT_MOST = 50_000
+# Disks differ in what is another case of ß or µ, never of A to Z.
+_OTHER_CASE = str.maketrans(string.ascii_letters, string.ascii_letters.swapcase())
 
 
 class Spelt(NamedTuple):
@@ -85,9 +88,8 @@ class Spelling:
     def _listed(self, folder: str, name: str, status: os.stat_result) -> str:
         if name.isascii() and folder in self._exact:
             return name
-        spellings = {name.swapcase(), *(unicodedata.normalize(form, name) for form in ("NFC", "NFD"))} - {
-            name
-        }
+        cases = (name.translate(_OTHER_CASE), name.swapcase())
+        spellings = {*cases, *(unicodedata.normalize(form, name) for form in ("NFC", "NFD"))} - {name}
         # Not compared by number: some network disks number each spelling of a file otherwise, or its entry in
         # a listing, and a disk may still answer with the number of a file that was deleted a moment ago.
         if not any(os.path.lexists(os.path.join(folder, other)) for other in spellings):

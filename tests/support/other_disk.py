@@ -3,7 +3,7 @@
 
 A small FUSE file system over a real folder, run as a process of its own:
 
-    python tests/support/other_disk.py FOLDER MOUNT_POINT [each-spelling]
+    python tests/support/other_disk.py FOLDER MOUNT_POINT [each-spelling] [by-letter]
 
 It stays in the foreground until it is unmounted. Needs ``mfusepy``, libfuse and the right to mount.
 """
@@ -16,7 +16,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NoReturn
@@ -42,6 +42,7 @@ def other_disk(folder: Path, *options: str) -> Iterator[Path]:
     """Such a disk, mounted below ``folder``. Skips the test where none can be mounted.
 
     With ``each-spelling`` each spelling of a name has an inode number of its own, as some network disks do.
+    With ``by-letter`` a letter is equal to one other letter at most, as on Windows: ß is not SS.
     """
     if fuse is None:
         _cannot(f"needs FUSE: {_WHY}")
@@ -80,8 +81,8 @@ class OtherDisk(fuse.Operations if fuse else object):  # type: ignore[misc]
 
     use_ns = True
 
-    def __init__(self, root: str) -> None:
-        self.root = os.path.realpath(root)
+    def __init__(self, root: str, fold: Callable[[str], str] = folded) -> None:
+        self.root, self.fold = os.path.realpath(root), fold
 
     def _real(self, path: str) -> str:
         real = self.root
@@ -92,7 +93,9 @@ class OtherDisk(fuse.Operations if fuse else object):  # type: ignore[misc]
                     listed = os.listdir(real)
                 except OSError:
                     listed = []
-                known = next((os.path.join(real, n) for n in listed if folded(n) == folded(name)), known)
+                known = next(
+                    (os.path.join(real, n) for n in listed if self.fold(n) == self.fold(name)), known
+                )
             real = known
         return real
 
@@ -196,10 +199,14 @@ class OtherDisk(fuse.Operations if fuse else object):  # type: ignore[misc]
         return {name: getattr(found, name) for name in (*names, "f_namemax")}
 
 
+def by_letter(name: str) -> str:
+    """Equal for names that differ in the case of letters only."""
+    return "".join(upper if len(upper := c.upper()) == 1 else c for c in name)
+
+
 if __name__ == "__main__":
     # nothreads: one request at a time, as the look-up and what follows it belong together.
     # use_ino: an inode is the file's own, whatever it is called; else each spelling has one.
     own = "each-spelling" not in sys.argv[3:]
-    fuse.FUSE(
-        OtherDisk(sys.argv[1]), sys.argv[2], foreground=True, nothreads=True, use_ino=own, fsname="other"
-    )
+    disk = OtherDisk(sys.argv[1], by_letter if "by-letter" in sys.argv[3:] else folded)
+    fuse.FUSE(disk, sys.argv[2], foreground=True, nothreads=True, use_ino=own, fsname="other")

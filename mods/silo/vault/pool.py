@@ -20,6 +20,11 @@ from silo.vault.session import CHUNK, Done, Question, Supplies, collect_seldom, 
 _WORTH_A_POOL = 128
 
 
+def _end_processes(executor: Executor) -> None:
+    # Python would wait for them at the end anyway, and at times trips over it then.
+    executor.shutdown(wait=True, cancel_futures=True)
+
+
 class Pool:
     """Makes executors for the work, and another one where that broke.
 
@@ -29,6 +34,8 @@ class Pool:
         so many files are read here before others are called in: they take a moment to start.
     chunk
         questions that travel together.
+    end
+        gives up an executor: what was not begun is dropped.
     """
 
     def __init__(
@@ -39,10 +46,11 @@ class Pool:
         alone: Callable[[], Executor] | None = None,
         worth: int = _WORTH_A_POOL,
         chunk: int = CHUNK,
+        end: Callable[[Executor], None] = _end_processes,
     ) -> None:
         self.jobs, self.worth, self.chunk = jobs, worth, chunk
         self.alone = alone or (lambda: _processes(1))
-        self._make = make
+        self._make, self._end = make, end
         self._run = str(uuid4())
         self._executor: Executor | None = None
 
@@ -55,8 +63,7 @@ class Pool:
     def renew(self) -> None:
         """Give up an executor that lost its workers, or that is no longer needed."""
         if self._executor is not None:
-            # Python would wait for it at the end anyway, and at times trips over it then.
-            self._executor.shutdown(wait=True, cancel_futures=True)
+            self._end(self._executor)
             self._executor = None
 
 
@@ -66,7 +73,10 @@ def pool_of(jobs: int, dask: str | None = None, *, worth: int = _WORTH_A_POOL) -
     if dask is not None:
         with _dask_client(dask) as client:
             workers = sum(client.nthreads().values())
-            yield Pool(client.get_executor, max(1, workers), worth=worth)
+            # Dask cancels where nobody waits, also what was begun.
+            yield Pool(
+                client.get_executor, max(1, workers), worth=worth, end=lambda one: one.shutdown(wait=False)
+            )
         return
     pool = Pool(lambda: _processes(jobs), jobs, worth=worth) if jobs > 1 else None
     try:
