@@ -49,6 +49,11 @@ def is_device_name(name: str) -> bool:
     return _DEVICE.match(name) is not None
 
 
+def no_device_name(name: str) -> str:
+    """``name``, or what a file of that name is called where nobody may call it so."""
+    return "_" * is_device_name(name) + name
+
+
 class Resources(Protocol):
     """The part of the module ``resource`` that is used; Windows has no such module."""
 

@@ -18,7 +18,7 @@ from typing import IO
 
 from silo.bom.errors import NotFoundError
 from silo.durable import remove_patiently, replace_patiently, sync_folder
-from silo.platform import is_device_name
+from silo.platform import no_device_name
 from silo_server.services.revisions import StoredFile
 
 CHUNK = 1024 * 1024
@@ -174,7 +174,7 @@ def clean_name(name: str) -> str:
     last = name.replace("\\", "/").rpartition("/")[2]
     cleaned = "".join(c for c in last if c.isprintable()).strip(" .")
     # A person on Windows cannot save a download that is called CON.
-    return ("_" * is_device_name(cleaned) + cleaned)[:200] or "file"
+    return no_device_name(cleaned)[:200] or "file"
 
 
 def read_thumbnail(path: Path) -> bytes | None:

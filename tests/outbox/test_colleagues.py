@@ -368,6 +368,14 @@ def test_a_name_in_another_case_is_no_other_name(vault: Vault) -> None:
     assert other_name("/elsewhere/Top 2.FCStd", known) == "Top.FCStd"
 
 
+@pytest.mark.parametrize("stored", ["_Aux.FCStd", "aux.FCStd"])
+def test_the_name_that_a_server_gives_a_device_of_windows_is_no_other_name(stored: str) -> None:
+    """On Linux a file may be called so; else each of its commits would be asked about."""
+    known = [Revision(revision_number=1, file_name=stored)]
+    assert other_name("/v/Aux.FCStd", known) == ""
+    assert other_name("/v/Part.FCStd", known) == stored
+
+
 def test_what_was_there_already_keeps_its_revision_over_a_hold(vault: Vault) -> None:
     """The BOM of a file that Silo had is refused; before its retry a colleague commits."""
     sent(vault, b"one")

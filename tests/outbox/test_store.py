@@ -198,6 +198,32 @@ def test_without_a_second_name_the_disk_is_synced_at_once(tmp_path: Path, docume
     assert store.entries() == ()
 
 
+class Stuck(Moody):
+    """A disk that takes no change of a row either."""
+
+    def discard(self, entry_id: int, *, keep: bool = False) -> None:
+        if self.error is not None:
+            raise OutboxError("the outbox cannot be used now (database or disk is full)")
+        super().discard(entry_id, keep=keep)
+
+
+def test_what_is_lost_is_reported_as_lost_also_where_its_row_cannot_go(
+    tmp_path: Path, document: Path
+) -> None:
+    """An OutboxError would be taken for a commit that is kept. The row that stays says what to do."""
+    store = Stuck(tmp_path / "outbox.sqlite3")
+    store.error = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    with pytest.raises(DocumentError, match=r"No space left.*nothing was kept, commit it again"):
+        store.add(commit(document))
+    store.error = None
+    send_all(store, FakeSilo())
+    (left,) = store.entries()
+    assert (left.state, left.reason) == (
+        State.HELD,
+        "its file was not copied in time; commit it again, then discard this",
+    )
+
+
 @pytest.mark.parametrize("content", [b"", b"fir", b"first and more"])
 def test_a_damaged_copy_is_not_sent(store: Store, document: Path, content: bytes) -> None:
     """Cut short by a power cut or a full disk; a person sees it and can save what there is."""

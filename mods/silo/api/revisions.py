@@ -18,6 +18,7 @@ from silo.bom.errors import ConflictError, NewerRevisionError, NotFoundError, Se
 from silo.durable import remove_patiently
 from silo.files import bare_checksum, seen_as
 from silo.folders import scratch_folder
+from silo.platform import no_device_name
 
 
 @dataclass(frozen=True)
@@ -109,7 +110,8 @@ def other_name(path: str, revisions: Iterable[Revision]) -> str:
         return ""
     newest = max(named, key=lambda revision: revision.revision_number)
     known = os.path.basename(str(newest.file_name))
-    return known if known.casefold() != os.path.basename(path).casefold() else ""
+    one, other = (no_device_name(os.path.basename(name)).casefold() for name in (known, path))
+    return known if one != other else ""
 
 
 REPACKED = (".kc",)

@@ -33,7 +33,7 @@ from silo.bom.report import to_plain
 from silo.durable import remove_patiently, replacing, stamp_of
 from silo.files import content_hash, seen_as
 from silo.folders import data_folder
-from silo.outbox.database import Origins
+from silo.outbox.database import Origins, OutboxError
 from silo.outbox.entry import ASKED, SAME_PART, Commit, Entry, State
 
 _BLOCK = 1 << 20
@@ -153,19 +153,22 @@ class Store(Origins):
                 told = f"{entry.path or entry.file_name}: {error}; commit it again, then discard this"
                 self.update(entry.id, state=State.HELD, reason=told)
                 return
-            self.discard(entry.id)
-            raise DocumentError(str(content), f"{error}; nothing was kept, commit it again") from error
+            raise self._lost(entry, content, str(error)) from error
         except OSError as error:
             told = f"cannot be copied for sending ({error.strerror or error})"
             if held is not None or content is copy:
                 self.update(entry.id, reason=f"{entry.path or entry.file_name}: {told}; it is tried again")
                 return
-            self.discard(entry.id)
-            raise DocumentError(str(content), f"{told}; nothing was kept, commit it again") from error
+            raise self._lost(entry, content, told) from error
         known = {"origin": origin} if origin and entry.origin else {}
         place = _place(copy, entry.path)
         self.update(entry.id, state=State.WAITING, sha256=sha256, size=size, reason="", **place, **known)
         shutil.rmtree(self._held / key, ignore_errors=True)
+
+    def _lost(self, entry: Entry, content: Path, reason: str) -> DocumentError:
+        with suppress(OutboxError):  # a row that stays has no file: the next sending holds it and says so
+            self.discard(entry.id)
+        return DocumentError(str(content), f"{reason}; nothing was kept, commit it again")
 
     def add(self, commit: Commit, server: str = "") -> Entry:
         """Both at once: on disk with its copy when it returns."""

@@ -147,6 +147,7 @@ def test_a_commit_that_a_full_disk_kept_is_not_reported_as_lost(office: Office, 
     made = commit(office, "Bolt", hold=hold)
     base = Base(made.path, stamp_of(made.path), UNKNOWN)
     office.session.keep(made, failing, base)
+    office.session._waits(())  # read before there was anything
     office.settle()
     assert base.origin == hashlib.sha256(b"content").hexdigest()  # the next commit is made from this one
     assert any("Bolt: It is kept, and sent once the disk" in line for line in office.console)

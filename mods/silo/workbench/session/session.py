@@ -74,7 +74,7 @@ class Session:
         self._live = False
         self._colleagues = Colleagues()
         self._comparing = False
-        # Something was kept since the outbox was last read; on a full disk it cannot be read.
+        # The outbox could not be used, as on a full disk: something may wait that is not shown.
         self._owed = False
 
     # -- the server -------------------------------------------------------------------------------------
@@ -139,15 +139,13 @@ class Session:
         title = translate("Silo", "Keeping the commit")
         self._colleagues.sending(commit.identity)
 
-        self._owed = True
-
         def finish(_control: Control) -> None:
             made_from, content = base.origin if base is not None and commit.origin else "", ""
             try:
                 content = self.outbox.finish(commit.key, commit.file, made_from)
             except (OutboxError, OSError) as error:
                 text = translate("Silo", "It is kept, and sent once the disk takes a copy of its file.")
-                told = SiloError(f"{commit.label or commit.path}: {text} {error}")  # its row is on disk
+                told = OutboxError(f"{commit.label or commit.path}: {text} {error}")  # its row is on disk
                 self._deliver(lambda: self.problem(told))
             if base is not None:
                 base.committed(content)
@@ -383,6 +381,7 @@ class Session:
 
     def problem(self, error: SiloError) -> None:
         """Show a problem that belongs to nothing else that is shown."""
+        self._owed |= isinstance(error, OutboxError)
         if error.code != "cancelled":
             self._show(reason=str(error))
             if error.code != "bad_config":
