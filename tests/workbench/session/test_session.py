@@ -80,6 +80,27 @@ def test_after_a_restore_a_colleagues_commit_that_is_gone_is_no_news(office: Off
     assert [one.revision for one in office.session.shown.newer.values()] == ([2] if kept == 2 else [])
 
 
+def test_looking_for_what_a_restore_took_can_be_stopped(office: Office) -> None:
+    """A request for each notice, of which a day may bring hundreds; those stay then."""
+    made = commit(office, "Bolt")
+    office.session.begin(live=False)
+    office.settle()
+    online, asked = office.session._need_online(), list[str]()
+
+    def stop(name: str) -> None:
+        asked.append(name)
+        office.session.cancel()
+
+    office.silo.before = stop
+    for number in (made.identity, "another"):
+        data = {"id": number, "part_number": "M01-0001", "revision_number": 2, "user": "alice"}
+        online._heard(ServerEvent("9", "revision.created", data), online.address)
+    office.gui.run_all()
+    online._heard(ServerEvent(None, RESET, {}), online.address)
+    office.settle()
+    assert (asked, len(office.session.shown.newer)) == (["revisions"], 2)
+
+
 class SlowStore(Store):
     """A disk on which copies take until the test lets them go."""
 

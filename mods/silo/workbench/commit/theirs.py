@@ -161,12 +161,14 @@ def look(
     return found
 
 
-def gone(client: SiloClient, announced: Mapping[str, Newer]) -> list[str]:
-    """The items of which the server no longer has the announced commit. For a worker."""
+def gone(client: SiloClient, announced: Mapping[str, Newer], cancelled: Cancel | None = None) -> list[str]:
+    """The items of which the server no longer has the announced commit. For a worker: a request for each."""
     from silo.api.revisions import newest_number
+    from silo.api.transport import stop_if
 
     found = []
     for identity, newer in announced.items():
+        stop_if(cancelled)
         try:
             known = client.revisions(newer.part_number, newest=1)
         except RouteMissingError:

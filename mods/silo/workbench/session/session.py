@@ -207,8 +207,12 @@ class Session:
             from silo.workbench.commit.theirs import gone  # late, as all that a start does not need
 
             title = translate("Silo", "Looking for colleagues' commits")
-            done = partial(self.no_news, seen)
-            self.ask(title, lambda client, _control: gone(client, seen), done, lambda _error: None)
+            self.ask(
+                title,
+                lambda client, control: gone(client, seen, control.cancelled),
+                done=partial(self.no_news, seen),
+                failed=lambda _error: None,  # the notices stay
+            )
 
     def no_news(self, seen: Mapping[str, Newer], identities: Iterable[str]) -> None:
         """The server has nothing newer of these items; ``seen``: what was shown when it was asked."""
