@@ -149,6 +149,21 @@ def test_a_notice_goes_once_the_server_has_nothing_newer(office: Office, flow: C
     assert (len(office.desk.asked), office.files("Plate")) == (1, [b"one", b"two", b"three"])
 
 
+def test_a_notice_stays_where_a_copy_of_the_file_is_older(office: Office, flow: CommitFlow) -> None:
+    """Two files of one item: one is the newest commit, the other would undo it."""
+    doc = committed(office, flow, "Plate", b"one")
+    copy = office.document("Copy")
+    copy.identity = doc.identity
+    Path(copy.FileName).write_bytes(b"older")
+    doc.OutList = [copy]
+    edit(doc, b"two")
+    edit(copy, b"older still")
+    office.session._heard(doc.identity, Newer("M01-0001", 2, "alice", time.monotonic()))
+    person = Person(office)
+    flow.start(doc)
+    assert (list(person.seen), list(office.session.shown.newer)) == ([copy.FileName], [doc.identity])
+
+
 def test_on_top_at_a_persons_word(office: Office, flow: CommitFlow) -> None:
     """The comment notes it; the next commit is made from that one."""
     doc = committed(office, flow, "Plate", b"one")

@@ -158,7 +158,8 @@ class CommitFlow:
             return look(client, self._session.outbox, asked, mine, control.cancelled)
 
         def done(found: dict[str, Theirs]) -> None:
-            self._session.no_news(announced, (one.identity for one in asked if one.path not in found))
+            news = {one.identity for one in asked if one.path in found}  # copies have one identity
+            self._session.no_news(announced, {one.identity for one in asked} - news)
             back({**local, **found})
 
         self._session.ask(
