@@ -387,6 +387,15 @@ def test_a_disk_without_extended_attributes_is_no_failure(tmp_path: Path) -> Non
         assert open_document(path).Meta == {"SiloUUID": "u-1"}
 
 
+def test_a_file_is_stamped_under_any_of_its_spellings(tmp_path: Path) -> None:
+    """Where each spelling has a number of its own, the file seemed to be changed by somebody else."""
+    with other_disk(tmp_path, "each-spelling") as disk:
+        part().save(disk / "Part.FCStd")
+        assert stamp(disk / "part.fcstd", "u-1")
+        assert open_document(disk / "Part.FCStd").Meta == {"SiloUUID": "u-1"}
+        assert os.listdir(disk) == ["Part.FCStd"]
+
+
 @LINUX
 def test_a_folder_that_cannot_be_synced_is_no_failure() -> None:
     """/proc says EINVAL, as some shares do: the file was written all the same."""

@@ -11,7 +11,6 @@ harm.
 
 from __future__ import annotations
 
-import os
 import re
 import unicodedata
 from collections.abc import Callable, Mapping
@@ -25,6 +24,7 @@ from silo.fcstd.container import ContainerFile, Entry, FileState
 from silo.fcstd.edit import changed, check_writable, edited_xml, in_attribute, replace_file, replaced_entry
 from silo.fcstd.library import Library
 from silo.fcstd.limits import Limits
+from silo.spelling import one_path
 
 _LONGEST = 200
 
@@ -52,7 +52,7 @@ def stamp(
     Raises DocumentError: the file cannot be read or written, is read-only, was changed meanwhile, carries
     another identity, or has no such object. The file is then as it was.
     """
-    real = os.path.realpath(path)
+    real = one_path(str(path))
     _check_identity(real, identity)
     limits = limits or Limits()
     key = meta_key(object_name or "")
@@ -78,7 +78,7 @@ def check_stampable(
 
     Asked before an item is made on the server: a file that cannot name its item shall get none.
     """
-    real = os.path.realpath(path)
+    real = one_path(str(path))
     limits = limits or Limits()
     with ContainerFile(real, limits) as container:
         _present(real, container.state, "", object_name, replace, limits, item_object)
@@ -91,7 +91,7 @@ def unstamp(path: Path | str, object_name: str, *, limits: Limits | None = None)
 
     The document's own identity stays. Raises DocumentError as :func:`stamp` does.
     """
-    real = os.path.realpath(path)
+    real = one_path(str(path))
     limits = limits or Limits()
     with ContainerFile(real, limits) as container:
         state = container.state
