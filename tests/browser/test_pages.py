@@ -178,7 +178,7 @@ def test_the_tree_sorts_and_filters(machine: dict[str, str], visit: Visit) -> No
     expect(heads).to_have_text([machine["module"], machine["screw"]])
     expect(page.get_by_label("Find in this BOM")).to_have_value(machine["screw"])
     page.get_by_label("Find in this BOM").fill("nothing like this")
-    expect(page.locator("#shown")).to_contain_text("Nothing in this BOM fits")
+    expect(page.locator("#shown")).to_contain_text("No line of this BOM matches")
 
 
 def test_flat_view_totals_and_what_is_missing(machine: dict[str, str], visit: Visit) -> None:
