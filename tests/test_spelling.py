@@ -64,6 +64,7 @@ def test_every_normal_form_of_a_name_is_one_path(disk: Path) -> None:
     assert real(disk / NFD.upper() / f"{NFD}.FCStd") == str(wanted)
 
 
+@pytest.mark.usefixtures("needs_case")  # of the disk below the simulated one
 def test_a_letter_without_a_counterpart_keeps_no_name_from_being_found(tmp_path: Path) -> None:
     """Windows takes ß for no SS; one part was two components where a link wrote it in another case."""
     with other_disk(tmp_path, "by-letter") as disk:
